@@ -39,7 +39,7 @@ use attachments::Attachment;
 use blade::Blade;
 pub use blade::{BladeDefinition, BladeReport};
 pub use budget::BudgetReport;
-use budget::Pace;
+use budget::WorkPace;
 pub use profile::StepProfile;
 use recording::Recorder;
 pub use recording::{ReplayDifference, ReplayReport};
@@ -111,7 +111,7 @@ pub struct World {
     /// How many threads to blades there ever were.
     holds_made: u32,
     /// Tools that devices lead.
-    haptics: Vec<haptics::Link>,
+    haptics: Vec<haptics::HapticLink>,
     /// The steps that were taken.
     clock: Clock,
     /// The most substeps of the step in progress, whatever the definition allows.
@@ -119,7 +119,7 @@ pub struct World {
     /// What steps with a budget have not simulated yet, s.
     lag: f64,
     /// How fast this machine works.
-    pace: Pace,
+    pace: WorkPace,
     /// What the caller keeps with it.
     user_data: usize,
     /// What the stages of the last step took, where that is asked for.
@@ -162,7 +162,7 @@ impl World {
             clock: Clock::default(),
             work: u32::MAX,
             lag: 0.0,
-            pace: Pace::default(),
+            pace: WorkPace::default(),
             user_data: 0,
             profile: None,
             recorder: None,

@@ -1,14 +1,14 @@
 //! Which springs tear after a step, the most loaded first.
 
 use super::bearing::{Bearing, sorted};
-use super::stretch::Stretch;
+use super::stretch::StretchBound;
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::cutting::Changes;
 use crate::def::{BodyDefinition, Spring, TearReport, Tearing, Withheld};
 use crate::simd::ChosenKernel;
 use crate::soa::{NodeOrder, Vectors};
-use crate::springs::{Change, Link, Rewiring};
+use crate::springs::{Link, Rewiring, SpringChange};
 use crate::threads::Team;
 
 /// A spring beyond its limits.
@@ -27,7 +27,7 @@ saved!(Beyond { load, callers, nodes });
 pub(crate) struct Tears {
     asked: Tearing,
     pub(super) bearing: Bearing,
-    stretch: Stretch,
+    stretch: StretchBound,
     /// The most loaded first.
     beyond: Vec<Beyond>,
     /// How many of them have had their turn.
@@ -72,7 +72,7 @@ impl Tears {
         let mut tears = Self {
             asked,
             bearing: Bearing::new(springs, [asked.strain, asked.force], node_count, room)?,
-            stretch: Stretch::new(node_count, room)?,
+            stretch: StretchBound::new(node_count, room)?,
             beyond: Vec::new(),
             seen: 0,
             tried: 0,
@@ -118,7 +118,7 @@ impl Tears {
     }
 
     /// Springs have other stiffnesses or rest lengths; limits stay.
-    pub fn change(&mut self, changes: &[Change]) {
+    pub fn change(&mut self, changes: &[SpringChange]) {
         self.bearing.change(changes);
         self.stretch.forget();
     }

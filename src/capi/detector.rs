@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world};
 use super::memory::{self, Versioned};
-use super::overlaps::{Method, Overlaps, Side, of_body};
+use super::overlaps::{DetectorSide, Method, Overlaps, of_body};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
 use crate::base::memory::reserved;
@@ -146,7 +146,7 @@ unsafe impl Versioned for sinew_detector_report {}
 /// The caller owns it; it may outlive its world. Any number of threads may use a `const sinew_detector *` at the
 /// same time; a `sinew_detector *` needs exclusive access.
 pub struct sinew_detector {
-    sides: [Side; 2],
+    sides: [DetectorSide; 2],
     method: Method,
     found: Overlaps,
 }
@@ -230,7 +230,7 @@ impl sinew_detector_def {
         Ok(sinew_detector { sides, method, found })
     }
 
-    fn side(&self, side: usize, body: &Body) -> Result<Side> {
+    fn side(&self, side: usize, body: &Body) -> Result<DetectorSide> {
         let thickness = self.thickness[side];
         if !(thickness >= 0.0 && thickness.is_finite()) {
             return Err(Error::invalid(format!(
@@ -249,7 +249,7 @@ impl sinew_detector_def {
         } else {
             Surface::open(node_count, triangles)
         };
-        Ok(Side {
+        Ok(DetectorSide {
             body: self.bodies[side],
             surface: surface.map_err(|error| of_body(side, error))?,
             was_closed,
@@ -258,7 +258,7 @@ impl sinew_detector_def {
     }
 
     /// What a closed body encloses.
-    fn solid(number: usize, side: &Side, body: &Body) -> Result<Option<Box<Exact>>> {
+    fn solid(number: usize, side: &DetectorSide, body: &Body) -> Result<Option<Box<Exact>>> {
         if !side.was_closed {
             return Ok(None);
         }

@@ -12,7 +12,7 @@ use crate::detection::image_space::{self, ImageSpace, Surface};
 use crate::world::World;
 
 /// One of the two bodies.
-pub(super) struct Side {
+pub(super) struct DetectorSide {
     pub(super) body: sinew_body_id,
     pub(super) surface: Surface,
     /// When the detector was made.
@@ -49,7 +49,7 @@ const NOTHING: sinew_detector_report = sinew_detector_report {
     reserved: 0,
 };
 
-impl Side {
+impl DetectorSide {
     /// The body, where it is still what the detector was made for.
     pub(super) fn body<'a>(&self, number: usize, world: &'a World) -> Result<&'a Body> {
         let sinew_body_id { index1, generation } = self.body;
@@ -74,7 +74,7 @@ impl Side {
 }
 
 impl Overlaps {
-    pub(super) fn reserved(sides: &[Side; 2], method: &Method, has_volume: bool) -> Result<Self> {
+    pub(super) fn reserved(sides: &[DetectorSide; 2], method: &Method, has_volume: bool) -> Result<Self> {
         let node_counts = [0, 1].map(|side| sides[side].surface.node_count());
         let edges = sides.iter().map(|side| side.surface.edges().len()).max().unwrap_or(0);
         // As many as an image-space detection lists.

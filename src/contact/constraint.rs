@@ -2,7 +2,7 @@
 
 use glam::{BVec3, DVec3, Vec3, Vec3A};
 
-use super::driven::Yielding;
+use super::driven::YieldingTool;
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
 use super::impulses::{LEVERAGE, pushed_out};
@@ -218,7 +218,7 @@ impl Constraint {
     }
 
     /// What it asks of the velocities at these places of its nodes.
-    pub fn press(&self, place_of: impl Fn(u32) -> u32, yielding: &[Yielding]) -> Press {
+    pub fn press(&self, place_of: impl Fn(u32) -> u32, yielding: &[YieldingTool]) -> Press {
         let mut places = [0; MOST];
         for (place, &node) in places.iter_mut().zip(self.nodes()) {
             *place = place_of(node);
@@ -255,7 +255,7 @@ impl Constraint {
     }
 
     /// The part of such a way out, m, that a dynamic tool goes.
-    pub fn push_back(&self, tool: &mut Yielding, way: f32) {
+    pub fn push_back(&self, tool: &mut YieldingTool, way: f32) {
         tool.push_out(-self.normal * (way * self.effective_mass));
     }
 

@@ -17,7 +17,7 @@ use super::node_contacts::NodeContacts;
 use super::path::ToolPath;
 use super::press::Presses;
 use super::report::Touch;
-use super::rigid::RigidMotion;
+use super::rigid::RigidState;
 use super::supports::Supports;
 use crate::base::{Result, Stage, Stopwatch, memory};
 use crate::codec::saved;
@@ -36,17 +36,17 @@ const SWEEPS_OF_A_SLICE: u32 = 16;
 
 /// What a tool received from a body in the step in progress, N s and N m s.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Load {
+pub(crate) struct ToolLoad {
     pub impulse: DVec3,
     pub angular_impulse: DVec3,
 }
 
-saved!(Load {
+saved!(ToolLoad {
     impulse,
     angular_impulse
 });
 
-impl Load {
+impl ToolLoad {
     /// Adds an impulse at this place, from the tool's position.
     pub(super) fn add(&mut self, impulse: DVec3, arm: Vec3) {
         self.impulse += impulse;
@@ -81,7 +81,7 @@ pub(crate) struct Contacts {
     /// The first of them, which a solved equation has seen.
     pub holds: Holds,
     /// By the place of a tool among those of the step.
-    pub(super) loads: Vec<Load>,
+    pub(super) loads: Vec<ToolLoad>,
     /// What a contact's last impulse stands for, s.
     pressed_for: f32,
     /// How long the slice was that contacts were found for last, s.
@@ -176,7 +176,7 @@ impl Contacts {
     }
 
     /// Where a dynamic tool is at the end of a step of `dt` seconds, as the body moved it; `None`: the body did not press it.
-    pub fn dynamic_end(&self, index: usize, dt: f32) -> Option<RigidMotion> {
+    pub fn dynamic_end(&self, index: usize, dt: f32) -> Option<RigidState> {
         let is_pressed = self.loads[index].impulse != DVec3::ZERO;
         is_pressed.then(|| self.driven.end(index, dt)).flatten()
     }
@@ -204,7 +204,7 @@ impl Contacts {
     pub fn begin(&mut self, (tools, dynamic): (&[ToolPath], &[DynamicTool]), origin: DVec3) {
         self.driven.begin(tools, dynamic);
         self.loads.clear();
-        self.loads.resize(tools.len(), Load::default());
+        self.loads.resize(tools.len(), ToolLoad::default());
         // A step that is begun again goes back to where its nodes were.
         if !self.committed || !self.candidates.covers(tools, self.filter, origin) {
             self.candidates.invalidate();
@@ -303,7 +303,7 @@ impl Contacts {
     /// There is a tool more, this many in order: it has pressed nothing yet. There is [room](Self::reserve) for it.
     pub fn add_tool(&mut self, index: usize) {
         if index <= self.loads.len() {
-            self.loads.insert(index, Load::default());
+            self.loads.insert(index, ToolLoad::default());
         }
     }
 
@@ -405,7 +405,7 @@ impl Contacts {
     }
 
     /// What each tool of the step received.
-    pub fn loads(&self) -> &[Load] {
+    pub fn loads(&self) -> &[ToolLoad] {
         &self.loads
     }
 

@@ -126,7 +126,7 @@ impl Hold {
     }
 
     /// What its nodes have of what its corners have.
-    fn shared<T: Shared>(&self, of_corners: [T; 3]) -> [T; MOST] {
+    fn shared<T: Spread>(&self, of_corners: [T; 3]) -> [T; MOST] {
         let Some(ties) = &self.ties else {
             let [a, b, c] = of_corners;
             return [a, b, c, T::default()];
@@ -169,17 +169,17 @@ impl Hold {
 }
 
 /// What corners share out to their nodes.
-trait Shared: Copy + Default {
+trait Spread: Copy + Default {
     fn add(&mut self, other: Self, part: f64);
 }
 
-impl Shared for f64 {
+impl Spread for f64 {
     fn add(&mut self, other: Self, part: f64) {
         *self += other * part;
     }
 }
 
-impl Shared for [f64; MOST] {
+impl Spread for [f64; MOST] {
     fn add(&mut self, other: Self, part: f64) {
         for (sum, other) in self.iter_mut().zip(other) {
             *sum += other * part;

@@ -13,7 +13,7 @@ use glam::{DVec3, Vec3};
 use super::constraint::Constraint;
 use super::features::Feature;
 use super::gauge::Meets;
-use super::grip::{Grip, Grips, add};
+use super::grip::{Grips, NodeFriction, add};
 use super::hold::{Answer, Hold};
 use super::supports::{MOST, Supports};
 use crate::base::{Result, StateHasher};
@@ -237,7 +237,7 @@ impl Holds {
                 free[place] = constraint.starts[place].as_dvec3() + way.as_dvec3();
                 softness += share * share / stiffness;
                 if drags && constraint.friction > 0.0 && share > 0.0 && stiffness.is_finite() {
-                    let grip = Grip {
+                    let grip = NodeFriction {
                         node,
                         tool: constraint.tool,
                         slot: slot_of(constraint.tool),
@@ -246,7 +246,7 @@ impl Holds {
                         slip: (way - constraint.surface_velocity * duration).as_dvec3(),
                         stiffness: f64::from(STIFFER * constraint.firmness * stiffness),
                         kept: hold.kept,
-                        ..Grip::default()
+                        ..NodeFriction::default()
                     };
                     self.grips.add(share.into(), grip);
                 }

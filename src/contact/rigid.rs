@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 
-use super::contacts::Load;
+use super::contacts::ToolLoad;
 use super::tool::{Form, Pose};
 use crate::base::{Error, Result, StateHasher, above_zero};
 use crate::codec::saved;
@@ -46,7 +46,7 @@ saved!(RigidMass { mass, center, inertia, inverse_inertia } where RigidMass::is_
 
 /// Where a rigid tool is and how it moves.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RigidMotion {
+pub(crate) struct RigidState {
     /// The centre of mass, m.
     pub center: DVec3,
     pub orientation: DQuat,
@@ -56,7 +56,7 @@ pub(crate) struct RigidMotion {
     pub angular_momentum: DVec3,
 }
 
-saved!(RigidMotion {
+saved!(RigidState {
     center,
     orientation,
     velocity,
@@ -68,7 +68,7 @@ saved!(RigidMotion {
 pub(crate) struct Rigid {
     pub properties: MassProperties,
     pub mass: RigidMass,
-    pub motion: RigidMotion,
+    pub motion: RigidState,
     /// What the caller applies in the next step: at the centre of mass, N, and about it, N m.
     pub force: DVec3,
     pub torque: DVec3,
@@ -241,7 +241,7 @@ impl RigidMass {
     }
 }
 
-impl RigidMotion {
+impl RigidState {
     /// Where the tool is.
     pub fn pose(&self, mass: &RigidMass) -> Pose {
         Pose {
@@ -293,7 +293,7 @@ impl RigidMotion {
     }
 
     /// Takes an impulse, given with its moment about the tool's position.
-    pub fn take(&mut self, mass: &RigidMass, load: &Load) {
+    pub fn take(&mut self, mass: &RigidMass, load: &ToolLoad) {
         let arm = self.orientation * mass.center;
         self.velocity += load.impulse / mass.mass;
         self.angular_momentum += load.angular_impulse - arm.cross(load.impulse);
@@ -314,7 +314,7 @@ impl Rigid {
         let mut rigid = Self {
             properties: *properties,
             mass,
-            motion: RigidMotion {
+            motion: RigidState {
                 center: DVec3::ZERO,
                 orientation: DQuat::IDENTITY,
                 velocity: DVec3::ZERO,
@@ -348,7 +348,7 @@ impl Rigid {
     }
 
     /// A step has moved it so. Where that leads beyond all bounds it stops instead.
-    pub fn arrive(&mut self, motion: RigidMotion) {
+    pub fn arrive(&mut self, motion: RigidState) {
         (self.force, self.torque) = (DVec3::ZERO, DVec3::ZERO);
         let reaches = motion.position(&self.mass).abs().max_element() <= f64::from(FURTHEST);
         if motion.is_finite() && reaches {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 
 use super::cuboid;
-use super::limit::Reach;
+use super::limit::PressSearch;
 use super::mesh_solid::MeshSolid;
 use super::rigid::Rigid;
 use super::rounded;
@@ -170,7 +170,7 @@ pub(crate) struct Tool {
     /// Where the last step was to move it.
     pub led_to: Pose,
     /// How much of that way the step in progress takes, where it has a limit of force.
-    pub reach: Option<Reach>,
+    pub reach: Option<PressSearch>,
     /// Mean force on it over the last step, N.
     pub force: Vec3,
     /// Mean torque about its position over the last step, N m.
@@ -312,7 +312,7 @@ impl Tool {
     pub fn set_out(&mut self) {
         let goes = self.target.is_some_and(|target| target != self.pose);
         let is_limited = self.force_limit < f32::INFINITY && goes;
-        self.reach = is_limited.then(|| Reach::new(self.force.length(), self.force_limit));
+        self.reach = is_limited.then(|| PressSearch::new(self.force.length(), self.force_limit));
     }
 
     /// Adds the bits that the next step depends on.

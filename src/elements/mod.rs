@@ -151,7 +151,7 @@ impl Sums {
 }
 
 /// What is shown the nodes of a tetrahedron, the gradients of their functions, and how it is deformed.
-pub(crate) type See<'a> = dyn FnMut([u32; 4], &[DVec3; 4], &Deformed) + 'a;
+pub(crate) type SeeDeformed<'a> = dyn FnMut([u32; 4], &[DVec3; 4], &Deformed) + 'a;
 
 impl Elements {
     /// Tetrahedra of nodes that are here at rest, in the body's own numbers.
@@ -240,7 +240,7 @@ impl Elements {
 
     /// Shows each tetrahedron's nodes, the gradients of their functions and how it is deformed with nodes at `positions`; what rings do
     /// is shown as if each tetrahedron kept this part of it by itself.
-    pub fn visit_deformed(&self, positions: &Vectors, part_of_rings: f32, see: &mut See) {
+    pub fn visit_deformed(&self, positions: &Vectors, part_of_rings: f32, see: &mut SeeDeformed) {
         let mut law = self.stiffened();
         if law.rings {
             law.rings = false;

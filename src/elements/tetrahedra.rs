@@ -15,7 +15,7 @@ use self::st_venant_kirchhoff::{FindChanges, FindEnergy, FindForces, FindGrowths
 use crate::codec::saved;
 use crate::elements::Law;
 use crate::elements::laws::with_hyperelastic;
-use crate::simd::algebra::{Matrix, Six, cross, difference, dot, sum, times_lower, times_upper};
+use crate::simd::algebra::{Matrix3, Six, cross, difference, dot, sum, times_lower, times_upper};
 use crate::simd::{ChosenKernel, Lanes, Record};
 
 /// Tetrahedra side by side.
@@ -64,14 +64,14 @@ impl Stresses {
 
 /// Tetrahedra of nodes below a number.
 #[derive(Debug)]
-pub(crate) struct Groups {
+pub(crate) struct TetrahedronGroups {
     groups: Vec<Group>,
     node_count: usize,
 }
 
-saved!(Groups { groups, node_count } where Self::lead_to_nodes);
+saved!(TetrahedronGroups { groups, node_count } where Self::lead_to_nodes);
 
-impl Groups {
+impl TetrahedronGroups {
     /// # Panics
     /// Where a corner is not below `node_count`.
     pub fn new(groups: Vec<Group>, node_count: usize) -> Self {
@@ -263,11 +263,11 @@ struct Tetrahedra<'a> {
 }
 
 /// A tetrahedron as it is deformed.
-struct Deformed<L> {
+struct DeformedLanes<L> {
     /// F.
-    gradient: Matrix<L>,
+    gradient: Matrix3<L>,
     /// The cofactors of F.
-    cofactors: Matrix<L>,
+    cofactors: Matrix3<L>,
     /// 2 E.
     twice_strain: Six<L>,
     /// 2 tr E.
@@ -284,7 +284,7 @@ impl<'a> Tetrahedra<'a> {
     /// # Safety
     /// As for the kernel; `first` is a turn's first lane.
     #[inline(always)]
-    unsafe fn edges<L: Lanes>(from: *const Record, group: &Group, first: usize) -> (Matrix<L>, L) {
+    unsafe fn edges<L: Lanes>(from: *const Record, group: &Group, first: usize) -> (Matrix3<L>, L) {
         // SAFETY: corners lead to records.
         unsafe {
             let [a, b, c, d] = &group.corners;
@@ -315,7 +315,7 @@ impl<'a> Tetrahedra<'a> {
     }
 
     #[inline(always)]
-    unsafe fn deformed<L: Lanes>(&self, group: &Group, first: usize, inverse: Six<L>) -> Deformed<L> {
+    unsafe fn deformed<L: Lanes>(&self, group: &Group, first: usize, inverse: Six<L>) -> DeformedLanes<L> {
         // SAFETY: the same contract.
         unsafe {
             let (edges, pressure) = Self::edges::<L>(self.positions, group, first);
@@ -331,7 +331,7 @@ impl<'a> Tetrahedra<'a> {
                 dot(c, c).subtract(one),
             ];
             let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
-            Deformed {
+            DeformedLanes {
                 gradient,
                 cofactors,
                 twice_strain,
@@ -344,7 +344,7 @@ impl<'a> Tetrahedra<'a> {
 
     /// Adds the forces of stresses times minus the volume at rest.
     #[inline(always)]
-    unsafe fn spread<L: Lanes>(&self, group: &Group, first: usize, stress: Matrix<L>, inverse: Six<L>) {
+    unsafe fn spread<L: Lanes>(&self, group: &Group, first: usize, stress: Matrix3<L>, inverse: Six<L>) {
         // SAFETY: the same contract.
         unsafe {
             let [b, c, d] = times_lower(stress, inverse);

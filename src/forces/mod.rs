@@ -51,7 +51,7 @@ pub(crate) struct Sum<'a> {
     pub springs: &'a dyn Springs,
     elements: Option<elements::Shares<'a>>,
     terms: Option<&'a Terms>,
-    cavities: Option<enclosed::Shares<'a>>,
+    cavities: Option<enclosed::PressureShares<'a>>,
 }
 
 impl Sum<'_> {

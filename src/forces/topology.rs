@@ -6,7 +6,7 @@ use super::{Changes, Forces};
 use crate::base::Result;
 use crate::elements::PieceOfElement;
 use crate::soa::{Masses, Region, Scale, Vectors};
-use crate::springs::Change;
+use crate::springs::SpringChange;
 use crate::terms::Parting;
 
 /// What a cut makes of elements and terms.
@@ -125,7 +125,7 @@ impl Forces {
     }
 
     /// Gives springs that there are, each once, other parameters. Changes nothing where it fails.
-    pub fn set_springs(&mut self, changes: &[Change]) -> Result<()> {
+    pub fn set_springs(&mut self, changes: &[SpringChange]) -> Result<()> {
         self.springs.set(changes)?;
         for law in self.beside.laws_mut() {
             changes.iter().for_each(|change| law.set_spring(change));

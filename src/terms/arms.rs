@@ -6,7 +6,7 @@
 use glam::{DMat3, DVec3};
 
 use super::nonlinear::Curve;
-use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
+use super::stencils::{StencilLaw, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use super::{Event, Term};
 use crate::base::{Result, StateHasher, memory};
@@ -81,7 +81,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
 }
 
 /// An arm where it is: the way from its first node to the other, and what is elastic.
-struct Placed {
+struct PlacedArm {
     way: DVec3,
     length: f64,
     strain: f64,
@@ -91,10 +91,10 @@ struct Placed {
 }
 
 impl Arms {
-    fn place(&self, arm: &Arm, [from, to]: &[DVec3; 2]) -> Placed {
+    fn place(&self, arm: &Arm, [from, to]: &[DVec3; 2]) -> PlacedArm {
         let way = *to - *from;
         let (length, rest_length) = (way.length(), f64::from(arm.rest_length));
-        let mut placed = Placed {
+        let mut placed = PlacedArm {
             way,
             length,
             strain: 0.0,
@@ -119,11 +119,11 @@ impl Arms {
         [longer + rest_length * pull, 1.0 + slope]
     }
 
-    fn pull(&self, arm: &Arm, placed: &Placed) -> f64 {
+    fn pull(&self, arm: &Arm, placed: &PlacedArm) -> f64 {
         f64::from(arm.load) + self.course.gain * placed.elastic
     }
 
-    fn stiffness(&self, arm: &Arm, placed: &Placed, is_exact: bool) -> DMat3 {
+    fn stiffness(&self, arm: &Arm, placed: &PlacedArm, is_exact: bool) -> DMat3 {
         let pull = self.pull(arm, placed);
         let across = if placed.length > 0.0 && (is_exact || pull > 0.0) {
             pull / placed.length
@@ -134,7 +134,7 @@ impl Arms {
     }
 }
 
-impl Law<2> for Arms {
+impl StencilLaw<2> for Arms {
     const SAVED_AS: u8 = 1;
 
     type Shape = Arm;

@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 
 use super::Term;
 use super::parting::Parting;
-use super::stencils::{Law, SeePart, Stencil, Stencils, directed, lengthening, shares, weighted};
+use super::stencils::{SeePart, Stencil, StencilLaw, Stencils, directed, lengthening, shares, weighted};
 use super::strings::Tension;
 use crate::base::{Error, Result, memory};
 use crate::codec::saved;
@@ -91,7 +91,7 @@ fn stiffness(fibre: DVec3) -> DMat3 {
     directed(fibre / length, 1.0, 1.0 - 1.0 / length)
 }
 
-impl Law<4> for Fibres {
+impl StencilLaw<4> for Fibres {
     const SAVED_AS: u8 = 6;
 
     type Shape = [f32; 3];

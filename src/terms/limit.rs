@@ -6,7 +6,7 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencils, directed, lengthening, of_springs};
+use super::stencils::{StencilLaw, Stencils, directed, lengthening, of_springs};
 use super::strings::Tension;
 use crate::base::{Error, Result, memory, not_negative};
 use crate::codec::saved;
@@ -72,7 +72,7 @@ impl Limit {
     }
 }
 
-impl Law<2> for Limit {
+impl StencilLaw<2> for Limit {
     const SAVED_AS: u8 = 2;
 
     type Shape = f32;

@@ -7,7 +7,7 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
+use super::stencils::{StencilLaw, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use crate::base::{Error, Result, memory};
 use crate::codec::saved;
@@ -226,7 +226,7 @@ impl Stiffening {
     }
 }
 
-impl Law<2> for Stiffening {
+impl StencilLaw<2> for Stiffening {
     const SAVED_AS: u8 = 5;
 
     type Shape = f32;

@@ -6,18 +6,18 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::parting::Parting;
-use super::stencils::{Law, Stencil, Stencils, tile_of};
+use super::stencils::{Stencil, StencilLaw, Stencils, tile_of};
 use super::strings::Aging;
-use super::{Blocks, Event, Term};
+use super::{Event, TangentBlocks, Term};
 use crate::base::{Error, Result, StateHasher, memory};
 use crate::codec::{Saved, Writer};
 use crate::def::RelaxationStep;
 use crate::simd::ChosenKernel;
 use crate::soa::{Masses, Region, Scale, TileForces, Vectors, View, tile_count};
-use crate::springs::Change;
+use crate::springs::SpringChange;
 use crate::threads::{Ragged, Team};
 
-impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
+impl<L: StencilLaw<N>, const N: usize> Term for Stencils<L, N> {
     fn save(&self, to: &mut Writer) {
         to.put(&[L::SAVED_AS]);
         Saved::save(self, to);
@@ -90,8 +90,8 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         }
     }
 
-    fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &Blocks)) {
-        let mut shown = Blocks::default();
+    fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &TangentBlocks)) {
+        let mut shown = TangentBlocks::default();
         for stencil in self.there() {
             let blocks = self.law.blocks(&stencil.shape, &stencil.at(at), is_exact);
             for (shown, blocks) in shown.iter_mut().zip(blocks) {
@@ -173,7 +173,7 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         removed
     }
 
-    fn set_spring(&mut self, change: &Change) {
+    fn set_spring(&mut self, change: &SpringChange) {
         if !L::IS_OF_SPRINGS {
             return;
         }

@@ -14,7 +14,7 @@ use crate::def::{RelaxationStep, Spring};
 use crate::soa::{NodeOrder, Region, Scale, TILE, TileForces, View, tile_count};
 
 /// What a term does whose stiffness is 1.
-pub(super) trait Law<const N: usize>: Saved + Debug + Send + Sync + 'static {
+pub(super) trait StencilLaw<const N: usize>: Saved + Debug + Send + Sync + 'static {
     /// Which law it is, in bytes.
     const SAVED_AS: u8;
 
@@ -163,7 +163,7 @@ pub(super) fn of_springs<T>(
 
 /// Terms of one law.
 #[derive(Debug)]
-pub(super) struct Stencils<L: Law<N>, const N: usize> {
+pub(super) struct Stencils<L: StencilLaw<N>, const N: usize> {
     pub(super) law: L,
     /// By the first of their tiles, but for those of cuts, which follow them.
     pub(super) all: Vec<Stencil<L::Shape, N>>,
@@ -178,13 +178,13 @@ pub(super) struct Stencils<L: Law<N>, const N: usize> {
     pub(super) added: Vec<Stencil<L::Shape, N>>,
 }
 
-saved!([L: Law<N>, const N: usize] Stencils<L, N> { law, all, starts, visitor_starts, visitors, later, changed, added });
+saved!([L: StencilLaw<N>, const N: usize] Stencils<L, N> { law, all, starts, visitor_starts, visitors, later, changed, added });
 
 pub(super) fn tile_of(node: u32) -> usize {
     node as usize / TILE
 }
 
-impl<L: Law<N>, const N: usize> Stencils<L, N> {
+impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
     pub fn new(law: L, mut all: Vec<Stencil<L::Shape, N>>, node_count: usize) -> Result<Self> {
         let tiles = |stencil: &Stencil<L::Shape, N>| {
             let mut tiles = stencil.nodes.map(tile_of);
@@ -298,7 +298,7 @@ impl<L: Law<N>, const N: usize> Stencils<L, N> {
     }
 }
 
-impl<L: Law<N>, const N: usize> Stencils<L, N> {
+impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
     /// Where the terms are that a region has all nodes of.
     pub(super) fn within(&self, region: &Region) -> impl Iterator<Item = usize> {
         let tiles = region.tiles().filter(|_| !L::IS_OF_SPRINGS);

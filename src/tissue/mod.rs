@@ -25,7 +25,7 @@ mod skin;
 mod warm_start;
 mod wound;
 
-pub(crate) use self::bonds::{Bonds, Bound, Lead, Thread, are_one, distance};
+pub(crate) use self::bonds::{BondPoint, Bonds, Lead, Thread, are_one, distance};
 pub(crate) use self::change::{SkinChange, SurfaceToBe};
 use self::clearances::Clearances;
 use self::entangled::Entangled;

@@ -3,9 +3,9 @@
 use super::Tissue;
 use super::bonds::Bonds;
 use super::entangled::Entangled;
-use super::link::{Link, Side};
+use super::link::{ContactSide, Link};
 use super::plan::FASTER;
-use super::search::{Measure, Party, Search, shift};
+use super::search::{Measure, PairSearch, Party, shift};
 use super::skin::Skin;
 use super::{join_movers, meet_each_other};
 use crate::geometry::Bounds;
@@ -62,7 +62,7 @@ impl Tissue {
         [a, b]: [usize; 2],
         bodies: &impl Systems,
         moment: &Span,
-    ) -> Option<Search<'a>> {
+    ) -> Option<PairSearch<'a>> {
         let party = |place: usize| {
             let skin = skins.get(place)?.as_ref()?;
             Some(Party { place, skin })
@@ -76,7 +76,7 @@ impl Tissue {
         }
         let is_looked_at = both.into_iter().all(|body| moment.concerns(body));
         let [own, others] = [first.skin, second.skin];
-        (is_looked_at && !entangled.has([a, b])).then(|| Search {
+        (is_looked_at && !entangled.has([a, b])).then(|| PairSearch {
             parties: [first, second],
             dt: moment.duration,
             radius,
@@ -93,7 +93,7 @@ impl Tissue {
         pair: [usize; 2],
         bodies: &impl Systems,
         moment: &Span,
-    ) -> Option<Search<'a>> {
+    ) -> Option<PairSearch<'a>> {
         Self::search(skins, pair, bodies, moment).filter(|search| !search.in_images)
     }
 
@@ -209,7 +209,7 @@ impl Tissue {
 }
 
 /// Whether a bond makes one point of nodes of both sides.
-fn are_joined(bonds: &Bonds, bodies: &impl Systems, sides: &[Side; 2]) -> bool {
+fn are_joined(bonds: &Bonds, bodies: &impl Systems, sides: &[ContactSide; 2]) -> bool {
     let [a, b] = sides;
     !bonds.are_none() && join_movers(bonds, bodies, [a.body, b.body], [&a.nodes, &b.nodes])
 }

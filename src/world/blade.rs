@@ -131,7 +131,7 @@ pub(super) struct Proxy {
     pub uncut: f64,
     pub behind: DVec3,
     /// What it is held by; none: nothing resists.
-    pub holds: Vec<Hold>,
+    pub holds: Vec<Snag>,
     /// The shortest edge of what it stands in, m.
     pub size: f64,
     /// What resists, N, and where to.
@@ -156,7 +156,7 @@ saved!(Proxy {
 
 /// A thread between tissue and the true edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Hold {
+pub(super) struct Snag {
     /// The thread's name.
     pub id: SlotId,
     /// From the point of the proxy to that of the tissue, m.
@@ -165,7 +165,7 @@ pub(super) struct Hold {
     pub way: Lead,
 }
 
-saved!(Hold { id, offset, way });
+saved!(Snag { id, offset, way });
 
 /// A point of the proxy, and the true edge next to it.
 #[derive(Clone, Copy, Debug)]
@@ -286,7 +286,7 @@ impl Blade {
     }
 }
 
-impl Hold {
+impl Snag {
     /// One of this number, which is nowhere yet. No attachment has place 0.
     pub fn new(number: u32) -> Self {
         Self {

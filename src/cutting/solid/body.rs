@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::sever::{Mark, Stroke};
+use super::sever::{Mark, SolidStroke};
 use crate::base::{Result, memory};
 use crate::codec::{saved, saved_enum};
 use crate::cutting::divided::{Cell, Divided, NONE, Node, Simplex, divided, weighed};
@@ -50,7 +50,7 @@ saved_enum!(Face { 0 => Whole, 1 => Severed, 2 => Opening });
 
 /// A tetrahedron of the material.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tetrahedron {
+pub struct SolidTetrahedron {
     /// Its vertices; seen from the first the others are clockwise, that is, their triple product is above 0.
     pub corners: [u32; 4],
     /// The cell that it lies in.
@@ -69,7 +69,7 @@ pub struct Tetrahedron {
     pub(crate) next: u32,
 }
 
-saved!(Tetrahedron {
+saved!(SolidTetrahedron {
     corners,
     cell,
     volume,
@@ -130,14 +130,14 @@ saved!(SolidVertex {
 pub struct CutSolid {
     pub(crate) nodes: Tracked<Node>,
     pub(crate) cells: Tracked<SolidCell>,
-    pub(crate) tetrahedra: Tracked<Tetrahedron>,
+    pub(crate) tetrahedra: Tracked<SolidTetrahedron>,
     pub(crate) triangles: Tracked<SolidTriangle>,
     pub(crate) vertices: Tracked<SolidVertex>,
     /// How many strokes there were.
     pub(crate) strokes: u32,
-    pub(crate) stroke: Stroke,
+    pub(crate) stroke: SolidStroke,
     /// Both before the last cut.
-    pub(crate) before: (u32, Stroke),
+    pub(crate) before: (u32, SolidStroke),
 }
 
 saved!(CutSolid {
@@ -160,7 +160,7 @@ divided!(CutSolid, 4, SolidCell { volume }, tetrahedra, {
     }
 
     fn move_simplex(&mut self, tetrahedron: u32, cell: u32, next: u32) -> Result<()> {
-        let Tetrahedron {
+        let SolidTetrahedron {
             cell: before, drawn, ..
         } = self.tetrahedra[tetrahedron];
         self.tetrahedra
@@ -190,7 +190,7 @@ impl CutSolid {
     }
 
     /// The tetrahedra of the material; none is ever taken away.
-    pub fn tetrahedra(&self) -> &[Tetrahedron] {
+    pub fn tetrahedra(&self) -> &[SolidTetrahedron] {
         self.tetrahedra.values()
     }
 

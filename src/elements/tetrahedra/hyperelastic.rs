@@ -2,8 +2,8 @@
 
 use super::{GROUP, Law, Tetrahedra, turns};
 use crate::elements::LEAST_SHEAR;
-use crate::elements::laws::{Columns, Hyperelastic, Strained};
-use crate::simd::algebra::{Matrix, scaled_matrix, times_upper};
+use crate::elements::laws::{Hyperelastic, MatrixColumns, Strained};
+use crate::simd::algebra::{Matrix3, scaled_matrix, times_upper};
 use crate::simd::{InLanes, Lanes, Record, WithLanes};
 
 /// With the pressures that their nodes have beside their places, or none.
@@ -23,7 +23,7 @@ pub(super) struct HyperelasticChanges<'a, H, const RINGS: bool> {
 /// # Safety
 /// As [`InLanes::new`].
 #[inline(always)]
-unsafe fn numbers<L: Lanes>([a, b, c]: Matrix<L>) -> Columns<InLanes<L>> {
+unsafe fn numbers<L: Lanes>([a, b, c]: Matrix3<L>) -> MatrixColumns<InLanes<L>> {
     // SAFETY: the caller's promise.
     unsafe {
         [
@@ -35,7 +35,7 @@ unsafe fn numbers<L: Lanes>([a, b, c]: Matrix<L>) -> Columns<InLanes<L>> {
 }
 
 #[inline(always)]
-fn lanes<L: Lanes>([a, b, c]: Columns<InLanes<L>>) -> Matrix<L> {
+fn lanes<L: Lanes>([a, b, c]: MatrixColumns<InLanes<L>>) -> Matrix3<L> {
     [
         [a[0].lanes(), a[1].lanes(), a[2].lanes()],
         [b[0].lanes(), b[1].lanes(), b[2].lanes()],

@@ -1,6 +1,6 @@
 //! The kernels of tetrahedra of St Venant and Kirchhoff's law with a signed volume term.
 
-use super::{Deformed, GROUP, Stresses, Tetrahedra, turns};
+use super::{DeformedLanes, GROUP, Stresses, Tetrahedra, turns};
 use crate::elements::{LEAST_SHEAR, Law};
 use crate::simd::algebra::{Six, add_times, cross, dot, largest, scaled_matrix, scaled_six, sum_six, times_upper};
 use crate::simd::{Lanes, Record, WithLanes};
@@ -96,7 +96,7 @@ impl<const RINGS: bool, const LOADED: bool> WithLanes for FindForces<'_, RINGS, 
                     let inverse = Tetrahedra::inverse::<L>(group, first);
                     let volumes = Tetrahedra::volumes::<L>(group, first);
                     let deformed = of.deformed(group, first, inverse);
-                    let Deformed {
+                    let DeformedLanes {
                         gradient,
                         cofactors,
                         twice_strain,

@@ -9,7 +9,8 @@
 use std::ops::Range;
 
 use super::layout::{
-    Column, Ends, FarIndices, Gather, Line, LinkPlace, Material, NearIndices, Neighbours, OWN, OwnRun, Parameters, Run,
+    Column, ColumnEnds, FarIndices, GatherColumn, Line, LinkPlace, NearIndices, Neighbours, OWN, OwnRun, Parameters,
+    RunColumn, SpringMaterial,
 };
 use super::strays::Strays;
 use crate::base::{Result, memory};
@@ -36,12 +37,12 @@ pub(crate) struct Columns {
     pub(super) reads: Range<isize>,
     /// What small indices count from.
     pub(super) window: usize,
-    pub(super) blocks: Vec<Ends>,
-    pub(super) runs: Vec<Run>,
+    pub(super) blocks: Vec<ColumnEnds>,
+    pub(super) runs: Vec<RunColumn>,
     pub(super) own_runs: Vec<OwnRun>,
-    pub(super) near: Vec<Gather>,
+    pub(super) near: Vec<GatherColumn>,
     pub(super) near_indices: Vec<NearIndices>,
-    pub(super) far: Vec<Gather>,
+    pub(super) far: Vec<GatherColumn>,
     pub(super) far_indices: Vec<FarIndices>,
     /// The parameters of columns that bring their own, in the order of the blocks, and in a block runs first, then near and
     /// far gathers.
@@ -107,7 +108,7 @@ impl Columns {
     }
 
     /// The columns of the next sixteen nodes; those that are shared are of `materials`.
-    pub fn push_block(&mut self, columns: &[Column], materials: &[Material]) -> Result<()> {
+    pub fn push_block(&mut self, columns: &[Column], materials: &[SpringMaterial]) -> Result<()> {
         let first = self.first + self.blocks.len() * LANES;
         let nodes = (self.first + self.count).saturating_sub(first).min(LANES);
         assert!(nodes > 0, "a block beyond the tile's last node");
@@ -126,7 +127,7 @@ impl Columns {
         }
         memory::push(
             &mut self.blocks,
-            Ends {
+            ColumnEnds {
                 runs: self.runs.len() as u32,
                 own_runs: self.own_runs.len() as u32,
                 near: self.near.len() as u32,
@@ -205,7 +206,7 @@ impl Columns {
     }
 
     /// A column of the sixteen nodes from `first` on.
-    fn push_column(&mut self, first: usize, column: &Column, materials: &[Material]) -> Result<()> {
+    fn push_column(&mut self, first: usize, column: &Column, materials: &[SpringMaterial]) -> Result<()> {
         let Column { lanes, .. } = *column;
         let material = self.push_parameters(&column.parameters)?;
         match column.neighbours {
@@ -222,7 +223,7 @@ impl Columns {
                     return memory::push(&mut self.own_runs, OwnRun { offset, lanes });
                 }
                 let shared = &materials[usize::from(material)];
-                let run = Run {
+                let run = RunColumn {
                     offset,
                     lanes,
                     material,
@@ -240,7 +241,7 @@ impl Columns {
                 for node in neighbours {
                     self.reads_also(node as isize..node as isize + 1);
                 }
-                let gather = Gather { lanes, material };
+                let gather = GatherColumn { lanes, material };
                 if self.is_near(&column.neighbours) {
                     let indices = neighbours.map(|neighbour| (neighbour as usize - self.window) as u16);
                     memory::push(&mut self.near, gather)?;
@@ -357,13 +358,13 @@ impl Columns {
     }
 
     /// Shows the links of `node`.
-    pub fn visit(&self, node: usize, materials: &[Material], see: &mut dyn FnMut(Link)) {
+    pub fn visit(&self, node: usize, materials: &[SpringMaterial], see: &mut dyn FnMut(Link)) {
         self.visit_columns(node, materials, see);
         self.strays.visit(node, see);
     }
 
     /// Shows the links of `node` that are in columns.
-    pub(super) fn visit_columns(&self, node: usize, materials: &[Material], see: &mut dyn FnMut(Link)) {
+    pub(super) fn visit_columns(&self, node: usize, materials: &[SpringMaterial], see: &mut dyn FnMut(Link)) {
         let lane = (node - self.first) % LANES;
         self.columns_of(node, &mut |_, material, own, neighbour| {
             let material = match material {
@@ -508,8 +509,8 @@ impl Columns {
         }
     }
 
-    fn own_parameters(&self, own: usize, lane: usize) -> Material {
-        Material {
+    fn own_parameters(&self, own: usize, lane: usize) -> SpringMaterial {
+        SpringMaterial {
             stiffness: self
                 .own_stiffnesses
                 .get(own)
@@ -521,9 +522,9 @@ impl Columns {
 
     /// Where the columns of a block start and end.
     #[inline(always)]
-    pub(super) fn ends(&self, block: usize) -> (Ends, Ends) {
+    pub(super) fn ends(&self, block: usize) -> (ColumnEnds, ColumnEnds) {
         let start = if block == 0 {
-            Ends::default()
+            ColumnEnds::default()
         } else {
             self.blocks[block - 1]
         };

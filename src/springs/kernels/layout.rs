@@ -8,7 +8,7 @@ pub(super) const OWN: u16 = u16::MAX;
 
 /// Parameters that many springs of a body share.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Material {
+pub(crate) struct SpringMaterial {
     /// N/m
     pub stiffness: f32,
     /// m
@@ -17,13 +17,13 @@ pub(crate) struct Material {
     pub damping: f32,
 }
 
-saved!(Material {
+saved!(SpringMaterial {
     stiffness,
     rest_length,
     damping
 });
 
-impl Material {
+impl SpringMaterial {
     /// Half the force with which a spring would be pressed to length 0, N.
     #[inline(always)]
     pub fn half_tension(&self) -> f32 {
@@ -75,7 +75,7 @@ pub(crate) struct Column {
 
 /// A column of neighbours that lie side by side, of springs that share their parameters.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
+pub(super) struct RunColumn {
     pub offset: i32,
     pub lanes: u16,
     /// Its place in the table of materials: what follows is a copy from there.
@@ -84,7 +84,7 @@ pub(super) struct Run {
     pub half_tension: f32,
 }
 
-saved!(Run {
+saved!(RunColumn {
     offset,
     lanes,
     material,
@@ -103,15 +103,15 @@ saved!(OwnRun { offset, lanes });
 
 /// What there is to know of a gather beside its neighbours.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Gather {
+pub(super) struct GatherColumn {
     pub lanes: u16,
     /// Its place in the table of materials; [`OWN`].
     pub(super) material: u16,
 }
 
-saved!(Gather { lanes, material });
+saved!(GatherColumn { lanes, material });
 
-impl Gather {
+impl GatherColumn {
     /// Its place in the table of materials, where its springs share their parameters.
     #[inline(always)]
     pub fn material(self) -> Option<usize> {
@@ -121,7 +121,7 @@ impl Gather {
 
 /// Where the columns of sixteen nodes end in each list.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Ends {
+pub(super) struct ColumnEnds {
     pub runs: u32,
     pub own_runs: u32,
     pub near: u32,
@@ -129,7 +129,7 @@ pub(super) struct Ends {
     pub own: u32,
 }
 
-saved!(Ends {
+saved!(ColumnEnds {
     runs,
     own_runs,
     near,

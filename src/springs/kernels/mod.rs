@@ -9,4 +9,4 @@ mod sound;
 mod strays;
 
 pub(super) use columns::Columns;
-pub(super) use layout::{Column, Line, Material, Neighbours, Parameters};
+pub(super) use layout::{Column, Line, Neighbours, Parameters, SpringMaterial};

@@ -16,7 +16,7 @@ pub(super) const CORNERS: usize = 2 * OF_POINT;
 
 /// One of the points of a bond, as the caller knows it and as the solvers do.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Bound {
+pub(crate) struct BondPoint {
     /// By the body's place in the world.
     pub body: usize,
     /// In the caller's numbers; `None`: what a blade stands in inside of a solid.
@@ -25,9 +25,9 @@ pub(crate) struct Bound {
     pub nodes: [(u32, f32); OF_POINT],
 }
 
-saved!(Bound { body, anchor, nodes });
+saved!(BondPoint { body, anchor, nodes });
 
-impl Bound {
+impl BondPoint {
     /// The sum of the parts of its nodes: 1, but for rounding; 0 of what is no point of tissue.
     pub(super) fn weight(&self) -> f64 {
         self.nodes.iter().map(|&(_, weight)| f64::from(weight)).sum()
@@ -36,7 +36,7 @@ impl Bound {
 
 /// A corner of one of the points of a bond.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Corner {
+pub(crate) struct BondCorner {
     /// By its place in the world.
     pub body: usize,
     pub node: u32,
@@ -46,7 +46,7 @@ pub(crate) struct Corner {
     pub end: usize,
 }
 
-saved!(Corner {
+saved!(BondCorner {
     body,
     node,
     weight,
@@ -59,8 +59,8 @@ pub(super) struct Bond {
     /// Its name among the world's attachments.
     pub(super) id: SlotId,
     /// The first point and the second.
-    pub(super) points: [Bound; 2],
-    pub(super) corners: [Corner; CORNERS],
+    pub(super) points: [BondPoint; 2],
+    pub(super) corners: [BondCorner; CORNERS],
     /// What is between them; else they are one.
     pub(super) thread: Option<Thread>,
     /// The mean force over a step with which it just holds, N.
@@ -109,7 +109,7 @@ saved!(Bond {
 
 /// A node at which bonds are.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct End {
+pub(super) struct BondEnd {
     pub(super) body: usize,
     pub(super) node: u32,
     /// Whether a bond is there still.
@@ -130,7 +130,7 @@ pub(super) struct End {
     pub(super) is_pending: bool,
 }
 
-saved!(End {
+saved!(BondEnd {
     body,
     node,
     is_used,
@@ -146,7 +146,7 @@ saved!(End {
 });
 
 impl Bond {
-    pub(super) fn used(&self) -> impl Iterator<Item = Corner> + use<> {
+    pub(super) fn used(&self) -> impl Iterator<Item = BondCorner> + use<> {
         self.corners.into_iter().filter(|corner| corner.weight != 0.0)
     }
 
@@ -155,8 +155,8 @@ impl Bond {
     }
 }
 
-impl End {
-    pub(super) fn new(corner: &Corner) -> Self {
+impl BondEnd {
+    pub(super) fn new(corner: &BondCorner) -> Self {
         Self {
             body: corner.body,
             node: corner.node,
@@ -175,7 +175,7 @@ impl End {
 }
 
 /// Where a point that is bound is now, m.
-pub(super) fn place(point: &Bound, bodies: &impl Systems) -> Option<DVec3> {
+pub(super) fn place(point: &BondPoint, bodies: &impl Systems) -> Option<DVec3> {
     let body = bodies.at(point.body)?;
     let positions = body.state.positions();
     let place = |(node, weight): (u32, f32)| positions.get(node as usize).as_dvec3() * f64::from(weight);
@@ -183,16 +183,16 @@ pub(super) fn place(point: &Bound, bodies: &impl Systems) -> Option<DVec3> {
 }
 
 /// The corners of two points: a node that has a part in both has the difference.
-pub(super) fn corners_of(points: &[Bound; 2]) -> [Corner; CORNERS] {
-    let mut corners = [Corner::default(); CORNERS];
+pub(super) fn corners_of(points: &[BondPoint; 2]) -> [BondCorner; CORNERS] {
+    let mut corners = [BondCorner::default(); CORNERS];
     let mut count = 0;
     for (point, sign) in points.iter().zip([1.0, -1.0]) {
         for &(node, weight) in point.nodes.iter().filter(|(_, weight)| *weight != 0.0) {
-            let is_known = |corner: &&mut Corner| (corner.body, corner.node) == (point.body, node);
+            let is_known = |corner: &&mut BondCorner| (corner.body, corner.node) == (point.body, node);
             match corners[..count].iter_mut().find(is_known) {
                 Some(corner) => corner.weight += sign * weight,
                 None => {
-                    corners[count] = Corner {
+                    corners[count] = BondCorner {
                         body: point.body,
                         node,
                         weight: sign * weight,
@@ -207,7 +207,7 @@ pub(super) fn corners_of(points: &[Bound; 2]) -> [Corner; CORNERS] {
 }
 
 /// How far two points are apart now, m.
-pub(crate) fn distance(bodies: &impl Systems, points: &[Bound; 2]) -> f64 {
+pub(crate) fn distance(bodies: &impl Systems, points: &[BondPoint; 2]) -> f64 {
     let apart: DVec3 = corners_of(points)
         .iter()
         .filter(|corner| corner.weight != 0.0)
@@ -221,6 +221,6 @@ pub(crate) fn distance(bodies: &impl Systems, points: &[Bound; 2]) -> f64 {
 }
 
 /// Where a node is among ends, or would be.
-pub(super) fn place_of(ends: &[End], body: usize, node: u32) -> std::result::Result<usize, usize> {
+pub(super) fn place_of(ends: &[BondEnd], body: usize, node: u32) -> std::result::Result<usize, usize> {
     ends.binary_search_by_key(&(body, node), |end| (end.body, end.node))
 }

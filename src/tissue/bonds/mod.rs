@@ -22,8 +22,8 @@ use crate::codec::saved;
 use crate::geometry::Bounds;
 use crate::solver::{Outcome, System, Systems};
 
-use self::bond::{Bond, CORNERS, Corner, End, OF_POINT, corners_of, place, place_of};
-pub(crate) use self::bond::{Bound, distance};
+use self::bond::{Bond, BondCorner, BondEnd, CORNERS, OF_POINT, corners_of, place, place_of};
+pub(crate) use self::bond::{BondPoint, distance};
 pub(crate) use self::thread::{Lead, Thread};
 
 /// What is apart comes together no faster than this, m/s, so that bodies that are far apart follow their points.
@@ -35,7 +35,7 @@ pub(crate) struct Bonds {
     /// In the order in which they came.
     bonds: Vec<Bond>,
     /// In the order of their bodies and nodes.
-    ends: Vec<End>,
+    ends: Vec<BondEnd>,
     /// Whether the first substep is to come, which VERLET begins with half a kick.
     is_opening: bool,
 }
@@ -47,7 +47,7 @@ saved!(Bonds {
 });
 
 /// Whether two points are one, of one body.
-pub(crate) fn are_one(points: &[Bound; 2]) -> bool {
+pub(crate) fn are_one(points: &[BondPoint; 2]) -> bool {
     corners_of(points).iter().all(|corner| corner.weight == 0.0)
 }
 
@@ -78,7 +78,7 @@ impl Bonds {
     }
 
     /// Keeps two points together, for which there is room, or a thread between them, once [`Self::settle`] has seen to all that were added.
-    pub fn add(&mut self, id: SlotId, points: [Bound; 2], limit: f32, thread: Option<Thread>) -> Result<()> {
+    pub fn add(&mut self, id: SlotId, points: [BondPoint; 2], limit: f32, thread: Option<Thread>) -> Result<()> {
         let bond = Bond {
             id,
             points,
@@ -102,8 +102,8 @@ impl Bonds {
 
     /// Has a thread to a blade begin at a point from now on, for which there is room: that of this name, which goes on with what it did, or a new
     /// one. To be followed by [`Self::pull`] and [`Self::settle`].
-    pub fn hold(&mut self, id: SlotId, point: Bound) -> Result<()> {
-        let nowhere = Bound {
+    pub fn hold(&mut self, id: SlotId, point: BondPoint) -> Result<()> {
+        let nowhere = BondPoint {
             nodes: [(0, 0.0); OF_POINT],
             ..point
         };
@@ -163,16 +163,16 @@ impl Bonds {
     }
 
     /// The points of a body.
-    pub fn points_of(&self, body: usize) -> impl Iterator<Item = &Bound> {
+    pub fn points_of(&self, body: usize) -> impl Iterator<Item = &BondPoint> {
         let points = self.bonds.iter().flat_map(|bond| &bond.points);
         points.filter(move |point| point.body == body && point.weight() > 0.0)
     }
 
     /// Has points of a body that `carried` knows be bound to what it says from now on: their triangles were cut, or copied. No point
     /// moves with that, as far as the new nodes are where they should be. There is room for it.
-    pub fn rebind(&mut self, body: usize, mut carried: impl FnMut(&Bound) -> Option<Bound>) {
+    pub fn rebind(&mut self, body: usize, mut carried: impl FnMut(&BondPoint) -> Option<BondPoint>) {
         for bond in &mut self.bonds {
-            let is_its = |point: &&mut Bound| point.body == body && point.weight() > 0.0;
+            let is_its = |point: &&mut BondPoint| point.body == body && point.weight() > 0.0;
             for point in bond.points.iter_mut().filter(is_its) {
                 *point = carried(point).unwrap_or(*point);
             }
@@ -205,7 +205,7 @@ impl Bonds {
         for corner in bonds.iter().flat_map(Bond::used) {
             match place_of(ends, corner.body, corner.node) {
                 Ok(place) => ends[place].is_used = true,
-                Err(place) => ends.insert(place, End::new(&corner)),
+                Err(place) => ends.insert(place, BondEnd::new(&corner)),
             }
         }
         ends.retain(|end| end.is_used);
@@ -330,14 +330,14 @@ mod tests {
     use crate::def::SurfacePoint;
     use crate::slots::Slots;
 
-    fn bound(body: usize, triangle: u32, nodes: &[(u32, f32)]) -> Bound {
+    fn bound(body: usize, triangle: u32, nodes: &[(u32, f32)]) -> BondPoint {
         let mut all = [(0, 0.0); OF_POINT];
         all[..nodes.len()].copy_from_slice(nodes);
         let anchor = Some(Anchor::Point(SurfacePoint {
             triangle,
             weights: [0.5, 0.25, 0.25],
         }));
-        Bound {
+        BondPoint {
             body,
             anchor,
             nodes: all,
@@ -381,7 +381,7 @@ mod tests {
         assert_eq!(corners(&bonds, 1), [(2, 10, 0.5), (2, 11, -0.25), (2, 13, -0.25)]);
         // The cell of triangle 4 is a copy now, of which a triangle has another number; the point lies in a tetrahedron.
         let cut = bound(2, 40, &[(30, 0.5), (11, 0.25), (31, 0.125), (1, 0.125)]);
-        let is_cut = |point: &Bound| matches!(point.anchor, Some(Anchor::Point(SurfacePoint { triangle: 4, .. })));
+        let is_cut = |point: &BondPoint| matches!(point.anchor, Some(Anchor::Point(SurfacePoint { triangle: 4, .. })));
         bonds.reserve_rebinding(2).expect("memory");
         bonds.rebind(5, |point| is_cut(point).then_some(cut));
         assert_eq!(
