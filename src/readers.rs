@@ -74,7 +74,7 @@ pub(crate) struct Clock {
     pub time: f64,
 }
 
-saved!(Clock { step, time });
+saved! { Clock { step, time } }
 
 impl Clock {
     pub fn tick(&mut self, dt: f32) {

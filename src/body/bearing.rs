@@ -21,12 +21,7 @@ struct BearingLimits {
     withheld: Option<(u32, Withheld)>,
 }
 
-saved!(BearingLimits {
-    strain,
-    force,
-    next,
-    withheld
-});
+saved! { BearingLimits { strain, force, next, withheld } }
 
 /// Springs with limits, in the body's own numbers.
 #[derive(Debug)]
@@ -38,7 +33,7 @@ pub(super) struct Bearing {
     first: Vec<u32>,
 }
 
-saved!(Bearing { springs, limits, first });
+saved! { Bearing { springs, limits, first } }
 
 impl Bearing {
     /// All springs with the same limits, strain and force; with room for so many nodes.

@@ -7,6 +7,7 @@ use super::cuttable::Cuttable;
 use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial};
 use crate::def::SMALLEST_MASS;
+use crate::elements::Elements;
 use crate::soa::Masses;
 use crate::solver::{Candidate, Changed, System, make_up_for};
 use crate::springs::Rewiring;
@@ -138,7 +139,8 @@ impl Body {
                 let System {
                     forces, order, state, ..
                 } = &body.system;
-                forces.force_at(order.own(node), cells, state.positions())
+                let force = |elements: &Elements| elements.force_at(order.own(node), cells, state.positions());
+                forces.elements().map_or(DVec3::ZERO, force)
             };
             let whole: DVec3 = pieces.iter().map(|piece| force_on(self, piece.node)).sum();
             for piece in pieces {

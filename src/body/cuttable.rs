@@ -27,14 +27,7 @@ pub(super) struct Cuttable {
     pub springs_are_edges: bool,
 }
 
-saved!(Cuttable {
-    material,
-    search,
-    log,
-    stroke,
-    density,
-    springs_are_edges
-});
+saved! { Cuttable { material, search, log, stroke, density, springs_are_edges } }
 
 impl Cuttable {
     /// With springs and the triangles that are drawn in the caller's numbers; `None`: the body is not to be cut.
@@ -164,11 +157,7 @@ pub(super) struct TileSearch {
     first_count: u32,
 }
 
-saved!(TileSearch {
-    home_of_cell,
-    homes,
-    first_count
-});
+saved! { TileSearch { home_of_cell, homes, first_count } }
 
 /// The items that are listed at one tile.
 #[derive(Clone, Debug, Default)]
@@ -180,7 +169,7 @@ struct TileItems {
     later: Vec<u32>,
 }
 
-saved!(TileItems { items, tiles, later });
+saved! { TileItems { items, tiles, later } }
 
 /// The tile at which what lies between these is listed.
 fn home_of<const CORNERS: usize>(corners: [u32; CORNERS], order: &NodeOrder) -> u32 {

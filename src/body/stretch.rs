@@ -25,7 +25,7 @@ pub(super) struct WatchedSpring {
     pub longest_squared: f32,
 }
 
-saved!(WatchedSpring { nodes, longest_squared });
+saved! { WatchedSpring { nodes, longest_squared } }
 
 /// What is known of some springs.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,7 +35,7 @@ struct Chunk {
     is_any_too_long: bool,
 }
 
-saved!(Chunk { slack, is_any_too_long });
+saved! { Chunk { slack, is_any_too_long } }
 
 /// What is known of the lengths of springs.
 #[derive(Debug)]
@@ -51,13 +51,7 @@ pub(super) struct StretchBound {
     drifts: Vec<Bounds>,
 }
 
-saved!(StretchBound {
-    chunks,
-    measured,
-    is_measured,
-    looked,
-    drifts
-});
+saved! { StretchBound { chunks, measured, is_measured, looked, drifts } }
 
 impl StretchBound {
     /// Of so many nodes, with room for more up to so many in all.

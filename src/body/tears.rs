@@ -20,7 +20,7 @@ struct Beyond {
     nodes: [u32; 2],
 }
 
-saved!(Beyond { load, callers, nodes });
+saved! { Beyond { load, callers, nodes } }
 
 /// The springs of a body that tears, and those beyond their limits after the last step.
 #[derive(Debug)]
@@ -39,16 +39,7 @@ pub(crate) struct Tears {
     pub(super) report: TearReport,
 }
 
-saved!(Tears {
-    asked,
-    bearing,
-    stretch,
-    beyond,
-    seen,
-    tried,
-    torn,
-    report
-});
+saved! { Tears { asked, bearing, stretch, beyond, seen, tried, torn, report } }
 
 impl Tears {
     /// With springs in the body's own numbers; `None`: the body is not to tear. Of tetrahedra that are elements edges without a spring tear too.

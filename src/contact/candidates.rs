@@ -49,20 +49,9 @@ pub(super) struct Candidates {
     marks: Vec<u32>,
 }
 
-saved!(Candidates {
-    near,
-    masks,
-    zones,
-    slack,
-    reach,
-    whole_slack,
-    firsts,
-    corners,
-    longest,
-    surface,
-    planes,
-    marks
-});
+saved! { Candidates {
+    near, masks, zones, slack, reach, whole_slack, firsts, corners, longest, surface, planes, marks,
+} }
 
 /// The plane through the point of a mesh that is closest to a node, across the way to it, in the mesh's own frame: as the mesh is seen from
 /// near by.
@@ -77,12 +66,7 @@ pub(super) struct NearestPlane {
     pub normal: Vec3,
 }
 
-saved!(NearestPlane {
-    slot,
-    point,
-    distance,
-    normal
-});
+saved! { NearestPlane { slot, point, distance, normal } }
 
 impl NearestPlane {
     pub const NONE: Self = Self {
@@ -103,12 +87,7 @@ struct Corner {
     step: Vec3,
 }
 
-saved!(Corner {
-    node,
-    sides,
-    start,
-    step
-});
+saved! { Corner { node, sides, start, step } }
 
 saved_enum!(Zone { 0 => Box { slot, bounds }, 1 => Mesh { slot, bounds, standing, allowance }, 2 => Behind { slot, point, normal }, 3 => Between { first, last } });
 

@@ -64,32 +64,11 @@ pub(super) struct Constraint {
     pub rounded: Option<([Vec3; 2], f32)>,
 }
 
-saved!(Constraint {
-    feature,
-    weights,
-    nodes,
-    count,
-    starts,
-    shares,
-    answers,
-    normal,
-    least_speed,
-    surface_velocity,
-    arm,
-    depth,
-    friction,
-    tool,
-    yielding,
-    tip,
-    effective_mass,
-    free_mass,
-    give,
-    firmness,
-    impulse,
-    friction_impulse,
-    counted,
-    rounded
-});
+saved! { Constraint {
+    feature, weights, nodes, count, starts, shares, answers, normal, least_speed, surface_velocity, arm, depth,
+    friction, tool, yielding, tip, effective_mass, free_mass, give, firmness, impulse, friction_impulse, counted,
+    rounded,
+} }
 
 impl Constraint {
     /// A contact that has given nothing yet, of a feature that these nodes move, which are held along these axes but have a mobility, with a

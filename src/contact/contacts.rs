@@ -41,10 +41,7 @@ pub(crate) struct ToolLoad {
     pub angular_impulse: DVec3,
 }
 
-saved!(ToolLoad {
-    impulse,
-    angular_impulse
-});
+saved! { ToolLoad { impulse, angular_impulse } }
 
 impl ToolLoad {
     /// Adds an impulse at this place, from the tool's position.
@@ -102,27 +99,10 @@ pub(crate) struct Contacts {
     pub(super) driven: Driven,
 }
 
-saved!(Contacts {
-    thickness,
-    filter,
-    features,
-    candidates,
-    constraints,
-    nodes,
-    undecided,
-    presses,
-    together,
-    holds,
-    loads,
-    pressed_for,
-    found_for,
-    touches,
-    touched,
-    given,
-    committed,
-    held,
-    fresh
-} leaves { driven: Driven::default() });
+saved! { Contacts {
+    thickness, filter, features, candidates, constraints, nodes, undecided, presses, together, holds, loads,
+    pressed_for, found_for, touches, touched, given, committed, held, fresh,
+} leaves { driven: Driven::default() } }
 
 impl Contacts {
     /// For a body with nodes in these places and this surface, of which this is asked, in a world with `tools` tools.

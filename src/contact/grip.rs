@@ -40,21 +40,9 @@ pub(super) struct NodeFriction {
     pub drag: Drag,
 }
 
-saved!(NodeFriction {
-    node,
-    tool,
-    slot,
-    friction,
-    normal,
-    slip,
-    stiffness,
-    kept,
-    multiplier,
-    most,
-    holds_on,
-    pressed,
-    drag
-});
+saved! { NodeFriction {
+    node, tool, slot, friction, normal, slip, stiffness, kept, multiplier, most, holds_on, pressed, drag,
+} }
 
 /// What it does with the node where it was last.
 #[derive(Clone, Copy, Debug, Default)]
@@ -67,7 +55,7 @@ pub(super) struct Drag {
     slip: DVec3,
 }
 
-saved!(Drag { force, stiffness, slip });
+saved! { Drag { force, stiffness, slip } }
 
 /// What friction did at the end of a step: the next begins with it.
 #[derive(Clone, Copy, Debug)]
@@ -81,12 +69,7 @@ struct Dragged {
     sticks: bool,
 }
 
-saved!(Dragged {
-    slot,
-    node,
-    force,
-    sticks
-});
+saved! { Dragged { slot, node, force, sticks } }
 
 /// The friction of a body with all tools in the equation in progress.
 #[derive(Debug, Default)]
@@ -98,7 +81,7 @@ pub(super) struct Grips {
     settled: Vec<Dragged>,
 }
 
-saved!(Grips { grips, last, settled });
+saved! { Grips { grips, last, settled } }
 
 impl Grips {
     /// Makes room for so many.

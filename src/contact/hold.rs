@@ -38,23 +38,10 @@ pub(super) struct Hold {
     pub(super) grips: [Option<usize>; MOST],
 }
 
-saved!(Hold {
-    nodes,
-    count,
-    corner_count,
-    ties,
-    free,
-    gauge,
-    least,
-    stiffness,
-    multiplier,
-    kept,
-    holds_on,
-    lasts,
-    answer,
-    pushed,
-    grips
-});
+saved! { Hold {
+    nodes, count, corner_count, ties, free, gauge, least, stiffness, multiplier, kept, holds_on, lasts, answer, pushed,
+    grips,
+} }
 
 /// What a contact does.
 #[derive(Clone, Copy, Debug, Default)]
@@ -68,12 +55,7 @@ pub(super) struct Answer {
     pub(super) stiffness: [[f64; MOST]; MOST],
 }
 
-saved!(Answer {
-    meets,
-    force,
-    shares,
-    stiffness
-});
+saved! { Answer { meets, force, shares, stiffness } }
 
 impl Hold {
     /// What it does with these pushes of the nodes, m.

@@ -32,7 +32,7 @@ struct Share {
     place: usize,
 }
 
-saved!(Share { node, hold, place });
+saved! { Share { node, hold, place } }
 
 /// What a contact did at the end of a step: where it is found again the next begins with it.
 #[derive(Clone, Copy, Debug)]
@@ -51,15 +51,7 @@ struct Push {
     arm: Vec3,
 }
 
-saved!(Push {
-    slot,
-    feature,
-    tip,
-    force,
-    drag,
-    normal,
-    arm
-});
+saved! { Push { slot, feature, tip, force, drag, normal, arm } }
 
 /// The contacts of a body with all tools in the equation in progress.
 #[derive(Debug, Default)]
@@ -75,14 +67,7 @@ pub(crate) struct Holds {
     grips: Grips,
 }
 
-saved!(Holds {
-    holds,
-    shares,
-    order,
-    last,
-    settled,
-    grips
-});
+saved! { Holds { holds, shares, order, last, settled, grips } }
 
 impl Holds {
     /// Makes room for so many contacts, and for friction of as many nodes if that belongs to them.

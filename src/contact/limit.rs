@@ -29,12 +29,7 @@ pub(crate) struct PressSearch {
     high: Option<(f32, f32)>,
 }
 
-saved!(PressSearch {
-    part,
-    low,
-    is_known,
-    high
-});
+saved! { PressSearch { part, low, is_known, high } }
 
 impl PressSearch {
     /// For a tool that pressed with `force` in the last step and presses with `limit` at most.

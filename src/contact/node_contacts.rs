@@ -212,24 +212,10 @@ pub(super) struct NodeContact {
     pub counted: Vec3,
 }
 
-saved!(NodeContact {
-    node,
-    tool,
-    start,
-    normal,
-    surface_velocity,
-    arm,
-    depth,
-    friction,
-    least_speed,
-    answer,
-    effective_mass,
-    free_mass,
-    give,
-    impulse,
-    friction_impulse,
-    counted
-});
+saved! { NodeContact {
+    node, tool, start, normal, surface_velocity, arm, depth, friction, least_speed, answer, effective_mass, free_mass,
+    give, impulse, friction_impulse, counted,
+} }
 
 impl NodeContact {
     /// A contact that has given nothing yet; `None` where the node cannot move along the normal.
@@ -359,7 +345,7 @@ fn solve(contacts: &mut [NodeContact], velocities: &mut Vectors, sweeps: u32) {
 #[derive(Debug, Default)]
 pub(super) struct NodeContacts(Vec<NodeContact>);
 
-saved!(NodeContacts { 0 });
+saved! { NodeContacts { 0 } }
 
 impl NodeContacts {
     pub fn reserve(&mut self, count: usize) -> Result<()> {

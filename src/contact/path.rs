@@ -45,7 +45,7 @@ pub(super) struct Placement {
     pub orientation: Quat,
 }
 
-saved!(Placement { centre, orientation });
+saved! { Placement { centre, orientation } }
 
 impl Placement {
     /// A point in the mesh's own frame.

@@ -42,23 +42,10 @@ pub(super) struct Press {
     pub friction_impulse: Vec3A,
 }
 
-saved!(Press {
-    yielding,
-    arm,
-    is_backed,
-    places,
-    shares,
-    answers,
-    normal,
-    surface_velocity,
-    least_speed,
-    friction,
-    effective_mass,
-    free_mass,
-    give,
-    impulse,
-    friction_impulse
-});
+saved! { Press {
+    yielding, arm, is_backed, places, shares, answers, normal, surface_velocity, least_speed, friction, effective_mass,
+    free_mass, give, impulse, friction_impulse,
+} }
 
 impl Press {
     /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.
@@ -142,7 +129,7 @@ pub(super) struct Presses {
     backs: Vec<Back>,
 }
 
-saved!(Presses { presses, nodes, velocities } leaves { yielding: Vec::new(), backs: Vec::new() });
+saved! { Presses { presses, nodes, velocities } leaves { yielding: Vec::new(), backs: Vec::new() } }
 
 /// A tool that is led and presses a node: it takes what a dynamic tool gives the node against it.
 #[derive(Clone, Copy, Debug)]

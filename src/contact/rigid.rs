@@ -42,7 +42,7 @@ pub(crate) struct RigidMass {
     inverse_inertia: DMat3,
 }
 
-saved!(RigidMass { mass, center, inertia, inverse_inertia } where RigidMass::is_sound);
+saved! { RigidMass { mass, center, inertia, inverse_inertia } where RigidMass::is_sound }
 
 /// Where a rigid tool is and how it moves.
 #[derive(Clone, Copy, Debug)]
@@ -56,12 +56,7 @@ pub(crate) struct RigidState {
     pub angular_momentum: DVec3,
 }
 
-saved!(RigidState {
-    center,
-    orientation,
-    velocity,
-    angular_momentum
-});
+saved! { RigidState { center, orientation, velocity, angular_momentum } }
 
 /// A tool that is a rigid body.
 #[derive(Clone, Copy, Debug)]
@@ -74,18 +69,8 @@ pub(crate) struct Rigid {
     pub torque: DVec3,
 }
 
-saved!(MassProperties {
-    mass,
-    center_of_mass,
-    inertia
-});
-saved!(Rigid {
-    properties,
-    mass,
-    motion,
-    force,
-    torque
-});
+saved! { MassProperties { mass, center_of_mass, inertia } }
+saved! { Rigid { properties, mass, motion, force, torque } }
 
 impl MassProperties {
     /// Of a shape that is filled evenly, kg/m³ (Eberly, Polyhedral Mass Properties, 2002, for meshes); refused where it has no end.

@@ -55,7 +55,7 @@ pub struct Pose {
     pub orientation: Quat,
 }
 
-saved!(Pose { position, orientation });
+saved! { Pose { position, orientation } }
 
 impl Pose {
     /// At the origin, not turned.
@@ -181,19 +181,9 @@ pub(crate) struct Tool {
     pub user_data: usize,
 }
 
-saved!(Tool {
-    form,
-    friction,
-    force_limit,
-    filter,
-    pose,
-    target,
-    led_to,
-    reach,
-    force,
-    torque,
-    rigid
-} leaves { user_data: 0 });
+saved! { Tool {
+    form, friction, force_limit, filter, pose, target, led_to, reach, force, torque, rigid,
+} leaves { user_data: 0 } }
 
 /// A longer capsule, as a part of its radius, has no caps among triangles with corners in `f32`.
 const SLENDEREST: f32 = 1e4;

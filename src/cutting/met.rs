@@ -29,16 +29,7 @@ pub(crate) struct Met {
     pub is_area: bool,
 }
 
-saved!(Met {
-    item,
-    times,
-    weights,
-    places,
-    amount,
-    profile,
-    size,
-    is_area
-});
+saved! { Met { item, times, weights, places, amount, profile, size, is_area } }
 
 impl Met {
     /// How much is cut over the length of that edge, m; of solids over its square, m².

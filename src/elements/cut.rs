@@ -28,7 +28,7 @@ pub(super) struct TetrahedronPlace {
     pub lane: u16,
 }
 
-saved!(TetrahedronPlace { part, group, lane });
+saved! { TetrahedronPlace { part, group, lane } }
 
 /// What bodies that may be cut know of their tetrahedra.
 #[derive(Debug)]
@@ -41,7 +41,7 @@ pub(super) struct Cells {
     spare: Vec<FemPart>,
 }
 
-saved!(Cells { places, used, spare });
+saved! { Cells { places, used, spare } }
 
 /// A piece of a tetrahedron, in the body's own numbers of nodes.
 #[derive(Clone, Copy, Debug)]

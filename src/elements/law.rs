@@ -25,13 +25,7 @@ pub(crate) struct Law {
     pub form: ElementLaw,
 }
 
-saved!(Law {
-    lambda,
-    mu,
-    kappa,
-    rings,
-    form
-});
+saved! { Law { lambda, mu, kappa, rings, form } }
 
 /// Poisson's ratio from which volume is kept by rings.
 const RINGS_FROM: f32 = 0.4;
@@ -117,7 +111,7 @@ pub(crate) struct Load {
     pub pressure: f64,
 }
 
-saved!(Load { stress, pressure });
+saved! { Load { stress, pressure } }
 
 impl Load {
     pub const NONE: Self = Self {
@@ -143,7 +137,7 @@ pub(crate) struct Rest {
     pub volume: f64,
 }
 
-saved!(Rest { inverse, volume });
+saved! { Rest { inverse, volume } }
 
 impl Rest {
     /// With these edges from its first corner to the others, m, in any order of hands. One without a volume has an inverse that is not

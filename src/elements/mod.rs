@@ -67,25 +67,10 @@ pub(crate) struct Elements {
     offsets: Offsets,
 }
 
-saved!(Elements {
-    law,
-    count,
-    parts,
-    cells,
-    starts,
-    copies,
-    forces,
-    rings,
-    memory,
-    highest,
-    settled,
-    most_damped,
-    of_springs,
-    stiffnesses,
-    carried,
-    rates_known,
-    offsets
-});
+saved! { Elements {
+    law, count, parts, cells, starts, copies, forces, rings, memory, highest, settled, most_damped, of_springs,
+    stiffnesses, carried, rates_known, offsets,
+} }
 
 /// Sums of a kind on all copies of nodes.
 #[derive(Debug)]
@@ -99,13 +84,7 @@ pub(crate) struct Sums {
     pressures: Pressures,
 }
 
-saved!(Sums {
-    positions,
-    ways,
-    sums,
-    of_parts,
-    pressures
-});
+saved! { Sums { positions, ways, sums, of_parts, pressures } }
 
 impl Sums {
     fn new(copies: usize, parts: usize, with_ways: bool, ring_count: usize) -> Result<Self> {

@@ -23,11 +23,7 @@ pub(super) struct FemPart {
     pub is_later: bool,
 }
 
-saved!(FemPart {
-    nodes,
-    groups,
-    is_later
-});
+saved! { FemPart { nodes, groups, is_later } }
 
 /// What is shown the nodes of a tetrahedron, the way it is at rest, and its group and lane.
 pub(super) type SeeNodes<'a> = dyn FnMut([u32; 4], &Rest, [usize; 2]) + 'a;
@@ -220,7 +216,7 @@ pub(super) struct Copy {
     pub place: u16,
 }
 
-saved!(Copy { at, place });
+saved! { Copy { at, place } }
 
 /// The copies of the nodes of each tile.
 #[derive(Debug)]
@@ -231,7 +227,7 @@ pub(super) struct Copies {
     later: Vec<Vec<Copy>>,
 }
 
-saved!(Copies { copies, starts, later });
+saved! { Copies { copies, starts, later } }
 
 impl Copies {
     pub fn new(parts: &[FemPart], node_count: usize) -> Result<Self> {

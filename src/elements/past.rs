@@ -28,14 +28,7 @@ pub(super) struct Memory {
     pub rings: Past<f32>,
 }
 
-saved!(Memory {
-    viscosity,
-    gain,
-    bounds,
-    parts,
-    spare,
-    rings
-});
+saved! { Memory { viscosity, gain, bounds, parts, spare, rings } }
 
 /// What is remembered of the tetrahedra of a part.
 #[derive(Debug)]
@@ -46,7 +39,7 @@ pub(super) struct OfPart {
     pub newest: Vec<Stresses>,
 }
 
-saved!(OfPart { past, set, newest });
+saved! { OfPart { past, set, newest } }
 
 /// Stresses of the step in progress, and of the current state.
 #[derive(Debug)]
@@ -58,7 +51,7 @@ pub(super) struct Past<T> {
     kept_elastic: Vec<T>,
 }
 
-saved!([T: Saved] Past<T> { arms, elastic, loads, kept_arms, kept_elastic });
+saved! { [T: Saved] Past<T> { arms, elastic, loads, kept_arms, kept_elastic } }
 
 /// What has the numbers of some tetrahedra, or one.
 pub(super) trait Numbers: Copy {

@@ -22,7 +22,7 @@ pub(super) struct PlasticSet {
     pub loads: Vec<Stresses>,
 }
 
-saved!(PlasticSet { stresses, kept, loads });
+saved! { PlasticSet { stresses, kept, loads } }
 
 /// The lengths of stresses, Pa: that at which they yield, and the longest that may be left.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +31,7 @@ pub(super) struct YieldBounds {
     longest: f32,
 }
 
-saved!(YieldBounds { yields, longest });
+saved! { YieldBounds { yields, longest } }
 
 impl YieldBounds {
     pub fn new(law: Law, yielding: Yielding) -> Self {

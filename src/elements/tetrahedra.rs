@@ -35,12 +35,7 @@ pub(crate) struct Group {
     pub rates: [f32; GROUP],
 }
 
-saved!(Group {
-    corners,
-    inverse,
-    volumes,
-    rates
-});
+saved! { Group { corners, inverse, volumes, rates } }
 
 impl Group {
     pub const EMPTY: Self = Self {
@@ -56,7 +51,7 @@ impl Group {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stresses(pub [[f32; GROUP]; 7]);
 
-saved!(Stresses { 0 });
+saved! { Stresses { 0 } }
 
 impl Stresses {
     pub const ZERO: Self = Self([[0.0; GROUP]; 7]);
@@ -69,7 +64,7 @@ pub(crate) struct TetrahedronGroups {
     node_count: usize,
 }
 
-saved!(TetrahedronGroups { groups, node_count } where Self::lead_to_nodes);
+saved! { TetrahedronGroups { groups, node_count } where Self::lead_to_nodes }
 
 impl TetrahedronGroups {
     /// # Panics

@@ -32,12 +32,7 @@ struct Cavity {
     pressure: f64,
 }
 
-saved!(Cavity {
-    rest_volume,
-    triangles,
-    is_open,
-    pressure
-});
+saved! { Cavity { rest_volume, triangles, is_open, pressure } }
 
 /// The cavities of a body.
 #[derive(Debug)]
@@ -61,20 +56,9 @@ pub(crate) struct Enclosed {
     rates_known: bool,
 }
 
-saved!(Enclosed {
-    stiffness,
-    pressure,
-    cavities,
-    surface,
-    vectors,
-    sums,
-    factors,
-    weights,
-    of_springs,
-    highest,
-    settled,
-    rates_known
-});
+saved! { Enclosed {
+    stiffness, pressure, cavities, surface, vectors, sums, factors, weights, of_springs, highest, settled, rates_known,
+} }
 
 /// What there is to know of the triangles of a block.
 #[derive(Clone, Copy, Debug, Default)]
@@ -84,7 +68,7 @@ struct BlockSums {
     bounds: rates::CavityBounds,
 }
 
-saved!(BlockSums { volume, bounds });
+saved! { BlockSums { volume, bounds } }
 
 /// How pressures change where nodes go some ways.
 #[derive(Debug)]
@@ -93,7 +77,7 @@ pub(crate) struct PressureChanges {
     factors: Vec<f64>,
 }
 
-saved!(PressureChanges { sums, factors });
+saved! { PressureChanges { sums, factors } }
 
 /// What the nodes of a tile are given.
 #[derive(Clone, Copy)]

@@ -22,7 +22,7 @@ pub(super) struct Weights {
     of_length: f32,
 }
 
-saved!(Weights { of_square, of_length });
+saved! { Weights { of_square, of_length } }
 
 /// What the triangles of a block, or of a cavity, add up to.
 #[derive(Clone, Copy, Debug, Default)]
@@ -33,7 +33,7 @@ pub(super) struct CavityBounds {
     of_lengths: f64,
 }
 
-saved!(CavityBounds { of_squares, of_lengths });
+saved! { CavityBounds { of_squares, of_lengths } }
 
 impl CavityBounds {
     /// Adds a triangle with this vector, and these edges and the one between their ends.

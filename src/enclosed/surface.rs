@@ -22,7 +22,7 @@ pub(super) struct SurfaceBlock {
     pub end: usize,
 }
 
-saved!(SurfaceBlock { cavity, start, end });
+saved! { SurfaceBlock { cavity, start, end } }
 
 /// A node of a cavity.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +33,7 @@ struct Member {
     end: u32,
 }
 
-saved!(Member { node, cavity, end });
+saved! { Member { node, cavity, end } }
 
 /// The triangles of all cavities, cavity by cavity, and those about each node.
 #[derive(Debug)]
@@ -52,15 +52,7 @@ pub(super) struct CavitySurface {
     pub nodes_are_shared: bool,
 }
 
-saved!(CavitySurface {
-    triangles,
-    blocks,
-    starts,
-    members,
-    tiles,
-    about,
-    nodes_are_shared
-});
+saved! { CavitySurface { triangles, blocks, starts, members, tiles, about, nodes_are_shared } }
 
 /// Finds the cavities of triangles in the caller's numbers.
 ///

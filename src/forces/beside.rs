@@ -14,7 +14,7 @@ pub(crate) struct Beside {
     pub(super) cavities: Option<Box<Enclosed>>,
 }
 
-saved!(Beside { terms, cavities });
+saved! { Beside { terms, cavities } }
 
 impl Beside {
     /// Whether there is any.

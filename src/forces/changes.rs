@@ -20,11 +20,7 @@ pub(crate) struct Changes {
     cavities: Option<enclosed::PressureChanges>,
 }
 
-saved!(Changes {
-    records,
-    elements,
-    cavities
-});
+saved! { Changes { records, elements, cavities } }
 
 impl Forces {
     /// Room for what forces change by.

@@ -37,13 +37,7 @@ pub(crate) struct Forces {
     pub records: Option<Records>,
 }
 
-saved!(Forces {
-    springs,
-    elements,
-    beside,
-    kernel,
-    records
-});
+saved! { Forces { springs, elements, beside, kernel, records } }
 
 /// The sum of all that acts on nodes, tile by tile: of forces, or of how these change.
 #[derive(Clone, Copy)]

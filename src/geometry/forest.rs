@@ -14,7 +14,7 @@ pub(crate) struct Forest {
     later: Vec<Later>,
 }
 
-saved!(Forest { first, later });
+saved! { Forest { first, later } }
 
 /// A tree of triangles that came later.
 #[derive(Debug)]
@@ -24,7 +24,7 @@ pub(crate) struct Later {
     tree: Tree,
 }
 
-saved!(Later { from, tree });
+saved! { Later { from, tree } }
 
 impl Forest {
     /// Over so many triangles.

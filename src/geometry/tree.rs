@@ -24,11 +24,7 @@ pub(crate) struct Tree {
     triangles: Vec<PlacedTriangle>,
 }
 
-saved!(Tree {
-    nodes,
-    order,
-    triangles
-});
+saved! { Tree { nodes, order, triangles } }
 
 /// A triangle where it is.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +34,7 @@ pub(crate) struct PlacedTriangle {
     pub normal: Vec3,
 }
 
-saved!(PlacedTriangle { corners, normal });
+saved! { PlacedTriangle { corners, normal } }
 
 #[derive(Clone, Copy, Debug)]
 struct TreeNode {
@@ -50,7 +46,7 @@ struct TreeNode {
     count: u32,
 }
 
-saved!(TreeNode { min, max, first, count });
+saved! { TreeNode { min, max, first, count } }
 
 impl Tree {
     /// Over `count` triangles, halved at the median along the longest side of their centres' box.

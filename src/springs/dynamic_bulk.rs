@@ -29,7 +29,7 @@ struct Bulks<L> {
     more: Chain<Bulk<L>>,
 }
 
-saved!([L: Saved] Bulks<L> { first, more });
+saved! { [L: Saved] Bulks<L> { first, more } }
 
 /// Where a node's next link goes, with memory for it.
 enum LinkRoom<L> {
@@ -137,7 +137,7 @@ pub(super) struct DynamicBulk<L> {
     nodes: Vec<Bulks<L>>,
 }
 
-saved!([L: Saved] DynamicBulk<L> { kernel, spring_count, springs_per_node, nodes });
+saved! { [L: Saved] DynamicBulk<L> { kernel, spring_count, springs_per_node, nodes } }
 
 impl<L: KeptLink> DynamicBulk<L> {
     /// Arrays of `springs_per_node` places; 0: chosen from the springs.

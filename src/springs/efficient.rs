@@ -27,11 +27,7 @@ pub(super) struct Efficient {
     lists: Vec<Chain<DampedLink>>,
 }
 
-saved!(Efficient {
-    spring_count,
-    damped,
-    lists
-});
+saved! { Efficient { spring_count, damped, lists } }
 
 impl Efficient {
     pub fn new(node_count: usize, springs: &[Spring]) -> Result<Self> {

@@ -26,7 +26,7 @@ pub(super) struct FastLink<L> {
     places: Vec<L>,
 }
 
-saved!([L: Saved] FastLink<L> { kernel, node_count, spring_count, springs_per_node, places } where Self::has_rows);
+saved! { [L: Saved] FastLink<L> { kernel, node_count, spring_count, springs_per_node, places } where Self::has_rows }
 
 impl<L> FastLink<L> {
     fn has_rows(&self) -> bool {

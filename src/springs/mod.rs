@@ -43,12 +43,7 @@ pub(crate) struct Link {
     pub damping: f32,
 }
 
-saved!(Link {
-    neighbour,
-    stiffness,
-    rest_length,
-    damping
-});
+saved! { Link { neighbour, stiffness, rest_length, damping } }
 
 impl Link {
     /// One that pulls at nothing, of this rest length.

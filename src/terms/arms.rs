@@ -9,7 +9,7 @@ use super::nonlinear::Curve;
 use super::stencils::{StencilLaw, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use super::{Event, Term};
-use crate::base::{Result, StateHasher, memory};
+use crate::base::{Result, StateHasher};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, RelaxationStep, Spring, SpringLaw, Viscosity};
 use crate::soa::NodeOrder;
@@ -25,13 +25,7 @@ pub(super) struct Arms {
     course: RelaxationStep,
 }
 
-saved!(Arms {
-    law,
-    curve,
-    viscosity,
-    stiffening,
-    course
-});
+saved! { Arms { law, curve, viscosity, stiffening, course } }
 
 /// Stresses are pulls over the spring's stiffness, m.
 #[derive(Clone, Copy, Debug)]
@@ -44,14 +38,7 @@ pub(super) struct Arm {
     kept_elastic: f32,
 }
 
-saved!(Arm {
-    rest_length,
-    load,
-    stress,
-    elastic,
-    kept_stress,
-    kept_elastic
-});
+saved! { Arm { rest_length, load, stress, elastic, kept_stress, kept_elastic } }
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let viscosity = definition.viscosity;
@@ -73,11 +60,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         stiffening,
         course: RelaxationStep::NOTHING,
     };
-    Ok(Some(memory::boxed(Stencils::new(
-        law,
-        arms,
-        definition.positions.len(),
-    )?)?))
+    Stencils::boxed(law, arms, definition.positions.len())
 }
 
 /// An arm where it is: the way from its first node to the other, and what is elastic.

@@ -29,7 +29,7 @@ use crate::soa::NodeOrder;
 #[derive(Debug)]
 pub(super) struct Hinges;
 
-saved!(Hinges);
+saved! { Hinges }
 
 /// A hinge at rest.
 #[derive(Clone, Copy, Debug)]
@@ -44,12 +44,7 @@ pub(super) struct HingeShape {
     sine: f32,
 }
 
-saved!(HingeShape {
-    feet,
-    inverse_heights,
-    cosine,
-    sine
-});
+saved! { HingeShape { feet, inverse_heights, cosine, sine } }
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let rigidity = definition.bending_stiffness;
@@ -100,7 +95,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
             shape,
         });
     }
-    Ok(Some(memory::boxed(Stencils::new(Hinges, hinges, rest.len())?)?))
+    Stencils::boxed(Hinges, hinges, rest.len())
 }
 
 /// A side of a triangle.

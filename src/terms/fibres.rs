@@ -23,7 +23,7 @@ const UNIT: f32 = 1e-3;
 #[derive(Debug)]
 pub(super) struct Fibres;
 
-saved!(Fibres);
+saved! { Fibres }
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let (directions, stiffnesses) = (definition.fibre_directions, &definition.fibre_stiffnesses);
@@ -74,7 +74,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
     if fibres.is_empty() {
         return Ok(None);
     }
-    Ok(Some(memory::boxed(Stencils::new(Fibres, fibres, rest.len())?)?))
+    Stencils::boxed(Fibres, fibres, rest.len())
 }
 
 /// By how much a fibre is longer than at rest, as a part of its length there.

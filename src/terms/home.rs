@@ -14,7 +14,7 @@ use crate::soa::NodeOrder;
 #[derive(Debug)]
 pub(super) struct Home;
 
-saved!(Home);
+saved! { Home }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HomeShape {
@@ -24,7 +24,7 @@ pub(super) struct HomeShape {
     local: Vec3,
 }
 
-saved!(HomeShape { rest, local });
+saved! { HomeShape { rest, local } }
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let (stiffnesses, node_count) = (&definition.home_stiffnesses, definition.positions.len());
@@ -40,7 +40,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
         stiffness: stiffnesses.get(node),
         shape: HomeShape { rest, local: rest },
     }));
-    Ok(Some(memory::boxed(Stencils::new(Home, springs, node_count)?)?))
+    Stencils::boxed(Home, springs, node_count)
 }
 
 impl StencilLaw<1> for Home {

@@ -196,17 +196,7 @@ pub(crate) struct Terms {
     settled: f32,
 }
 
-saved!(Terms {
-    laws,
-    holds_any,
-    viscosity,
-    kernel,
-    sums,
-    rates,
-    rates_known,
-    stiffening,
-    settled
-});
+saved! { Terms { laws, holds_any, viscosity, kernel, sums, rates, rates_known, stiffening, settled } }
 
 impl Terms {
     /// Those that a definition asks for; `springs` are its springs. `None`: it asks for none.

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 use super::stencils::{StencilLaw, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use super::{Event, Term};
-use crate::base::{Error, Result, StateHasher, memory};
+use crate::base::{Error, Result, StateHasher};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, RelaxationStep, Spring, SpringLaw, Yielding};
 use crate::soa::NodeOrder;
@@ -22,7 +22,7 @@ pub(super) struct Sets {
     largest: f64,
 }
 
-saved!(Sets { yield_strain, largest });
+saved! { Sets { yield_strain, largest } }
 
 /// m
 #[derive(Clone, Copy, Debug)]
@@ -33,11 +33,7 @@ pub(super) struct Set {
     kept: f32,
 }
 
-saved!(Set {
-    rest_length,
-    longer,
-    kept
-});
+saved! { Set { rest_length, longer, kept } }
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let Yielding { strain, largest } = definition.yielding;
@@ -58,11 +54,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         yield_strain: f64::from(strain),
         largest: f64::from(largest),
     };
-    Ok(Some(memory::boxed(Stencils::new(
-        law,
-        sets,
-        definition.positions.len(),
-    )?)?))
+    Stencils::boxed(law, sets, definition.positions.len())
 }
 
 /// What a spring does at a length.

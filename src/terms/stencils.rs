@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::Event;
 use super::parting::Parting;
 use super::strings::{OfTile, Tension};
+use super::{Event, Term};
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{Saved, saved};
 use crate::def::{RelaxationStep, Spring};
@@ -137,7 +137,7 @@ pub(super) struct Stencil<T, const N: usize> {
     pub shape: T,
 }
 
-saved!([T: Saved, const N: usize] Stencil<T, N> { nodes, stiffness, shape });
+saved! { [T: Saved, const N: usize] Stencil<T, N> { nodes, stiffness, shape } }
 
 /// A term for each spring, with the shape that its rest length leads to; one without a length at rest has no strain, and nothing that goes
 /// by that.
@@ -185,7 +185,12 @@ pub(super) fn tile_of(node: u32) -> usize {
 }
 
 impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
-    pub fn new(law: L, mut all: Vec<Stencil<L::Shape, N>>, node_count: usize) -> Result<Self> {
+    /// A term of these, for a body to have.
+    pub fn boxed(law: L, all: Vec<Stencil<L::Shape, N>>, node_count: usize) -> Result<Option<Box<dyn Term>>> {
+        Ok(Some(memory::boxed(Self::new(law, all, node_count)?)?))
+    }
+
+    fn new(law: L, mut all: Vec<Stencil<L::Shape, N>>, node_count: usize) -> Result<Self> {
         let tiles = |stencil: &Stencil<L::Shape, N>| {
             let mut tiles = stencil.nodes.map(tile_of);
             tiles.sort_unstable();

@@ -37,14 +37,7 @@ pub(super) struct Changing {
     pub wound: Option<Wound>,
 }
 
-saved!(Changing {
-    movers,
-    roles,
-    sides,
-    triangles,
-    first_later,
-    wound
-});
+saved! { Changing { movers, roles, sides, triangles, first_later, wound } }
 
 /// A body's surface as it is to be, and what moves it.
 pub(crate) struct SurfaceToBe<'a> {

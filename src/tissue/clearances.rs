@@ -15,7 +15,7 @@ struct FeatureClearance {
     nearest: f32,
 }
 
-saved!(FeatureClearance { allowed, nearest });
+saved! { FeatureClearance { allowed, nearest } }
 
 const WHOLE: FeatureClearance = FeatureClearance {
     allowed: f32::INFINITY,
@@ -44,7 +44,7 @@ pub(super) struct Clearances {
     pub is_new: bool,
 }
 
-saved!(Clearances { corners, edges, is_new });
+saved! { Clearances { corners, edges, is_new } }
 
 /// A corner or an edge of a surface.
 #[derive(Clone, Copy, Debug)]

@@ -18,7 +18,7 @@ pub(super) struct ContactSide {
     pub weights: [f32; 3],
 }
 
-saved!(ContactSide { body, nodes, weights });
+saved! { ContactSide { body, nodes, weights } }
 
 /// Which sides a contact is between, whatever points of them.
 pub(super) type Key = [(usize, [u32; 3]); 2];
@@ -47,20 +47,9 @@ pub(super) struct Link {
     friction_impulse: Vec3,
 }
 
-saved!(Link {
-    sides,
-    normal,
-    least_speed,
-    depth,
-    is_parted,
-    friction,
-    movers,
-    counts,
-    answers,
-    mass,
-    impulse,
-    friction_impulse
-});
+saved! { Link {
+    sides, normal, least_speed, depth, is_parted, friction, movers, counts, answers, mass, impulse, friction_impulse,
+} }
 
 impl ContactSide {
     /// A node of a body.

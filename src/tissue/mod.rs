@@ -87,18 +87,7 @@ pub(crate) struct Tissue {
     pub bonds: Bonds,
 }
 
-saved!(Tissue {
-    islands,
-    skins,
-    clearances,
-    entangled,
-    links,
-    known,
-    pushes,
-    pairs,
-    groups,
-    bonds
-});
+saved! { Tissue { islands, skins, clearances, entangled, links, known, pushes, pairs, groups, bonds } }
 
 impl Tissue {
     /// Makes room for a body at this place in the world, which meets tissue.

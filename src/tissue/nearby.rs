@@ -41,16 +41,7 @@ pub(super) struct Nearby {
     triangles: Vec<u32>,
 }
 
-saved!(Nearby {
-    is_found,
-    within,
-    margin,
-    share,
-    waits,
-    places,
-    firsts,
-    triangles
-});
+saved! { Nearby { is_found, within, margin, share, waits, places, firsts, triangles } }
 
 impl Nearby {
     /// Nothing yet, with room for a surface of so many corners and edges.

@@ -34,7 +34,7 @@ pub(super) struct Near {
     pub apart: f32,
 }
 
-saved!(Near { feature, apart });
+saved! { Near { feature, apart } }
 
 /// A corner or an edge, and what of the other body is near it.
 #[derive(Clone, Copy, Debug)]
@@ -47,12 +47,7 @@ pub(super) struct NearRun {
     pub apart: f32,
 }
 
-saved!(NearRun {
-    number,
-    first,
-    end,
-    apart
-});
+saved! { NearRun { number, first, end, apart } }
 
 /// What of two bodies is near: corners of the first with triangles of the second, the other way round, and edges with edges.
 #[derive(Clone, Copy, Debug)]
@@ -65,12 +60,7 @@ struct List {
     moved: f32,
 }
 
-saved!(List {
-    first,
-    ends,
-    within,
-    moved
-});
+saved! { List { first, ends, within, moved } }
 
 /// The lists of the near pairs of an island, in their order.
 #[derive(Debug, Default)]
@@ -83,13 +73,7 @@ pub(super) struct Pairs {
     features: Vec<Near>,
 }
 
-saved!(Pairs {
-    is_known,
-    is_full,
-    lists,
-    runs,
-    features
-});
+saved! { Pairs { is_known, is_full, lists, runs, features } }
 
 /// The list of one pair, to be gone through.
 pub(super) struct Known<'a> {

@@ -26,7 +26,7 @@ struct WarmStart {
     friction: Vec3,
 }
 
-saved!(WarmStart { key, impulse, friction });
+saved! { WarmStart { key, impulse, friction } }
 
 /// The impulses of earlier substeps, in the order of their sides.
 #[derive(Debug, Default)]
@@ -42,13 +42,7 @@ pub(crate) struct Pushes {
     recalls: bool,
 }
 
-saved!(Pushes {
-    last,
-    settled,
-    next,
-    substeps,
-    recalls
-});
+saved! { Pushes { last, settled, next, substeps, recalls } }
 
 impl Pushes {
     /// Makes room for those of so many contacts, of which few press at once.

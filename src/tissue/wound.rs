@@ -53,14 +53,7 @@ pub(super) struct Wound {
     longest: Vec<f32>,
 }
 
-saved!(Wound {
-    faces,
-    is_bared,
-    nodes,
-    is_corner,
-    normals,
-    longest
-});
+saved! { Wound { faces, is_bared, nodes, is_corner, normals, longest } }
 
 impl Wound {
     /// None yet, of a body with so many triangles.

@@ -17,7 +17,7 @@ pub(super) struct Attachment {
     holder: Holder,
 }
 
-saved!(Attachment { body, holder });
+saved! { Attachment { body, holder } }
 
 /// What it is attached to.
 #[derive(Clone, Copy, Debug, PartialEq)]

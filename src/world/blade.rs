@@ -71,15 +71,7 @@ pub struct BladeReport {
     pub area: f64,
 }
 
-saved!(BladeReport {
-    force,
-    torque,
-    work,
-    length,
-    lag,
-    refused,
-    area
-});
+saved! { BladeReport { force, torque, work, length, lag, refused, area } }
 
 impl BladeReport {
     /// It has made a cut.
@@ -106,18 +98,7 @@ pub(super) struct Blade {
     pub knots: Vec<Knot>,
 }
 
-saved!(Blade {
-    edge,
-    stiffness,
-    filter,
-    pose,
-    target,
-    proxies,
-    report,
-    near,
-    met,
-    knots
-});
+saved! { Blade { edge, stiffness, filter, pose, target, proxies, report, near, met, knots } }
 
 /// Where a blade stands in a body: the edge that tissue is cut to.
 #[derive(Debug, Default)]
@@ -141,18 +122,7 @@ pub(super) struct Proxy {
     pub was_outside: Option<bool>,
 }
 
-saved!(Proxy {
-    body,
-    stroke,
-    last,
-    uncut,
-    behind,
-    holds,
-    size,
-    force,
-    forward,
-    was_outside
-});
+saved! { Proxy { body, stroke, last, uncut, behind, holds, size, force, forward, was_outside } }
 
 /// A thread between tissue and the true edge.
 #[derive(Clone, Copy, Debug)]
@@ -165,7 +135,7 @@ pub(super) struct Snag {
     pub way: Lead,
 }
 
-saved!(Snag { id, offset, way });
+saved! { Snag { id, offset, way } }
 
 /// A point of the proxy, and the true edge next to it.
 #[derive(Clone, Copy, Debug)]

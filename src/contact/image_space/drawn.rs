@@ -28,7 +28,7 @@ pub(crate) struct Drawn {
     views: [AxisView; 3],
 }
 
-saved!(Drawn { pixel, views });
+saved! { Drawn { pixel, views } }
 
 #[derive(Debug)]
 struct AxisView {
@@ -41,13 +41,7 @@ struct AxisView {
     projection: Option<Projection>,
 }
 
-saved!(AxisView {
-    axis,
-    frame,
-    pixels,
-    layers,
-    projection
-});
+saved! { AxisView { axis, frame, pixels, layers, projection } }
 
 impl Drawn {
     /// Room for a surface like this one, in pixels of `pixel` metres.

@@ -16,7 +16,7 @@ pub(super) struct RayCrossing {
     code: u32,
 }
 
-saved!(RayCrossing { depth, code });
+saved! { RayCrossing { depth, code } }
 
 impl RayCrossing {
     fn new(depth: f32, triangle: usize, enters: bool) -> Self {
@@ -44,7 +44,7 @@ pub(super) struct Layers {
     crossings: Vec<RayCrossing>,
 }
 
-saved!(Layers { ends, crossings });
+saved! { Layers { ends, crossings } }
 
 impl Layers {
     /// Room for so much.

@@ -27,13 +27,7 @@ pub struct SolidCell {
     pub(crate) next: [u32; 4],
 }
 
-saved!(SolidCell {
-    nodes,
-    volume,
-    snap,
-    first,
-    next
-});
+saved! { SolidCell { nodes, volume, snap, first, next } }
 
 /// Whether a face of the material with a tetrahedron across was cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,16 +63,7 @@ pub struct SolidTetrahedron {
     pub(crate) next: u32,
 }
 
-saved!(SolidTetrahedron {
-    corners,
-    cell,
-    volume,
-    neighbours,
-    faces,
-    drawn,
-    turned,
-    next
-});
+saved! { SolidTetrahedron { corners, cell, volume, neighbours, faces, drawn, turned, next } }
 
 /// A triangle that is drawn and touched: a face of the material with nothing across.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,12 +78,7 @@ pub struct SolidTriangle {
     pub(crate) tetrahedron: u32,
 }
 
-saved!(SolidTriangle {
-    corners,
-    cell,
-    is_inner,
-    tetrahedron
-});
+saved! { SolidTriangle { corners, cell, is_inner, tetrahedron } }
 
 /// A corner of the material. Those that triangles have are drawn; others lie inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,14 +96,7 @@ pub struct SolidVertex {
     pub(crate) other_mark: Mark,
 }
 
-saved!(SolidVertex {
-    nodes,
-    weights,
-    point,
-    around,
-    mark,
-    other_mark
-});
+saved! { SolidVertex { nodes, weights, point, around, mark, other_mark } }
 
 /// A solid that can be cut.
 #[derive(Clone, Debug)]
@@ -140,16 +113,7 @@ pub struct CutSolid {
     pub(crate) before: (u32, SolidStroke),
 }
 
-saved!(CutSolid {
-    nodes,
-    cells,
-    tetrahedra,
-    triangles,
-    vertices,
-    strokes,
-    stroke,
-    before
-});
+saved! { CutSolid { nodes, cells, tetrahedra, triangles, vertices, strokes, stroke, before } }
 
 divided!(CutSolid, 4, SolidCell { volume }, tetrahedra, {
     const EDGES: &'static [[usize; 2]] = &[[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
@@ -212,16 +176,6 @@ impl CutSolid {
     /// How many pieces the material has fallen into, found by going through all.
     pub fn piece_count(&self) -> Result<u32> {
         piece_count(self.tetrahedra().iter().map(|tetrahedron| tetrahedron.neighbours))
-    }
-
-    /// The tetrahedra that fill a cell, in ascending order.
-    pub fn tetrahedra_in(&self, cell: u32, inside: &mut Vec<u32>) -> Result<()> {
-        inside.clear();
-        for tetrahedron in self.simplices_in(cell) {
-            memory::push(inside, tetrahedron)?;
-        }
-        inside.sort_unstable();
-        Ok(())
     }
 
     /// The tetrahedra about a vertex, as far as they hang together by faces at it, each with the vertex's number in it.

@@ -22,12 +22,7 @@ pub(crate) struct SolidStroke {
     turns_up: bool,
 }
 
-saved!(SolidStroke {
-    number,
-    end,
-    normal,
-    turns_up
-});
+saved! { SolidStroke { number, end, normal, turns_up } }
 
 impl SolidStroke {
     /// Before the first.
@@ -94,7 +89,7 @@ pub(crate) struct Plane {
     pub(crate) offset: f64,
 }
 
-saved!(Plane { normal, offset });
+saved! { Plane { normal, offset } }
 
 impl Plane {
     pub(crate) const NONE: Self = Self {
@@ -132,7 +127,7 @@ pub(crate) struct Mark {
     plane: Plane,
 }
 
-saved!(Mark { stroke, side, plane });
+saved! { Mark { stroke, side, plane } }
 
 impl Mark {
     pub(crate) const NONE: Self = Self {

@@ -56,26 +56,10 @@ pub(crate) struct Columns {
     pub(super) strays: Strays,
 }
 
-saved!(Columns {
-    first,
-    count,
-    node_count,
-    reads,
-    window,
-    blocks,
-    runs,
-    own_runs,
-    near,
-    near_indices,
-    far,
-    far_indices,
-    own_rest_lengths,
-    own_stiffnesses,
-    own_stiffness,
-    own_dampings,
-    damped,
-    strays
-});
+saved! { Columns {
+    first, count, node_count, reads, window, blocks, runs, own_runs, near, near_indices, far, far_indices,
+    own_rest_lengths, own_stiffnesses, own_stiffness, own_dampings, damped, strays,
+} }
 
 impl Columns {
     /// No links yet of `nodes`, of a body of `node_count`. Springs that bring their own parameters have this stiffness;

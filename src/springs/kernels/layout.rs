@@ -17,11 +17,7 @@ pub(crate) struct SpringMaterial {
     pub damping: f32,
 }
 
-saved!(SpringMaterial {
-    stiffness,
-    rest_length,
-    damping
-});
+saved! { SpringMaterial { stiffness, rest_length, damping } }
 
 impl SpringMaterial {
     /// Half the force with which a spring would be pressed to length 0, N.
@@ -36,7 +32,7 @@ impl SpringMaterial {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Line(pub [f32; LANES]);
 
-saved!(Line { 0 });
+saved! { Line { 0 } }
 
 impl Line {
     pub const ZERO: Self = Self([0.0; LANES]);
@@ -84,13 +80,7 @@ pub(super) struct RunColumn {
     pub half_tension: f32,
 }
 
-saved!(RunColumn {
-    offset,
-    lanes,
-    material,
-    stiffness,
-    half_tension
-});
+saved! { RunColumn { offset, lanes, material, stiffness, half_tension } }
 
 /// A column of neighbours that lie side by side, of springs that bring their own parameters.
 #[derive(Clone, Copy, Debug)]
@@ -99,7 +89,7 @@ pub(super) struct OwnRun {
     pub lanes: u16,
 }
 
-saved!(OwnRun { offset, lanes });
+saved! { OwnRun { offset, lanes } }
 
 /// What there is to know of a gather beside its neighbours.
 #[derive(Clone, Copy, Debug)]
@@ -109,7 +99,7 @@ pub(super) struct GatherColumn {
     pub(super) material: u16,
 }
 
-saved!(GatherColumn { lanes, material });
+saved! { GatherColumn { lanes, material } }
 
 impl GatherColumn {
     /// Its place in the table of materials, where its springs share their parameters.
@@ -129,27 +119,21 @@ pub(super) struct ColumnEnds {
     pub own: u32,
 }
 
-saved!(ColumnEnds {
-    runs,
-    own_runs,
-    near,
-    far,
-    own
-});
+saved! { ColumnEnds { runs, own_runs, near, far, own } }
 
 /// Small indices of a column.
 #[repr(C, align(32))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NearIndices(pub [u16; LANES]);
 
-saved!(NearIndices { 0 });
+saved! { NearIndices { 0 } }
 
 /// Indices of a column.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FarIndices(pub [u32; LANES]);
 
-saved!(FarIndices { 0 });
+saved! { FarIndices { 0 } }
 
 /// A link's place.
 #[derive(Clone, Copy)]

@@ -19,11 +19,7 @@ struct MaterialKind {
     longest: f32,
 }
 
-saved!(MaterialKind {
-    material,
-    shortest,
-    longest
-});
+saved! { MaterialKind { material, shortest, longest } }
 
 /// The kinds of spring in a body.
 #[derive(Debug, Default)]
@@ -31,7 +27,7 @@ pub(super) struct Kinds {
     kinds: Vec<MaterialKind>,
 }
 
-saved!(Kinds { kinds });
+saved! { Kinds { kinds } }
 
 impl Kinds {
     /// The kinds that are common among `springs`.

@@ -40,12 +40,7 @@ struct PackedTile {
     removed: usize,
 }
 
-saved!(PackedTile {
-    columns,
-    links,
-    strays,
-    removed
-});
+saved! { PackedTile { columns, links, strays, removed } }
 
 impl PackedTile {
     fn new(columns: Columns, links: usize) -> Self {
@@ -85,15 +80,7 @@ pub(crate) struct Packed {
     tiles: Vec<PackedTile>,
 }
 
-saved!(Packed {
-    kernel,
-    node_count,
-    spring_count,
-    damped,
-    kinds,
-    materials,
-    tiles
-} where Self::is_sound);
+saved! { Packed { kernel, node_count, spring_count, damped, kinds, materials, tiles } where Self::is_sound }
 
 /// What columns of these springs cost, the most of them.
 pub(crate) fn costs(springs: &[Spring], rounding: Rounding) -> Result<Costs> {

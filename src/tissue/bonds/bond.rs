@@ -25,7 +25,7 @@ pub(crate) struct BondPoint {
     pub nodes: [(u32, f32); OF_POINT],
 }
 
-saved!(BondPoint { body, anchor, nodes });
+saved! { BondPoint { body, anchor, nodes } }
 
 impl BondPoint {
     /// The sum of the parts of its nodes: 1, but for rounding; 0 of what is no point of tissue.
@@ -46,12 +46,7 @@ pub(crate) struct BondCorner {
     pub end: usize,
 }
 
-saved!(BondCorner {
-    body,
-    node,
-    weight,
-    end
-});
+saved! { BondCorner { body, node, weight, end } }
 
 /// Two points that are kept together.
 #[derive(Clone, Copy, Debug)]
@@ -88,24 +83,10 @@ pub(super) struct Bond {
     pub(super) has_equation: bool,
 }
 
-saved!(Bond {
-    id,
-    points,
-    corners,
-    thread,
-    limit,
-    foreseen,
-    mean,
-    is_in_turn,
-    load,
-    impulse,
-    sum,
-    masses,
-    gap,
-    miss,
-    acts,
-    has_equation
-});
+saved! { Bond {
+    id, points, corners, thread, limit, foreseen, mean, is_in_turn, load, impulse, sum, masses, gap, miss, acts,
+    has_equation,
+} }
 
 /// A node at which bonds are.
 #[derive(Clone, Copy, Debug)]
@@ -130,20 +111,9 @@ pub(super) struct BondEnd {
     pub(super) is_pending: bool,
 }
 
-saved!(BondEnd {
-    body,
-    node,
-    is_used,
-    is_on_skin,
-    is_in_turn,
-    velocity,
-    answer,
-    given,
-    place,
-    shift,
-    pending,
-    is_pending
-});
+saved! { BondEnd {
+    body, node, is_used, is_on_skin, is_in_turn, velocity, answer, given, place, shift, pending, is_pending,
+} }
 
 impl Bond {
     pub(super) fn used(&self) -> impl Iterator<Item = BondCorner> + use<> {

@@ -40,11 +40,7 @@ pub(crate) struct Bonds {
     is_opening: bool,
 }
 
-saved!(Bonds {
-    bonds,
-    ends,
-    is_opening
-});
+saved! { Bonds { bonds, ends, is_opening } }
 
 /// Whether two points are one, of one body.
 pub(crate) fn are_one(points: &[BondPoint; 2]) -> bool {
