@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::System;
 use super::closing::ClosingKick;
-use super::energy_monitor::EnergyAccount;
+use super::energy_account::EnergyAccount;
 use super::gravity::GravityKicks;
 use super::implicit;
 use super::pace::Pace;
@@ -271,7 +271,8 @@ pub(crate) fn needed(body: &mut System, request: &StepRequest, team: &Team) -> N
     let stable_substep = first_substep(body, &start, beside_springs);
     let mut need = Need::new(body, request, start, stable_substep, beside_springs);
     need.start.pace = start.pace.after(need.substeps, request.dt);
-    need.substeps = start.pace.keep(need.substeps, request.dt, request.max_substeps);
+    let substeps = start.pace.keep(need.substeps, request.dt, request.max_substeps);
+    need.substeps = refined(substeps, &start, request);
     need
 }
 

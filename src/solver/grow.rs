@@ -1,7 +1,7 @@
 //! Nodes that come after a body was made, as cuts make them: room for them is made at the door, so that adding one moves nothing.
 
 use super::System;
-use super::energy_monitor::TileSums;
+use super::energy_sums::TileSums;
 use super::kick::Survey;
 use crate::base::{Error, Result, memory};
 use crate::forces::Parts;

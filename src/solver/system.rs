@@ -3,7 +3,8 @@
 use glam::{BVec3, DVec3, Vec3};
 
 use super::early::Early;
-use super::energy_monitor::{EnergyAccount, TileSums};
+use super::energy_account::EnergyAccount;
+use super::energy_sums::TileSums;
 use super::grasp::Grasps;
 use super::implicit::Implicit;
 use super::kick::Survey;

@@ -11,10 +11,12 @@ use glam::DVec3;
 use super::System;
 use super::attempt::{Carry, StepRequest};
 use super::closing::{ClosingKick, close_aside, may_stay_open};
-use super::energy_monitor::{Account, TileSums, keep_energy};
+use super::energy_monitor::Account;
+use super::energy_sums::TileSums;
 use super::grasp::Lapse;
 use super::pipeline::{self, DEEPEST, Plan};
 use super::sleep::Sleeper;
+use super::slow_down::{keep_energy, slow_down};
 use super::stability::Stability;
 use super::substep::{Part, VelocityTime, kick_and_drift};
 use crate::base::{Stage, Stopwatch};
@@ -124,6 +126,7 @@ impl<'a> Step<'a> {
         let mut carry = start;
         let mut finite = true;
         begin(body, request);
+        carry.energy.share(0);
         let account = Account::new(body, &carry, request, substeps);
         let may_stay_open = may_stay_open(body) && !body.pins.are_led();
         let mut part = self.opening(body, &mut carry);
@@ -155,7 +158,7 @@ impl<'a> Step<'a> {
             let parts = &parts[..depth];
             part = parts[depth - 1];
             if account.compares && index + 1 == substeps {
-                account.keep_velocities(body, &part);
+                Account::keep_velocities(body, &part);
             }
             if let (2.., Some(plan)) = (depth, self.pipeline) {
                 let watch = Stopwatch::start(request.profile);
@@ -215,7 +218,10 @@ impl<'a> Step<'a> {
             finite = pass(body, request, &part, &mut carry, team);
             check_beside_springs(body, substep)?;
         }
-        account.settle(body, &mut carry, sums, team);
+        if let Some(found) = account.settle(body, &mut carry, sums, team) {
+            let excess = carry.energy.compare(&found);
+            carry.energy.refine(slow_down(body, excess, false));
+        }
         Ok(Some(StepResult { carry, finite }))
     }
 

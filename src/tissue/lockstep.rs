@@ -5,8 +5,9 @@
 
 use super::Tissue;
 use crate::solver::{
-    Carry, Outcome, Part, Span, Step, StepRequest, StepResult, System, Systems, TooLong, begin, begin_parts, check,
-    check_beside_springs, end_part, finish, needed, next_part, parts_near, pass, relieve_squeezed, substeps_needed,
+    Account, Carry, Energies, EnergyAccount, Outcome, Part, Span, Step, StepRequest, StepResult, System, Systems,
+    TileSums, TooLong, begin, begin_parts, check, check_beside_springs, end_part, finish, needed, next_part,
+    parts_near, pass, relieve_squeezed, slow_down, substeps_needed,
 };
 use crate::threads::Team;
 
@@ -23,6 +24,10 @@ pub(crate) struct CoupledBody {
     masses_for: f32,
     carry: Carry,
     part: Part,
+    /// Of the open velocities, where the step ends with a comparison of energies.
+    sums: Option<TileSums>,
+    /// What can be taken off its motion, J.
+    own: f64,
 }
 
 /// The bodies that go together, in islands, as `tissue` tells; `walks` has a place for each body.
@@ -92,6 +97,9 @@ impl CoupledGroup<'_> {
             }
         }
         self.tissue.bonds.unload(bodies);
+        if is_taken {
+            self.settle_energy(island, bodies, substeps);
+        }
         let mut is_whole = is_taken;
         for &place in self.tissue.islands.members(island) {
             let place = place as usize;
@@ -117,14 +125,71 @@ impl CoupledGroup<'_> {
         }
     }
 
+    /// Takes a step that was taken into the account of the energy that bodies of VERLET have together: contacts and attachments give
+    /// none.
+    fn settle_energy(&mut self, island: usize, bodies: &mut impl Systems, substeps: u32) {
+        let Self {
+            tissue,
+            walks,
+            request,
+            team,
+        } = self;
+        let members = tissue.islands.members(island);
+        let (mut common, mut found) = (None::<EnergyAccount>, Energies::default());
+        let of_bonds = tissue.bonds.energy();
+        let [mut work, stored] = of_bonds.unwrap_or_default();
+        for &place in members {
+            let place = place as usize;
+            let (Some(walk), Some(body)) = (&mut walks[place], bodies.at_mut(place)) else {
+                continue;
+            };
+            let request = &request.of(body);
+            let account = Account::new(body, &walk.carry, request, substeps);
+            let energies = account.settle(body, &mut walk.carry, walk.sums, team);
+            walk.carry.energy.gain(std::mem::take(&mut work));
+            if of_bonds.is_none() || !body.is_explicit() {
+                walk.carry.energy.forget();
+            }
+            if let Some(energies) = energies {
+                walk.own = energies.own;
+                found = found.plus(&energies);
+                match &mut common {
+                    Some(common) => common.join(&walk.carry.energy),
+                    None => common = Some(walk.carry.energy),
+                }
+            }
+        }
+        let Some(mut common) = common else { return };
+        found.all += stored;
+        let excess = common.compare(&found);
+        let mut removed = 0.0;
+        for &place in members {
+            if let (Some(walk), Some(body)) = (&mut walks[place as usize], bodies.at_mut(place as usize)) {
+                removed += slow_down(body, excess * walk.own / found.own, false);
+            }
+        }
+        common.refine(removed);
+        for &place in members {
+            if let Some(walk) = &mut walks[place as usize] {
+                walk.carry.energy.go_on_with(&common);
+            }
+        }
+    }
+
     /// Makes a way for each body of an island: in how many substeps, 0: it has none, and how many of them VERLET needs.
     fn set_out(&mut self, island: usize, bodies: &mut impl Systems, outcomes: &[Option<Outcome>]) -> [u32; 2] {
         let [mut substeps, mut needed] = [0; 2];
+        let group = match self.tissue.islands.members(island) {
+            [_] => 0,
+            members => members.iter().fold(1, |group: u64, &place| {
+                (group ^ u64::from(place)).wrapping_mul(0x0100_0000_01b3)
+            }),
+        };
         for &place in self.tissue.islands.members(island) {
             let place = place as usize;
             if let Some(body) = bodies.at_mut(place) {
                 let request = &self.request.of(body);
-                let (begun, wanted) = CoupledBody::of(body, request, self.team);
+                let (begun, wanted) = CoupledBody::of(body, request, group, self.team);
                 substeps = substeps.max(wanted);
                 if body.is_explicit() {
                     needed = needed.max(wanted);
@@ -171,10 +236,11 @@ impl CoupledGroup<'_> {
             ..*request
         };
         let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
+        let compares = compares(tissue.islands.members(island), walks, bodies, request, substeps);
         tissue.bonds.begin(request.dt);
         each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
             let request = &request.of(body);
-            walk.carry = walk.start;
+            (walk.carry, walk.sums) = (walk.start, None);
             if !body.is_explicit() {
                 begin_parts(body, request, substeps);
                 return Ok(());
@@ -215,6 +281,9 @@ impl CoupledGroup<'_> {
                 }
                 walk.part.start = f64::from(index) / f64::from(substeps);
                 walk.part.end = f64::from(index + 1) / f64::from(substeps);
+                if compares && index + 1 == substeps {
+                    Account::keep_velocities(body, &walk.part);
+                }
                 pass(body, request, &walk.part, &mut walk.carry, team);
                 Ok(())
             })?;
@@ -235,6 +304,12 @@ impl CoupledGroup<'_> {
                     check(&walk.carry.stability, substep)?;
                 }
                 check_beside_springs(body, substep)
+            })?;
+        }
+        if compares {
+            each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
+                walk.sums = Some(TileSums::of_open(body, &walk.part, team));
+                Ok(())
             })?;
         }
         tissue.show_early(bodies);
@@ -261,7 +336,7 @@ impl CoupledGroup<'_> {
 
 impl CoupledBody {
     /// A body's way through a step that is to begin, and how many substeps it wants by itself.
-    fn of(body: &mut System, request: &StepRequest, team: &Team) -> (Self, u32) {
+    fn of(body: &mut System, request: &StepRequest, group: u64, team: &Team) -> (Self, u32) {
         let (mut start, masses_for, substeps) = if body.is_explicit() {
             let need = needed(body, request, team);
             (need.start, need.masses_for, need.substeps)
@@ -269,16 +344,38 @@ impl CoupledBody {
             let parts = parts_near(request.dt).max(request.substeps);
             (body.carry, 0.0, parts)
         };
-        // What others do to it is not taken into account.
-        start.energy.forget();
+        start.energy.share(group);
         let walk = Self {
             start,
             masses_for,
             carry: start,
             part: Part::opening(0.0),
+            sums: None,
+            own: 0.0,
         };
         (walk, substeps)
     }
+}
+
+/// Whether a step of these bodies ends with a comparison of what energy they have together.
+fn compares(
+    members: &[u32],
+    walks: &[Option<CoupledBody>],
+    bodies: &impl Systems,
+    request: &StepRequest,
+    substeps: u32,
+) -> bool {
+    let mut is_due = false;
+    for &place in members {
+        if let (Some(walk), Some(body)) = (&walks[place as usize], bodies.at(place as usize)) {
+            let account = Account::new(body, &walk.start, request, substeps);
+            if !account.watches || !body.is_explicit() {
+                return false;
+            }
+            is_due |= account.compares;
+        }
+    }
+    is_due
 }
 
 /// Does something with each body that is on its way.

@@ -3,16 +3,26 @@
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, BodyId, Material, Model, Shape, Solver, ToolDefinition, World, WorldDefinition};
+use sinew::{
+    Anchor, BodyDefinition, BodyId, Material, Model, Shape, Solver, SutureDefinition, ToolDefinition, World,
+    WorldDefinition,
+};
 
 const DT: f32 = 1.0 / 60.0;
 
 /// An organ of springs of 5.4 kPa, its nodes at one end, and the one that is furthest from there.
 fn organ() -> (World, BodyId, Vec<u32>, u32) {
-    let mesh = Mesh::organ(0.15, 0.012).expect("an organ");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let (body, end, tip) = organ_at(&mut world, Vec3::ZERO);
+    (world, body, end, tip)
+}
+
+/// The same, moved by this.
+fn organ_at(world: &mut World, offset: Vec3) -> (BodyId, Vec<u32>, u32) {
+    let mesh = Mesh::organ(0.15, 0.012).expect("an organ");
+    let positions: Vec<Vec3> = mesh.positions.iter().map(|position| *position + offset).collect();
     let body = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
+        positions: &positions,
         tetrahedra: &mesh.tetrahedra,
         material: Some(Material {
             model: Model::Springs,
@@ -31,7 +41,7 @@ fn organ() -> (World, BodyId, Vec<u32>, u32) {
         .filter(|node| along(node) < low + 0.1 * (high - low))
         .collect();
     let tip = nodes.max_by(|a, b| along(a).total_cmp(&along(b))).expect("nodes");
-    (world, body.expect("a body"), end, tip)
+    (body.expect("a body"), end, tip)
 }
 
 /// The same, pinned at that end, with its furthest node.
@@ -45,11 +55,17 @@ fn pinned() -> (World, BodyId, u32) {
 
 /// Steps it for so many frames as `step` does, and compares all energy with that at the start, as a part of the most that there is of kinetic and
 /// elastic energy in the first two seconds: it swings about its rest then.
-fn gain((world, body): (&mut World, BodyId), frames: usize, mut step: impl FnMut(&mut World)) -> f64 {
+fn gain((world, body): (&mut World, BodyId), frames: usize, step: impl FnMut(&mut World)) -> f64 {
+    gain_of_all((world, &[body]), frames, step)
+}
+
+fn gain_of_all((world, bodies): (&mut World, &[BodyId]), frames: usize, mut step: impl FnMut(&mut World)) -> f64 {
     let energy = |world: &World| {
-        let energy = world.body(body).expect("a body").energy(world.gravity());
-        let inner = energy.kinetic + energy.elastic;
-        (inner, inner + energy.gravitational)
+        bodies.iter().fold((0.0, 0.0), |(inner, all), &body| {
+            let energy = world.body(body).expect("a body").energy(world.gravity());
+            let own = energy.kinetic + energy.elastic;
+            (inner + own, all + own + energy.gravitational)
+        })
     };
     let (_, start) = energy(world);
     let (mut most, mut gained) = (0.0_f64, 0.0_f64);
@@ -158,5 +174,34 @@ fn steps_of_little_work_let_the_world_lag_and_gain_no_energy() {
             world.step_with_budget(DT, work).expect("a step");
         });
         assert!(gained < 0.01, "{work}: {:.2} %", 100.0 * gained);
+    }
+}
+
+#[test]
+fn organs_that_hang_from_each_other_gain_no_energy() {
+    for is_sutured in [false, true] {
+        let (mut world, first, tip) = pinned();
+        let positions = world.body(first).expect("a body").positions();
+        let gap = positions.iter().fold([f32::MAX, f32::MIN], |[low, high], position| {
+            [low.min(position.x), high.max(position.x)]
+        });
+        let (second, end, _) = organ_at(&mut world, Vec3::X * (gap[1] - gap[0] + 0.005));
+        let anchors = [tip, end[0]].map(Anchor::Node);
+        if is_sutured {
+            let thread = SutureDefinition {
+                length: Some(0.03),
+                stiffness: 100.0,
+                ..Default::default()
+            };
+            world
+                .suture(first, &anchors[0], second, &anchors[1], &thread)
+                .expect("a suture");
+        } else {
+            world
+                .attach_to_body(first, &anchors[..1], second, &anchors[1..], 0.0)
+                .expect("an attachment");
+        }
+        let gained = gain_of_all((&mut world, &[first, second]), 360, plain);
+        assert!(gained < 0.01, "{is_sutured}: {:.2} %", 100.0 * gained);
     }
 }

@@ -8,7 +8,7 @@ use crate::contact::Contacts;
 use crate::simd::Loops;
 use crate::soa::{TileForces, Vectors, tile_count, tile_nodes};
 use crate::solver::System;
-use crate::solver::energy_monitor::slow_down;
+use crate::solver::slow_down::slow_down;
 use crate::springs::Motion;
 use crate::threads::{Items, Team};
 
@@ -128,10 +128,9 @@ impl Substep<'_> {
         let known = implicit.histories[next].energy;
         let work = self.work(body, &implicit.histories[next]);
         let excess = known.map(|total| total.energy - before.total.energy - work);
-        let taken = excess.filter(|excess| excess.is_finite()).map(|excess| {
-            let held = body.held_axes();
-            slow_down(body, held, excess.max(0.0), true)
-        });
+        let taken = excess
+            .filter(|excess| excess.is_finite())
+            .map(|excess| slow_down(body, excess, true));
         let kinetic = kinetic(body, false);
         let state = body.state.substep();
         let history = &mut implicit.histories[next];

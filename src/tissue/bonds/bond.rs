@@ -72,6 +72,8 @@ pub(super) struct Bond {
     /// What was given beside that in this substep, N s, and all in the step.
     pub(super) impulse: Vec3,
     pub(super) sum: DVec3,
+    /// What closing the gap has put in, J.
+    pub(super) work: f64,
     /// How much impulse makes the points faster against each other, along each axis, kg; 0 where neither moves.
     pub(super) masses: Vec3,
     /// How far the points are to be apart at the end of the substep, and how far they may miss that, m.
@@ -84,7 +86,7 @@ pub(super) struct Bond {
 }
 
 saved! { Bond {
-    id, points, corners, thread, limit, foreseen, mean, is_in_turn, load, impulse, sum, masses, gap, miss, acts,
+    id, points, corners, thread, limit, foreseen, mean, is_in_turn, load, impulse, sum, work, masses, gap, miss, acts,
     has_equation,
 } }
 

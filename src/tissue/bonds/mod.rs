@@ -87,6 +87,7 @@ impl Bonds {
             load: Vec3::ZERO,
             impulse: Vec3::ZERO,
             sum: DVec3::ZERO,
+            work: 0.0,
             masses: Vec3::ZERO,
             gap: DVec3::ZERO,
             miss: 0.0,

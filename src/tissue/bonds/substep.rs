@@ -53,7 +53,7 @@ impl Bonds {
         self.is_opening = true;
         for bond in self.bonds.iter_mut().filter(|bond| bond.is_in_turn) {
             bond.load = bond.foreseen;
-            bond.sum = DVec3::ZERO;
+            (bond.sum, bond.work) = (DVec3::ZERO, 0.0);
             if let Some(thread) = &mut bond.thread {
                 thread.begin(dt);
             }
@@ -69,6 +69,20 @@ impl Bonds {
         } else {
             1
         }
+    }
+
+    /// What bonds of the group have put in in the step, and what their threads store as it ends, J; `None` where that is not known: a thread
+    /// becomes shorter, is led or gives way.
+    pub(in crate::tissue) fn energy(&self) -> Option<[f64; 2]> {
+        let mut sums = [0.0; 2];
+        for bond in self.bonds.iter().filter(|bond| bond.is_in_turn) {
+            let stored = bond.thread.as_ref().map_or(Some(0.0), |thread| {
+                let distance = bond.apart(&self.ends).length();
+                thread.is_elastic().then(|| thread.energy(distance))
+            });
+            sums = [sums[0] + bond.work, sums[1] + stored?];
+        }
+        Some(sums)
     }
 
     /// Has the forces that are foreseen act in what follows.
@@ -234,6 +248,7 @@ impl Bonds {
             let apart = bond.apart(ends);
             let way = (apart * closed).clamp_length_max(CLOSING_SPEED * duration);
             bond.gap = apart - way;
+            bond.work -= bond.load.as_dvec3().dot(way);
             bond.miss = MISSED * way.abs().max_element();
         }
         for _ in 0..SWEEPS {

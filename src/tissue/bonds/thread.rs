@@ -136,6 +136,12 @@ impl Thread {
         }
     }
 
+    /// Whether it has done no more in the step in progress than to stretch.
+    pub fn is_elastic(&self) -> bool {
+        let most = self.gave.max(self.give * self.duration);
+        self.lead.is_none() && self.target == self.length && most <= self.compliance * (1.0 + 1e-6)
+    }
+
     /// Begins a step of `dt` seconds.
     pub fn begin(&mut self, dt: f32) {
         self.pace = (self.length_after(dt) - self.length) / f64::from(dt);
