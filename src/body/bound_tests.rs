@@ -255,6 +255,20 @@ fn what_a_tool_gives_to_bound_points_is_the_momentum_of_nodes() {
     }
 }
 
+const TETRAHEDRON: [Vec3; 4] = [
+    Vec3::new(-0.05, 0.01, -0.04),
+    Vec3::new(0.06, -0.02, -0.03),
+    Vec3::new(0.0, 0.03, 0.07),
+    Vec3::new(0.01, -0.08, 0.0),
+];
+
+/// Parts of its corners, for each corner of a triangle within it.
+const OF_FOUR: [[f32; 4]; 3] = [
+    [0.5, 0.25, 0.25, 0.0],
+    [0.125, 0.5, 0.125, 0.25],
+    [0.25, 0.0, 0.5, 0.25],
+];
+
 /// A body without springs of which a triangle is drawn whose corners have these parts of its nodes.
 fn free_nodes(world: &mut World, positions: &[Vec3], masses: &[f32], parts: [[f32; 4]; 3]) -> BodyId {
     let definition = BodyDefinition {
@@ -284,21 +298,9 @@ fn free_nodes(world: &mut World, positions: &[Vec3], masses: &[f32], parts: [[f3
 
 #[test]
 fn nodes_receive_what_weights_say() {
-    let tetrahedron = [
-        Vec3::new(-0.05, 0.01, -0.04),
-        Vec3::new(0.06, -0.02, -0.03),
-        Vec3::new(0.0, 0.03, 0.07),
-        Vec3::new(0.01, -0.08, 0.0),
-    ];
-    let flat = [tetrahedron[0], tetrahedron[1], tetrahedron[2]];
     let masses = [0.001, 0.002, 0.0007, 0.0013];
     let of_three = [[1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0], [0.5, 0.0, 0.5, 0.0]];
-    let of_four = [
-        [0.5, 0.25, 0.25, 0.0],
-        [0.125, 0.5, 0.125, 0.25],
-        [0.25, 0.0, 0.5, 0.25],
-    ];
-    for (positions, parts) in [(&flat[..], of_three), (&tetrahedron[..], of_four)] {
+    for (positions, parts) in [(&TETRAHEDRON[..3], of_three), (&TETRAHEDRON[..], OF_FOUR)] {
         let mut world = world(Vec3::ZERO, 1, 1);
         let id = free_nodes(&mut world, positions, &masses[..positions.len()], parts);
         // Where the sphere meets the triangle, by parts of its corners.
@@ -345,19 +347,8 @@ fn nodes_receive_what_weights_say() {
 
 #[test]
 fn what_nobody_draws_is_not_touched() {
-    let positions = [
-        Vec3::new(-0.05, 0.01, -0.04),
-        Vec3::new(0.06, -0.02, -0.03),
-        Vec3::new(0.0, 0.03, 0.07),
-        Vec3::new(0.01, -0.08, 0.0),
-    ];
-    let parts = [
-        [0.5, 0.25, 0.25, 0.0],
-        [0.125, 0.5, 0.125, 0.25],
-        [0.25, 0.0, 0.5, 0.25],
-    ];
     let mut world = world(Vec3::ZERO, 1, 1);
-    free_nodes(&mut world, &positions, &[0.001; 4], parts);
+    free_nodes(&mut world, &TETRAHEDRON, &[0.001; 4], OF_FOUR);
     let plane = ToolDefinition {
         pose: Pose {
             position: Vec3::NEG_Y * 0.07,
@@ -377,15 +368,11 @@ fn what_nobody_draws_is_not_touched() {
 
 #[test]
 fn what_holds_a_node_takes_its_share() {
-    let positions = [
-        Vec3::new(-0.05, 0.01, -0.04),
-        Vec3::new(0.06, -0.02, -0.03),
-        Vec3::new(0.0, 0.03, 0.07),
-    ];
+    let positions = &TETRAHEDRON[..3];
     let parts = [[0.5, 0.5, 0.0, 0.0], [0.0, 0.5, 0.5, 0.0], [0.25, 0.0, 0.75, 0.0]];
     for axes in [[true; 3], [false, true, false]] {
         let mut world = world(Vec3::ZERO, 1, 1);
-        let id = free_nodes(&mut world, &positions, &[0.001, 0.002, 0.0007], parts);
+        let id = free_nodes(&mut world, positions, &[0.001, 0.002, 0.0007], parts);
         world.body_mut(id).expect("a body").pin_axes(0, axes).expect("a node");
         let met = [0.5, 0.25, 0.25_f32];
         let corners = parts.map(|parts| {

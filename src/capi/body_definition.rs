@@ -7,7 +7,7 @@ use super::definition::{
     SINEW_SPRING_LAW_LINEAR, SINEW_STORAGE_DYNAMIC_BULK, SINEW_STORAGE_EFFICIENT, SINEW_STORAGE_FAST_LINK,
     SINEW_STORAGE_PACKED, sinew_body_def,
 };
-use super::memory::{self};
+use super::memory;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
 use crate::base::{Error, Result};
 use crate::def::{

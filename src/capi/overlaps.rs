@@ -13,11 +13,11 @@ use crate::world::World;
 
 /// One of the two bodies.
 pub(super) struct DetectorSide {
-    pub(super) body: sinew_body_id,
-    pub(super) surface: Surface,
+    pub body: sinew_body_id,
+    pub surface: Surface,
     /// When the detector was made.
-    pub(super) was_closed: bool,
-    pub(super) thickness: f32,
+    pub was_closed: bool,
+    pub thickness: f32,
 }
 
 pub(super) enum Method {
@@ -30,10 +30,10 @@ pub(super) enum Method {
 pub(super) struct Overlaps {
     /// Whether volumes are measured.
     has_volume: bool,
-    pub(super) report: sinew_detector_report,
-    pub(super) points: [Vec<sinew_point_inside>; 2],
-    pub(super) edges: [Vec<sinew_edge_inside>; 2],
-    pub(super) gradients: [Vec<DVec3>; 2],
+    pub report: sinew_detector_report,
+    pub points: [Vec<sinew_point_inside>; 2],
+    pub edges: [Vec<sinew_edge_inside>; 2],
+    pub gradients: [Vec<DVec3>; 2],
 }
 
 const NOTHING: sinew_detector_report = sinew_detector_report {
@@ -51,7 +51,7 @@ const NOTHING: sinew_detector_report = sinew_detector_report {
 
 impl DetectorSide {
     /// The body, where it is still what the detector was made for.
-    pub(super) fn body<'a>(&self, number: usize, world: &'a World) -> Result<&'a Body> {
+    pub fn body<'a>(&self, number: usize, world: &'a World) -> Result<&'a Body> {
         let sinew_body_id { index1, generation } = self.body;
         let Ok(body) = world.body(self.body.id()) else {
             return Err(Error::invalid(format!(
@@ -74,7 +74,7 @@ impl DetectorSide {
 }
 
 impl Overlaps {
-    pub(super) fn reserved(sides: &[DetectorSide; 2], method: &Method, has_volume: bool) -> Result<Self> {
+    pub fn reserved(sides: &[DetectorSide; 2], method: &Method, has_volume: bool) -> Result<Self> {
         let node_counts = [0, 1].map(|side| sides[side].surface.node_count());
         let edges = sides.iter().map(|side| side.surface.edges().len()).max().unwrap_or(0);
         // As many as an image-space detection lists.
@@ -92,7 +92,7 @@ impl Overlaps {
         })
     }
 
-    pub(super) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.report = NOTHING;
         self.points.iter_mut().for_each(Vec::clear);
         self.edges.iter_mut().for_each(Vec::clear);
@@ -112,7 +112,7 @@ impl Overlaps {
         Ok(())
     }
 
-    pub(super) fn take_image(&mut self, overlap: &image_space::Overlap, surfaces: [&Surface; 2]) -> Result<()> {
+    pub fn take_image(&mut self, overlap: &image_space::Overlap, surfaces: [&Surface; 2]) -> Result<()> {
         let inside = &overlap.inside;
         self.begin(
             [inside[0].points.len(), inside[1].points.len()],
@@ -145,7 +145,7 @@ impl Overlaps {
         Ok(())
     }
 
-    pub(super) fn take_exact(&mut self, overlaps: &[exact::Overlap; 2], surfaces: [&Surface; 2]) -> Result<()> {
+    pub fn take_exact(&mut self, overlaps: &[exact::Overlap; 2], surfaces: [&Surface; 2]) -> Result<()> {
         self.begin(
             [overlaps[0].points.len(), overlaps[1].points.len()],
             [overlaps[0].edges.len(), overlaps[1].edges.len()],

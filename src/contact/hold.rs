@@ -10,32 +10,32 @@ use crate::codec::saved;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hold {
     /// The nodes that move the feature.
-    pub(super) nodes: [u32; MOST],
-    pub(super) count: usize,
-    pub(super) corner_count: usize,
-    pub(super) ties: Option<Ties>,
+    pub nodes: [u32; MOST],
+    pub count: usize,
+    pub corner_count: usize,
+    pub ties: Option<Ties>,
     /// Where its corners are without a push, m.
-    pub(super) free: [DVec3; 3],
-    pub(super) gauge: Gauge,
+    pub free: [DVec3; 3],
+    pub gauge: Gauge,
     /// The gap is at least this, m: below 0 where it began inside.
-    pub(super) least: f64,
+    pub least: f64,
     /// N/m
-    pub(super) stiffness: f64,
+    pub stiffness: f64,
     /// N
-    pub(super) multiplier: f64,
+    pub multiplier: f64,
     /// What part of its force becomes its multiplier: less than 1 where it gives way, as what holds nodes leaves them no way out.
-    pub(super) kept: f64,
+    pub kept: f64,
     /// Whether it may pull: where it pushed before, the first solution takes it for one that goes on, though a node that were left
     /// alone might go away from the tool for once.
-    pub(super) holds_on: bool,
+    pub holds_on: bool,
     /// Whether it pushed in the last equation.
-    pub(super) lasts: bool,
+    pub lasts: bool,
     /// What acts on the tissue with the nodes where they were last.
-    pub(super) answer: Answer,
+    pub answer: Answer,
     /// Whether it pushed when it was last asked.
-    pub(super) pushed: bool,
+    pub pushed: bool,
     /// The friction of its nodes.
-    pub(super) grips: [Option<usize>; MOST],
+    pub grips: [Option<usize>; MOST],
 }
 
 saved! { Hold {
@@ -46,20 +46,20 @@ saved! { Hold {
 /// What a contact does.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Answer {
-    pub(super) meets: Meets,
+    pub meets: Meets,
     /// Along the normal, N.
-    pub(super) force: f64,
+    pub force: f64,
     /// What of it acts on each node.
-    pub(super) shares: [f64; MOST],
+    pub shares: [f64; MOST],
     /// How it falls as each node goes along the normal, for each that goes, N/m.
-    pub(super) stiffness: [[f64; MOST]; MOST],
+    pub stiffness: [[f64; MOST]; MOST],
 }
 
 saved! { Answer { meets, force, shares, stiffness } }
 
 impl Hold {
     /// What it does with these pushes of the nodes, m.
-    pub(super) fn answer_to(&self, push_of: impl Fn(usize) -> DVec3) -> Answer {
+    pub fn answer_to(&self, push_of: impl Fn(usize) -> DVec3) -> Answer {
         let mut corners = self.free;
         for (corner, push) in corners.iter_mut().zip(self.corner_vectors(push_of)) {
             *corner += push;
@@ -88,7 +88,7 @@ impl Hold {
     }
 
     /// The vectors of its corners, which those of its nodes make.
-    pub(super) fn corners(&self, vectors: [DVec3; MOST]) -> [DVec3; 3] {
+    pub fn corners(&self, vectors: [DVec3; MOST]) -> [DVec3; 3] {
         let [a, b, c, _] = vectors;
         let Some(ties) = &self.ties else {
             return [a, b, c];
@@ -99,7 +99,7 @@ impl Hold {
         })
     }
 
-    pub(super) fn corner_vectors(&self, vector_of: impl Fn(usize) -> DVec3) -> [DVec3; 3] {
+    pub fn corner_vectors(&self, vector_of: impl Fn(usize) -> DVec3) -> [DVec3; 3] {
         let mut vectors = [DVec3::ZERO; MOST];
         for (vector, &node) in vectors.iter_mut().zip(&self.nodes).take(self.count) {
             *vector = vector_of(node as usize);
@@ -123,14 +123,14 @@ impl Hold {
     }
 
     /// The matter's part along the normal.
-    pub(super) fn weighted(&self, vector_of: impl Fn(usize) -> DVec3) -> f64 {
+    pub fn weighted(&self, vector_of: impl Fn(usize) -> DVec3) -> f64 {
         let nodes = self.nodes.iter().zip(self.answer.shares).take(self.count);
         let sum: DVec3 = nodes.map(|(&node, share)| vector_of(node as usize) * share).sum();
         sum.dot(self.answer.meets.normal)
     }
 
     /// The product of its stiffness with the vectors, for each of its nodes along the normal.
-    pub(super) fn products(&self, vector_of: impl Fn(usize) -> DVec3) -> [f64; MOST] {
+    pub fn products(&self, vector_of: impl Fn(usize) -> DVec3) -> [f64; MOST] {
         let mut products = [0.0; MOST];
         for (place, &node) in self.nodes.iter().enumerate().take(self.count) {
             let along = vector_of(node as usize).dot(self.answer.meets.normal);
@@ -141,7 +141,7 @@ impl Hold {
         products
     }
 
-    pub(super) fn share_out(&self, answer: &Answer, force: f64, add: &mut impl FnMut(usize, DVec3)) {
+    pub fn share_out(&self, answer: &Answer, force: f64, add: &mut impl FnMut(usize, DVec3)) {
         for (&node, share) in self.nodes.iter().zip(answer.shares).take(self.count) {
             if share > 0.0 && force != 0.0 {
                 add(node as usize, answer.meets.normal * (force * share));

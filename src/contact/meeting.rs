@@ -51,18 +51,18 @@ pub(crate) struct Meeting<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slice {
     /// Seconds from its start to the end of the substep.
-    pub(super) remains: f32,
+    pub remains: f32,
     /// s
     pub duration: f32,
-    pub(super) first: bool,
-    pub(super) sweeps: u32,
+    pub first: bool,
+    pub sweeps: u32,
     /// Whether contacts are only looked for.
-    pub(super) foresees: bool,
+    pub foresees: bool,
 }
 
 impl Slice {
     /// The whole substep, looked at before it is taken.
-    pub(super) fn ahead(meeting: &Meeting) -> Self {
+    pub fn ahead(meeting: &Meeting) -> Self {
         Self {
             remains: meeting.substep,
             duration: meeting.substep,

@@ -96,7 +96,7 @@ saved! { OwnRun { offset, lanes } }
 pub(super) struct GatherColumn {
     pub lanes: u16,
     /// Its place in the table of materials; [`OWN`].
-    pub(super) material: u16,
+    pub material: u16,
 }
 
 saved! { GatherColumn { lanes, material } }

@@ -52,37 +52,37 @@ saved! { BondCorner { body, node, weight, end } }
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bond {
     /// Its name among the world's attachments.
-    pub(super) id: SlotId,
+    pub id: SlotId,
     /// The first point and the second.
-    pub(super) points: [BondPoint; 2],
-    pub(super) corners: [BondCorner; CORNERS],
+    pub points: [BondPoint; 2],
+    pub corners: [BondCorner; CORNERS],
     /// What is between them; else they are one.
-    pub(super) thread: Option<Thread>,
+    pub thread: Option<Thread>,
     /// The mean force over a step with which it just holds, N.
-    pub(super) limit: f32,
+    pub limit: f32,
     /// The force on the first point that the next step foresees, N.
-    pub(super) foreseen: Vec3,
+    pub foreseen: Vec3,
     /// The mean force on it over the last step, N.
-    pub(super) mean: Vec3,
+    pub mean: Vec3,
     // The step in progress.
     /// Whether it is the turn of the group of its bodies.
-    pub(super) is_in_turn: bool,
+    pub is_in_turn: bool,
     /// The force that this substep foresees, N; none where a body is not moved by VERLET.
-    pub(super) load: Vec3,
+    pub load: Vec3,
     /// What was given beside that in this substep, N s, and all in the step.
-    pub(super) impulse: Vec3,
-    pub(super) sum: DVec3,
+    pub impulse: Vec3,
+    pub sum: DVec3,
     /// What closing the gap has put in, J.
-    pub(super) work: f64,
+    pub work: f64,
     /// How much impulse makes the points faster against each other, along each axis, kg; 0 where neither moves.
-    pub(super) masses: Vec3,
+    pub masses: Vec3,
     /// How far the points are to be apart at the end of the substep, and how far they may miss that, m.
-    pub(super) gap: DVec3,
-    pub(super) miss: f64,
+    pub gap: DVec3,
+    pub miss: f64,
     /// Whether it acts in this moment.
-    pub(super) acts: bool,
+    pub acts: bool,
     /// Whether a body at it is not moved by VERLET.
-    pub(super) has_equation: bool,
+    pub has_equation: bool,
 }
 
 saved! { Bond {
@@ -93,24 +93,24 @@ saved! { Bond {
 /// A node at which bonds are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BondEnd {
-    pub(super) body: usize,
-    pub(super) node: u32,
+    pub body: usize,
+    pub node: u32,
     /// Whether a bond is there still.
-    pub(super) is_used: bool,
+    pub is_used: bool,
     /// Whether its velocity is that of a skin.
-    pub(super) is_on_skin: bool,
+    pub is_on_skin: bool,
     /// Whether it is the turn of the group of its body.
-    pub(super) is_in_turn: bool,
-    pub(super) velocity: Vec3,
+    pub is_in_turn: bool,
+    pub velocity: Vec3,
     /// 1/kg; 0 along axes along which it is held.
-    pub(super) answer: Vec3,
+    pub answer: Vec3,
     /// What was given to it in this substep, N s, or what is foreseen, N.
-    pub(super) given: Vec3,
-    pub(super) place: DVec3,
-    pub(super) shift: DVec3,
+    pub given: Vec3,
+    pub place: DVec3,
+    pub shift: DVec3,
     /// What acts on it from outside in this step, N, and whether anything does on its body.
-    pub(super) pending: Vec3,
-    pub(super) is_pending: bool,
+    pub pending: Vec3,
+    pub is_pending: bool,
 }
 
 saved! { BondEnd {
@@ -118,17 +118,17 @@ saved! { BondEnd {
 } }
 
 impl Bond {
-    pub(super) fn used(&self) -> impl Iterator<Item = BondCorner> + use<> {
+    pub fn used(&self) -> impl Iterator<Item = BondCorner> + use<> {
         self.corners.into_iter().filter(|corner| corner.weight != 0.0)
     }
 
-    pub(super) fn concerns(&self, body: usize) -> bool {
+    pub fn concerns(&self, body: usize) -> bool {
         self.points.iter().any(|point| point.body == body)
     }
 }
 
 impl BondEnd {
-    pub(super) fn new(corner: &BondCorner) -> Self {
+    pub fn new(corner: &BondCorner) -> Self {
         Self {
             body: corner.body,
             node: corner.node,
