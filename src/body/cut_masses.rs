@@ -7,7 +7,6 @@ use super::cuttable::Cuttable;
 use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial};
 use crate::def::SMALLEST_MASS;
-use crate::elements::Elements;
 use crate::soa::Masses;
 use crate::solver::{Candidate, Changed, System, make_up_for};
 use crate::springs::Rewiring;
@@ -139,8 +138,9 @@ impl Body {
                 let System {
                     forces, order, state, ..
                 } = &body.system;
-                let force = |elements: &Elements| elements.force_at(order.own(node), cells, state.positions());
-                forces.elements().map_or(DVec3::ZERO, force)
+                forces.elements().map_or(DVec3::ZERO, |elements| {
+                    elements.force_at(order.own(node), cells, state.positions())
+                })
             };
             let whole: DVec3 = pieces.iter().map(|piece| force_on(self, piece.node)).sum();
             for piece in pieces {
