@@ -82,6 +82,14 @@ impl StepRequest<'_> {
         }
     }
 
+    /// The same with the gravity that acts on all of a body's mass, as it is scaled now.
+    pub fn weighed(&self, body: &System) -> Self {
+        Self {
+            gravity: self.gravity * body.weight_share().unwrap_or(1.0),
+            ..*self
+        }
+    }
+
     /// In how many parts a step is taken at most that is cut because something is near: what is longer would take as long as it
     /// liked.
     pub fn most_parts(&self) -> u32 {

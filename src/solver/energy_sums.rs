@@ -51,7 +51,7 @@ pub(crate) struct TileSums {
     kinetic: f64,
     /// Of what is free to move, kg m/s.
     momentum: DVec3,
-    /// The sum of `m x`, kg m.
+    /// The sum of `m x` of the mass that gravity pulls at, kg m.
     moment: DVec3,
     mass: f64,
     free_mass: f64,
@@ -89,6 +89,7 @@ impl TileSums {
     /// `Σ m (v·u + v⁻·v⁻ / 12 - v⁻·u / 2)` with `u = v⁻ - v⁻⁻ / 6`. Here `u` goes to where the next positions will be.
     pub fn of_open(body: &mut System, last: &Part, team: &Team) -> Self {
         let (kernel, masses, inverse_masses, pins) = (body.kernel, &body.masses, &body.inverse_masses, &body.pins);
+        let weighs_all = body.weight_share().is_some();
         let state = body.state.substep();
         let (positions, before, velocities) = (state.positions, &*state.forces, &*state.velocities);
         let kicks = last.duration / last.substep;
@@ -101,6 +102,7 @@ impl TileSums {
                 kernel.run(OfAxis {
                     axis,
                     kicks,
+                    weighs_all,
                     positions: &positions.axes()[axis][nodes.clone()],
                     before: &before.axes()[axis][nodes.clone()],
                     velocities: &velocities.axes()[axis][nodes.clone()],
@@ -152,6 +154,8 @@ impl TileSums {
 /// What the nodes of a tile add to its sums along one axis.
 struct OfAxis<'a> {
     axis: usize,
+    /// Whether gravity pulls at all mass, or at that before some was added.
+    weighs_all: bool,
     /// How long the last kick was, in substeps.
     kicks: f32,
     positions: &'a [f32],
@@ -188,8 +192,12 @@ impl Loops for OfAxis<'_> {
         let part = 1.0 / (6.0 * self.kicks);
         for start in (0..count).step_by(LANES) {
             for (lane, node) in lanes.iter_mut().zip(start..count) {
-                let mass = f64::from(self.masses[node]);
                 let free_mass = free_mass(self.inverse_masses[node]);
+                let mass = if self.weighs_all {
+                    free_mass
+                } else {
+                    f64::from(self.masses[node])
+                };
                 let velocity = self.velocities[node];
                 // A kick of another length stands for one of a substep.
                 let share = velocity * (5.0 / 6.0) + (velocity - self.before[node]) * part;

@@ -147,6 +147,8 @@ pub(crate) struct MassScaling {
     complete_to: f64,
     /// The substep that masses are made for, s; 0: they are as they are.
     step: f32,
+    /// What gravity pulls at, of a body that nothing holds: all mass, this part of it, so that it does not turn; `None`: mass as it is.
+    weight_share: Option<f32>,
     /// How many times as stiff as at rest the elements at each node are; of no nodes where masses are not made for that.
     growths: Vec<f32>,
     /// How many times as stiff as that they may become; 1 at rest.
@@ -169,6 +171,7 @@ saved!(MassScaling {
     slivers,
     complete_to,
     step,
+    weight_share,
     growths,
     margin,
     relief,
@@ -243,6 +246,7 @@ impl MassScaling {
             slivers,
             complete_to,
             step: 0.0,
+            weight_share: None,
             growths: memory::filled(0.0, room)?,
             margin: 1.0,
             relief: None,
@@ -267,9 +271,18 @@ impl MassScaling {
         &self.slivers
     }
 
-    /// Those of the nodes that may be heavier now.
+    /// Those of the nodes that gravity may pull less than in proportion to their mass.
     pub fn heavier(&self) -> &[Sliver] {
-        if self.step > 0.0 { &self.slivers } else { &[] }
+        if self.step > 0.0 && self.weight_share.is_none() {
+            &self.slivers
+        } else {
+            &[]
+        }
+    }
+
+    /// What part of all mass gravity pulls at, where it pulls all nodes in proportion.
+    pub fn weight_share(&self) -> Option<f32> {
+        self.weight_share
     }
 
     /// How many substeps a step of `dt` seconds takes at rest with masses as they are; where elements have become so stiff that it would be
@@ -451,8 +464,8 @@ impl MassScaling {
         })
     }
 
-    /// Makes masses those for a substep of `step` seconds; 0: as they are.
-    pub fn apply(&mut self, step: f32, body: Heavier) {
+    /// Makes masses those for a substep of `step` seconds; 0: as they are. `is_free`: nothing holds the body.
+    pub fn apply(&mut self, step: f32, body: Heavier, is_free: bool) {
         self.step = step;
         *body.uniform_inverse_mass = self.uniform_inverse_mass.filter(|_| step == 0.0);
         let mut damping = body.damping;
@@ -469,6 +482,8 @@ impl MassScaling {
                 }
             }
         }
+        let added = self.added_mass();
+        self.weight_share = (is_free && added > 0.0).then(|| (self.total / (self.total + added)) as f32);
     }
 
     /// Nodes are damped at these rates from now on, 1/s, with their masses as they are.

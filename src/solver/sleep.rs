@@ -494,7 +494,7 @@ impl System {
         for (place, node) in nodes.enumerate() {
             let inverse_mass = self.inverse_masses[node];
             if inverse_mass > 0.0 {
-                let pull = forces.get(place) * inverse_mass + gravity * (self.masses[node] * inverse_mass);
+                let pull = forces.get(place) * inverse_mass + self.gravity_at(node, gravity);
                 let held = self.pins.partial_axes_of(node as u32);
                 let pull = Vec3::select(held, Vec3::ZERO, pull);
                 largest = largest.max(pull.length());

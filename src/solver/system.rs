@@ -262,6 +262,7 @@ impl System {
 
     /// The same, after springs or pins have changed too.
     pub fn scale_masses(&mut self, step: f32) {
+        let is_free = self.held_axes() == BVec3::FALSE;
         if let Some(scaling) = &mut self.scaling {
             let differ = step > 0.0 || scaling.step() > 0.0;
             let heavier = Heavier {
@@ -270,11 +271,24 @@ impl System {
                 uniform_inverse_mass: &mut self.uniform_inverse_mass,
                 damping: self.damping.as_mut(),
             };
-            scaling.apply(step, heavier);
+            scaling.apply(step, heavier, is_free);
             if differ {
                 self.forces.forget_rates();
             }
         }
+    }
+
+    /// The gravity that pulls a node with its mass as it is, given that of the body, m/s².
+    pub fn gravity_at(&self, node: usize, gravity: Vec3) -> Vec3 {
+        match self.weight_share() {
+            None => gravity * (self.masses[node] * self.inverse_masses[node]),
+            Some(share) => gravity * share,
+        }
+    }
+
+    /// What part of all mass gravity pulls at, where mass was added to a body that nothing holds.
+    pub fn weight_share(&self) -> Option<f32> {
+        self.scaling.as_ref()?.weight_share()
     }
 
     /// Makes room for contacts within equations, where it has such.

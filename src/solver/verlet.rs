@@ -127,9 +127,10 @@ impl<'a> Step<'a> {
         let mut finite = true;
         begin(body, request);
         carry.energy.share(0);
-        let account = Account::new(body, &carry, request, substeps);
         let may_stay_open = may_stay_open(body) && !body.pins.are_led();
         let mut part = self.opening(body, &mut carry);
+        let request = &request.weighed(body);
+        let account = Account::new(body, &carry, request, substeps);
         if let Some(damping) = &mut body.damping {
             damping.prepare(substep);
         }
@@ -237,16 +238,19 @@ impl<'a> Step<'a> {
             request, substep, team, ..
         } = *self;
         let mut part = Part::opening(substep);
-        let mut change = request.gravity.as_dvec3() * f64::from(part.duration);
+        let (half, mut fall) = (part.duration, DVec3::ZERO);
+        let closing = carry.closing.take();
+        if closing.is_some() {
+            body.use_masses_for(carry.masses_for);
+        }
         let same_masses = carry.masses_for == self.masses_for;
-        match carry.closing.take() {
+        match closing {
             None => {}
-            Some(closing) if same_masses && closing.joins(body, substep, request.gravity) => {
+            Some(closing) if same_masses && closing.joins(body, substep, request.weighed(body).gravity) => {
                 part.join(&closing);
-                change += closing.fall();
+                fall = closing.fall();
             }
             Some(closing) => {
-                body.use_masses_for(carry.masses_for);
                 close_aside(body, &closing, &mut carry.gravity, team);
                 part.before = VelocityTime::Closed;
             }
@@ -257,7 +261,8 @@ impl<'a> Step<'a> {
             keep_energy(body, &mut carry.energy);
             part.before = VelocityTime::Closed;
         }
-        part.fall = carry.gravity.next(change);
+        fall += request.weighed(body).gravity.as_dvec3() * f64::from(half);
+        part.fall = carry.gravity.next(fall);
         part
     }
 

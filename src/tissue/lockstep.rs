@@ -143,7 +143,7 @@ impl CoupledGroup<'_> {
             let (Some(walk), Some(body)) = (&mut walks[place], bodies.at_mut(place)) else {
                 continue;
             };
-            let request = &request.of(body);
+            let request = &request.of(body).weighed(body);
             let account = Account::new(body, &walk.carry, request, substeps);
             let energies = account.settle(body, &mut walk.carry, walk.sums, team);
             walk.carry.energy.gain(std::mem::take(&mut work));
@@ -265,7 +265,7 @@ impl CoupledGroup<'_> {
             moment.begins = index == 0;
             tissue.bonds.load(bodies);
             each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
-                let request = &request.of(body);
+                let request = &request.of(body).weighed(body);
                 if !body.is_explicit() {
                     // There may be no more parts to try it in.
                     let is_last = is_last || substeps >= PARTS;
@@ -320,7 +320,7 @@ impl CoupledGroup<'_> {
             if !body.is_explicit() {
                 return Ok(());
             }
-            let request = &request.of(body);
+            let request = &request.of(body).weighed(body);
             let fall = request.gravity.as_dvec3() * f64::from(0.5 * substep);
             walk.part.close(walk.carry.gravity.next(fall));
             pass(body, request, &walk.part, &mut walk.carry, team);

@@ -283,6 +283,29 @@ fn energy_does_not_grow() {
     }
 }
 
+/// The added mass lies to one side, and gravity pulls at all of it, so the body falls without turning.
+#[test]
+fn a_body_that_falls_does_not_turn() {
+    const STEPS: usize = 30;
+    let parts = slivers(5, 1, false);
+    let extent = 0.05;
+    let mut scene = scene(&parts, gravity(), PLENTY as f32);
+    scene.run(FRAME, STEPS);
+    let lacks_weight = added(&scene);
+    assert!(lacks_weight > 1e-4 * total_mass(&parts), "{lacks_weight} kg");
+    let (positions, velocities) = (scene.positions(), scene.velocities());
+    let count = positions.len() as f64;
+    let [centre, mean] = [&positions, &velocities].map(|all| all.iter().sum::<DVec3>() / count);
+    let turns = positions
+        .iter()
+        .zip(&velocities)
+        .map(|(position, velocity)| (position - centre).cross(velocity - mean) * 1e-3);
+    let turns = turns.sum::<DVec3>().length();
+    // What it would turn with if the added mass had no weight, a tenth of its size from the middle.
+    let would = lacks_weight * 0.1 * extent * f64::from(G * FRAME * STEPS as f32);
+    assert!(turns < 0.02 * would, "{turns:e} kg m2/s, {would:e}");
+}
+
 #[test]
 fn momentum_is_kept() {
     let parts = slivers(5, 5, false);
