@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::base::{Error, Result, memory};
 use crate::codec::saved;
-use crate::handover::pool::{Reader, Writer};
+use crate::handover::pool::{PoolReader, PoolWriter};
 use crate::soa::{TILE, tile_count, tile_nodes};
 use crate::threads::{Team, Tiles};
 
@@ -19,7 +19,7 @@ const MOST_READERS: usize = 126;
 /// and the world, and ends on any thread.
 #[derive(Debug)]
 pub struct BodyReader {
-    reader: Reader<Snapshot>,
+    reader: PoolReader<Snapshot>,
     has_read: bool,
 }
 
@@ -74,7 +74,7 @@ pub(crate) struct Clock {
     pub time: f64,
 }
 
-saved!(Clock { step, time });
+saved! { Clock { step, time } }
 
 impl Clock {
     pub fn tick(&mut self, dt: f32) {
@@ -114,7 +114,7 @@ impl Snapshot {
 /// What a body keeps for its readers, from the first on.
 #[derive(Debug)]
 pub(crate) struct Shown {
-    writer: Writer<Snapshot>,
+    writer: PoolWriter<Snapshot>,
     triangles: TriangleLists,
     pub clock: Clock,
     /// What was shown last.
@@ -137,7 +137,7 @@ impl Shown {
         let triangles = TriangleLists::new(triangles)?;
         let snapshot = || Snapshot::new(room, triangles.current());
         Ok(Self {
-            writer: Writer::new(MOST_READERS, [snapshot()?, snapshot()?])?,
+            writer: PoolWriter::new(MOST_READERS, [snapshot()?, snapshot()?])?,
             triangles,
             clock: Clock::default(),
             topology_version: 0,

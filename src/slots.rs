@@ -22,7 +22,7 @@ pub(crate) struct Slot<T> {
     content: Option<T>,
 }
 
-saved!([T: Saved] Slot<T> { generation, content });
+saved! { [T: Saved] Slot<T> { generation, content } }
 
 impl<T: Saved> Slots<T> {
     /// Writes all places.

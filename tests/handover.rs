@@ -73,7 +73,7 @@ macro_rules! triple_buffer_test {
                 }
             });
             let mut before = 0;
-            let mut read = |reader: &mut $files::triple_buffer::Reader<[u32; 2]>| {
+            let mut read = |reader: &mut $files::triple_buffer::BufferReader<[u32; 2]>| {
                 let is_new = reader.take();
                 let [first, second] = reader.read(|value| *value);
                 assert_eq!(first, second, "torn");
@@ -93,8 +93,8 @@ macro_rules! triple_buffer_test {
 macro_rules! pool_test {
     ($files:ident, $changes:expr, $readers:expr, $writes:expr, $reads:expr) => {
         model($changes, || {
-            let mut writer = $files::pool::Writer::new(2, [[1_u64; 2], [0; 2]]).expect("memory");
-            let read = |mut reader: $files::pool::Reader<[u64; 2]>| {
+            let mut writer = $files::pool::PoolWriter::new(2, [[1_u64; 2], [0; 2]]).expect("memory");
+            let read = |mut reader: $files::pool::PoolReader<[u64; 2]>| {
                 for _ in 0..$reads {
                     let before = reader.version();
                     let is_new = reader.take();
@@ -172,8 +172,9 @@ fn a_pool_needs_each_of_its_orderings() {
 fn readers_come_and_go() {
     static SHARED: AtomicBool = AtomicBool::new(false);
     model(3, || {
-        let mut writer = right::pool::Writer::new(1, [[1_u64; 2], [0; 2]]).expect("memory");
-        let add = |writer: &mut right::pool::Writer<_>| writer.add_reader(|| Ok::<_, ()>([0; 2])).expect("a buffer");
+        let mut writer = right::pool::PoolWriter::new(1, [[1_u64; 2], [0; 2]]).expect("memory");
+        let add =
+            |writer: &mut right::pool::PoolWriter<_>| writer.add_reader(|| Ok::<_, ()>([0; 2])).expect("a buffer");
         let mut first = add(&mut writer).expect("a place");
         let going = thread::spawn(move || {
             first.take();
@@ -201,7 +202,7 @@ fn what_is_shared_ends_once() {
     model(3, || {
         let value = Arc::new(());
         let [a, b, c] = [&value; 3].map(Arc::clone);
-        let mut writer = right::pool::Writer::new(1, [a, b]).expect("memory");
+        let mut writer = right::pool::PoolWriter::new(1, [a, b]).expect("memory");
         let reader = writer
             .add_reader(|| Ok::<_, ()>(c))
             .expect("a buffer")

@@ -1,18 +1,18 @@
 //! What each spring of a body bears before it tears.
 
-use super::stretch::Watched;
+use super::stretch::WatchedSpring;
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::cutting::Changes;
 use crate::def::{Spring, Withheld};
 use crate::soa::NodeOrder;
-use crate::springs::{Change, Link, Rewiring};
+use crate::springs::{Link, Rewiring, SpringChange};
 
 /// No spring.
 const NONE: u32 = u32::MAX;
 
 #[derive(Clone, Copy, Debug)]
-struct Limits {
+struct BearingLimits {
     strain: f32,
     force: f32,
     /// The next spring of the same lower node.
@@ -21,24 +21,19 @@ struct Limits {
     withheld: Option<(u32, Withheld)>,
 }
 
-saved!(Limits {
-    strain,
-    force,
-    next,
-    withheld
-});
+saved! { BearingLimits { strain, force, next, withheld } }
 
 /// Springs with limits, in the body's own numbers.
 #[derive(Debug)]
 pub(super) struct Bearing {
     /// Each with its limits at the same place.
-    springs: Vec<Watched>,
-    limits: Vec<Limits>,
+    springs: Vec<WatchedSpring>,
+    limits: Vec<BearingLimits>,
     /// Of each node the first spring that it is the lower one of.
     first: Vec<u32>,
 }
 
-saved!(Bearing { springs, limits, first });
+saved! { Bearing { springs, limits, first } }
 
 impl Bearing {
     /// All springs with the same limits, strain and force; with room for so many nodes.
@@ -61,7 +56,7 @@ impl Bearing {
         Ok(all)
     }
 
-    pub fn springs(&self) -> &[Watched] {
+    pub fn springs(&self) -> &[WatchedSpring] {
         &self.springs
     }
 
@@ -123,7 +118,7 @@ impl Bearing {
     }
 
     /// Springs have other stiffnesses or rest lengths; limits stay.
-    pub fn change(&mut self, changes: &[Change]) {
+    pub fn change(&mut self, changes: &[SpringChange]) {
         for change in changes {
             if let Some(at) = self.find([change.node, change.after.neighbour]) {
                 self.springs[at].longest_squared = longest_squared(&self.limits[at], &change.after);
@@ -139,11 +134,11 @@ impl Bearing {
                 let (spring, limits) = (self.springs[at], self.limits[at]);
                 // As long as the whole.
                 self.link(
-                    Watched {
+                    WatchedSpring {
                         nodes: sorted(own(piece.nodes)),
                         ..spring
                     },
-                    Limits {
+                    BearingLimits {
                         force: (f64::from(limits.force) * piece.part) as f32,
                         withheld: None,
                         ..limits
@@ -158,7 +153,7 @@ impl Bearing {
         for &nodes in &changes.removed_springs {
             self.remove(own(nodes));
         }
-        for Change { node, before, after } in &rewiring.changed {
+        for SpringChange { node, before, after } in &rewiring.changed {
             if let Some(at) = self.find([*node, after.neighbour])
                 && before.stiffness > 0.0
             {
@@ -180,22 +175,22 @@ impl Bearing {
     }
 
     fn add(&mut self, nodes: [u32; 2], [strain, force]: [f32; 2], link: &Link) {
-        let limits = Limits {
+        let limits = BearingLimits {
             strain,
             force,
             next: NONE,
             withheld: None,
         };
         let longest_squared = longest_squared(&limits, link);
-        self.link(Watched { nodes, longest_squared }, limits);
+        self.link(WatchedSpring { nodes, longest_squared }, limits);
     }
 
     /// Appends a spring, for which there is room.
-    fn link(&mut self, spring: Watched, limits: Limits) {
+    fn link(&mut self, spring: WatchedSpring, limits: BearingLimits) {
         let number = self.springs.len() as u32;
         let next = std::mem::replace(&mut self.first[spring.nodes[0] as usize], number);
         self.springs.push(spring);
-        self.limits.push(Limits { next, ..limits });
+        self.limits.push(BearingLimits { next, ..limits });
     }
 
     /// The place of a spring.
@@ -227,7 +222,7 @@ pub(super) fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
 }
 
 /// The square of the longest that a spring may be, m²; infinity: any length.
-fn longest_squared(limits: &Limits, link: &Link) -> f32 {
+fn longest_squared(limits: &BearingLimits, link: &Link) -> f32 {
     let [rest, stiffness] = [link.rest_length, link.stiffness].map(f64::from);
     let mut longest = f64::INFINITY;
     if limits.strain > 0.0 && rest > 0.0 {

@@ -66,7 +66,7 @@ fn rim(count: u32) -> impl Iterator<Item = u32> {
 
 /// How a sheet is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Drawn {
+enum Refinement {
     /// By its nodes.
     Plainly,
     /// Each triangle as four, whose inner corners are bound to the ends of edges.
@@ -152,13 +152,13 @@ fn divide(body: &mut Body, triangles: std::ops::Range<usize>) {
     assert!(!is_whole || body.surface().len() == 4 * changed.len());
 }
 
-fn draw(world: &mut World, id: BodyId, drawn: Drawn) {
+fn draw(world: &mut World, id: BodyId, drawn: Refinement) {
     let body = world.body_mut(id).expect("a body");
     let triangles = body.surface().len();
     match drawn {
-        Drawn::Plainly => {}
-        Drawn::InFour => divide(body, 0..triangles),
-        Drawn::Twice => {
+        Refinement::Plainly => {}
+        Refinement::InFour => divide(body, 0..triangles),
+        Refinement::Twice => {
             let count = body.node_count() as u32;
             let twin = |node: u32| {
                 let own = body.system.order.own(node);
@@ -204,7 +204,7 @@ fn momentum(body: &Body) -> DVec3 {
 
 #[test]
 fn a_sphere_carries_the_weight_of_a_sheet_however_it_is_drawn() {
-    for drawn in [Drawn::Plainly, Drawn::InFour, Drawn::Twice] {
+    for drawn in [Refinement::Plainly, Refinement::InFour, Refinement::Twice] {
         let mut world = world(Vec3::NEG_Y * 9.81, 0, 1);
         let tool = sphere(&mut world, 0.07, Vec3::NEG_Y * 0.0701, 0.5);
         let id = sheet(&mut world, Solver::Verlet, Storage::Packed, 8, 20.0);
@@ -218,7 +218,7 @@ fn a_sphere_carries_the_weight_of_a_sheet_however_it_is_drawn() {
         let weight = Vec3::NEG_Y * (81.0 * NODE_MASS * 9.81);
         let off = force.distance(weight) / weight.length();
         assert!(off < 1e-3, "{drawn:?}: {force} of {weight}");
-        let share = if drawn == Drawn::InFour { 4 } else { 1 };
+        let share = if drawn == Refinement::InFour { 4 } else { 1 };
         assert_eq!(body(&world, id).surface().len(), 128 * share);
     }
 }
@@ -227,7 +227,7 @@ fn a_sphere_carries_the_weight_of_a_sheet_however_it_is_drawn() {
 fn what_a_tool_gives_to_bound_points_is_the_momentum_of_nodes() {
     for solver in SOLVERS {
         for storage in [Storage::Packed, Storage::FastLink] {
-            for drawn in [Drawn::Plainly, Drawn::InFour] {
+            for drawn in [Refinement::Plainly, Refinement::InFour] {
                 let mut world = world(Vec3::ZERO, 0, 1);
                 let id = sheet(&mut world, solver, storage, 6, 0.0);
                 draw(&mut world, id, drawn);
@@ -254,6 +254,20 @@ fn what_a_tool_gives_to_bound_points_is_the_momentum_of_nodes() {
         }
     }
 }
+
+const TETRAHEDRON: [Vec3; 4] = [
+    Vec3::new(-0.05, 0.01, -0.04),
+    Vec3::new(0.06, -0.02, -0.03),
+    Vec3::new(0.0, 0.03, 0.07),
+    Vec3::new(0.01, -0.08, 0.0),
+];
+
+/// Parts of its corners, for each corner of a triangle within it.
+const OF_FOUR: [[f32; 4]; 3] = [
+    [0.5, 0.25, 0.25, 0.0],
+    [0.125, 0.5, 0.125, 0.25],
+    [0.25, 0.0, 0.5, 0.25],
+];
 
 /// A body without springs of which a triangle is drawn whose corners have these parts of its nodes.
 fn free_nodes(world: &mut World, positions: &[Vec3], masses: &[f32], parts: [[f32; 4]; 3]) -> BodyId {
@@ -284,21 +298,9 @@ fn free_nodes(world: &mut World, positions: &[Vec3], masses: &[f32], parts: [[f3
 
 #[test]
 fn nodes_receive_what_weights_say() {
-    let tetrahedron = [
-        Vec3::new(-0.05, 0.01, -0.04),
-        Vec3::new(0.06, -0.02, -0.03),
-        Vec3::new(0.0, 0.03, 0.07),
-        Vec3::new(0.01, -0.08, 0.0),
-    ];
-    let flat = [tetrahedron[0], tetrahedron[1], tetrahedron[2]];
     let masses = [0.001, 0.002, 0.0007, 0.0013];
     let of_three = [[1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0], [0.5, 0.0, 0.5, 0.0]];
-    let of_four = [
-        [0.5, 0.25, 0.25, 0.0],
-        [0.125, 0.5, 0.125, 0.25],
-        [0.25, 0.0, 0.5, 0.25],
-    ];
-    for (positions, parts) in [(&flat[..], of_three), (&tetrahedron[..], of_four)] {
+    for (positions, parts) in [(&TETRAHEDRON[..3], of_three), (&TETRAHEDRON[..], OF_FOUR)] {
         let mut world = world(Vec3::ZERO, 1, 1);
         let id = free_nodes(&mut world, positions, &masses[..positions.len()], parts);
         // Where the sphere meets the triangle, by parts of its corners.
@@ -345,19 +347,8 @@ fn nodes_receive_what_weights_say() {
 
 #[test]
 fn what_nobody_draws_is_not_touched() {
-    let positions = [
-        Vec3::new(-0.05, 0.01, -0.04),
-        Vec3::new(0.06, -0.02, -0.03),
-        Vec3::new(0.0, 0.03, 0.07),
-        Vec3::new(0.01, -0.08, 0.0),
-    ];
-    let parts = [
-        [0.5, 0.25, 0.25, 0.0],
-        [0.125, 0.5, 0.125, 0.25],
-        [0.25, 0.0, 0.5, 0.25],
-    ];
     let mut world = world(Vec3::ZERO, 1, 1);
-    free_nodes(&mut world, &positions, &[0.001; 4], parts);
+    free_nodes(&mut world, &TETRAHEDRON, &[0.001; 4], OF_FOUR);
     let plane = ToolDefinition {
         pose: Pose {
             position: Vec3::NEG_Y * 0.07,
@@ -377,15 +368,11 @@ fn what_nobody_draws_is_not_touched() {
 
 #[test]
 fn what_holds_a_node_takes_its_share() {
-    let positions = [
-        Vec3::new(-0.05, 0.01, -0.04),
-        Vec3::new(0.06, -0.02, -0.03),
-        Vec3::new(0.0, 0.03, 0.07),
-    ];
+    let positions = &TETRAHEDRON[..3];
     let parts = [[0.5, 0.5, 0.0, 0.0], [0.0, 0.5, 0.5, 0.0], [0.25, 0.0, 0.75, 0.0]];
     for axes in [[true; 3], [false, true, false]] {
         let mut world = world(Vec3::ZERO, 1, 1);
-        let id = free_nodes(&mut world, &positions, &[0.001, 0.002, 0.0007], parts);
+        let id = free_nodes(&mut world, positions, &[0.001, 0.002, 0.0007], parts);
         world.body_mut(id).expect("a body").pin_axes(0, axes).expect("a node");
         let met = [0.5, 0.25, 0.25_f32];
         let corners = parts.map(|parts| {
@@ -414,7 +401,7 @@ fn what_holds_a_node_takes_its_share() {
 }
 
 /// Presses a ball into a sheet that is held at its rim, along it, and lets it settle: the force on it, and whatever `see` is shown.
-fn press(drawn: Drawn, solver: Solver, threads: u32, mut see: impl FnMut(&World, BodyId, Vec3)) -> (World, Vec3) {
+fn press(drawn: Refinement, solver: Solver, threads: u32, mut see: impl FnMut(&World, BodyId, Vec3)) -> (World, Vec3) {
     let mut world = world(Vec3::ZERO, 0, threads);
     let id = sheet(&mut world, solver, Storage::Packed, 8, 40.0);
     for node in rim(8) {
@@ -436,10 +423,10 @@ fn press(drawn: Drawn, solver: Solver, threads: u32, mut see: impl FnMut(&World,
 
 #[test]
 fn solvers_agree_on_a_sheet_drawn_finely() {
-    let (_, plain) = press(Drawn::Plainly, Solver::Verlet, 1, |_, _, _| ());
+    let (_, plain) = press(Refinement::Plainly, Solver::Verlet, 1, |_, _, _| ());
     assert!(plain.y > 0.1, "{plain}");
     for solver in SOLVERS {
-        let (_, force) = press(Drawn::InFour, solver, 1, |world, id, place| {
+        let (_, force) = press(Refinement::InFour, solver, 1, |world, id, place| {
             let depth = deepest(body(world, id), place, 0.025);
             assert!(depth < 1e-4, "{solver:?}: {depth} m");
         });
@@ -451,14 +438,14 @@ fn solvers_agree_on_a_sheet_drawn_finely() {
 #[test]
 fn threads_make_no_difference_to_bound_points() {
     for solver in [Solver::Verlet, Solver::Implicit] {
-        let [one, two] = [1, 2].map(|threads| press(Drawn::InFour, solver, threads, |_, _, _| ()));
+        let [one, two] = [1, 2].map(|threads| press(Refinement::InFour, solver, threads, |_, _, _| ()));
         assert_eq!(one.0.state_hash(), two.0.state_hash(), "{solver:?}");
     }
 }
 
 #[test]
 fn a_point_that_is_all_one_node_is_touched_as_that_is() {
-    let [plain, twice] = [Drawn::Plainly, Drawn::Twice].map(|drawn| {
+    let [plain, twice] = [Refinement::Plainly, Refinement::Twice].map(|drawn| {
         let mut id = None;
         let (world, force) = press(drawn, Solver::Verlet, 1, |_, body, _| id = Some(body));
         let positions = body(&world, id.expect("a body")).positions().to_vec();
@@ -512,7 +499,7 @@ fn forces_at_a_bound_point_are_those_of_its_nodes() {
     let run = |is_bound: bool| {
         let mut world = world(Vec3::ZERO, 0, 1);
         let id = sheet(&mut world, Solver::Verlet, Storage::Packed, 4, 1.0);
-        draw(&mut world, id, Drawn::InFour);
+        draw(&mut world, id, Refinement::InFour);
         let body = world.body_mut(id).expect("a body");
         let force = Vec3::new(0.25, 0.5, -0.125);
         let middle = body.surface()[0][1];
@@ -541,7 +528,7 @@ fn forces_at_a_bound_point_are_those_of_its_nodes() {
 fn bound_points_cannot_be_held_or_joined() {
     let mut world = world(Vec3::ZERO, 0, 1);
     let id = sheet(&mut world, Solver::Verlet, Storage::Packed, 4, 1.0);
-    draw(&mut world, id, Drawn::InFour);
+    draw(&mut world, id, Refinement::InFour);
     let before = world.state_hash();
     let body = world.body_mut(id).expect("a body");
     let middle = body.surface()[0][1];
@@ -565,7 +552,7 @@ fn a_tool_that_holds_a_bound_point_holds_its_nodes() {
     for solver in SOLVERS {
         let mut world = world(Vec3::NEG_Y * 9.81, 0, 1);
         let id = sheet(&mut world, solver, Storage::Packed, 4, 5.0);
-        draw(&mut world, id, Drawn::InFour);
+        draw(&mut world, id, Refinement::InFour);
         let tool = sphere(&mut world, 0.01, Vec3::Y * 0.02, 0.0);
         let middle = body(&world, id).surface()[0][1];
         let attachment = world.attach_node(id, middle, tool, 0.0).expect("an attachment");
@@ -603,7 +590,7 @@ fn a_tool_that_holds_a_bound_point_holds_its_nodes() {
 /// Whether the tool holds the middle of an edge as such, or as a corner of the surface.
 #[test]
 fn what_a_tool_holds_at_a_bound_point_it_does_not_touch() {
-    let [plain, bound] = [Drawn::Plainly, Drawn::InFour].map(|drawn| {
+    let [plain, bound] = [Refinement::Plainly, Refinement::InFour].map(|drawn| {
         let mut world = world(Vec3::NEG_Y * 9.81, 0, 1);
         let id = sheet(&mut world, Solver::Verlet, Storage::Packed, 4, 20.0);
         draw(&mut world, id, drawn);
@@ -611,7 +598,7 @@ fn what_a_tool_holds_at_a_bound_point_it_does_not_touch() {
         let middle = start[triangles[0][0] as usize].midpoint(start[triangles[0][1] as usize]);
         // Beside it, where faces are met that are bound to what it holds.
         let tool = sphere(&mut world, 0.012, middle + Vec3::new(0.006, -0.008, 0.002), 0.5);
-        if drawn == Drawn::Plainly {
+        if drawn == Refinement::Plainly {
             let point = crate::def::SurfacePoint {
                 triangle: 0,
                 weights: [0.5, 0.5, 0.0],

@@ -17,7 +17,7 @@ pub struct NewNodeSource {
     pub weights: [f32; 3],
 }
 
-saved!(NewNodeSource { node, sources, weights });
+saved! { NewNodeSource { node, sources, weights } }
 
 /// An edge of the rim of a cut. Each edge that was cut is two of them, one on either side.
 #[repr(C)]
@@ -29,7 +29,7 @@ pub struct NewRimEdge {
     pub triangle: u32,
 }
 
-saved!(NewRimEdge { nodes, triangle });
+saved! { NewRimEdge { nodes, triangle } }
 
 /// What has come, changed or gone since a version.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,12 +55,7 @@ struct Lengths {
     rim: usize,
 }
 
-saved!(Lengths {
-    nodes,
-    triangles,
-    removed_springs,
-    rim
-});
+saved! { Lengths { nodes, triangles, removed_springs, rim } }
 
 /// All that has changed since the body was made.
 #[derive(Debug, Default)]
@@ -73,13 +68,7 @@ pub(super) struct ChangeLog {
     versions: Vec<Lengths>,
 }
 
-saved!(ChangeLog {
-    nodes,
-    triangles,
-    removed_springs,
-    rim,
-    versions
-});
+saved! { ChangeLog { nodes, triangles, removed_springs, rim, versions } }
 
 impl ChangeLog {
     pub fn version(&self) -> u64 {

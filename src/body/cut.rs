@@ -11,7 +11,7 @@ use crate::forces::Parts;
 use crate::nodes::{Bound, NewNode};
 use crate::soa::NodeOrder;
 use crate::solver::{Changed, System, close_beside};
-use crate::springs::{Change, Rewiring};
+use crate::springs::{Rewiring, SpringChange};
 use crate::terms::Parting;
 use crate::tissue::{Skin, SkinChange, SurfaceToBe};
 
@@ -385,7 +385,7 @@ fn parting(order: &NodeOrder, material: &CutMaterial, changes: &Changes, rewirin
     for spring in &rewiring.removed {
         parting.add_other_spring(spring.nodes, known, 0.0)?;
     }
-    for Change { node, before, after } in &rewiring.changed {
+    for SpringChange { node, before, after } in &rewiring.changed {
         let part = f64::from(after.stiffness) / f64::from(before.stiffness);
         parting.add_other_spring(
             [*node, before.neighbour],

@@ -138,7 +138,9 @@ impl Body {
                 let System {
                     forces, order, state, ..
                 } = &body.system;
-                forces.force_at(order.own(node), cells, state.positions())
+                forces.elements().map_or(DVec3::ZERO, |elements| {
+                    elements.force_at(order.own(node), cells, state.positions())
+                })
             };
             let whole: DVec3 = pieces.iter().map(|piece| force_on(self, piece.node)).sum();
             for piece in pieces {

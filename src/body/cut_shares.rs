@@ -46,9 +46,9 @@ impl Body {
         carried: &mut [f64],
     ) -> f64 {
         let mut highest = 0.0_f64;
-        if !self.system.forces.has_elements() {
+        let Some(elements) = self.system.forces.elements() else {
             return highest;
-        }
+        };
         let source = self.system.order.own(pieces[0].source);
         for (piece, carried) in pieces.iter().zip(carried) {
             for cell in material.tetrahedra_at(piece.node) {
@@ -56,7 +56,7 @@ impl Body {
                     Ok(at) => (cells[at].source, cells[at].part),
                     Err(_) => (cell, 1.0),
                 };
-                let (of_cell, beside) = self.system.forces.carried_by(of, source, &self.system.inverse_masses);
+                let (of_cell, beside) = elements.carried_by(of, source, &self.system.inverse_masses);
                 *carried += part * of_cell;
                 highest = highest.max(beside);
             }

@@ -5,7 +5,7 @@ use super::cuttable::passes;
 use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial, PieceOfSpring, Sweep};
 use crate::def::Spring;
-use crate::springs::{Change, Link, Rewiring};
+use crate::springs::{Link, Rewiring, SpringChange};
 
 impl Body {
     /// What becomes of springs along edges of cells.
@@ -109,8 +109,8 @@ fn spring_of(nodes: [u32; 2], link: &Link, part: f64) -> Spring {
     }
 }
 
-fn part_of(node: u32, link: Link, part: f64) -> Change {
-    Change {
+fn part_of(node: u32, link: Link, part: f64) -> SpringChange {
+    SpringChange {
         node,
         before: link,
         after: Link {

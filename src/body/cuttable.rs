@@ -18,7 +18,7 @@ use super::stroke::Stroke;
 pub(super) struct Cuttable {
     /// In the caller's numbers.
     pub material: CutMaterial,
-    pub search: Search,
+    pub search: TileSearch,
     pub log: ChangeLog,
     pub stroke: Stroke,
     /// Mass by material in the mean, kg/m² or kg/m³, of nodes that have mass.
@@ -27,14 +27,7 @@ pub(super) struct Cuttable {
     pub springs_are_edges: bool,
 }
 
-saved!(Cuttable {
-    material,
-    search,
-    log,
-    stroke,
-    density,
-    springs_are_edges
-});
+saved! { Cuttable { material, search, log, stroke, density, springs_are_edges } }
 
 impl Cuttable {
     /// With springs and the triangles that are drawn in the caller's numbers; `None`: the body is not to be cut.
@@ -72,7 +65,7 @@ impl Cuttable {
             _ => CutMaterial::Solid(CutSolid::new(rest, tetrahedra, definition.triangles).map_err(refused)?),
         };
         material.reserve(spare)?;
-        let mut search = Search::new(rest.len(), &material, order)?;
+        let mut search = TileSearch::new(rest.len(), &material, order)?;
         // Each copy of a cell brings copies of nodes.
         search.home_of_cell.try_reserve_exact(spare as usize)?;
         let (mut mass, mut size) = (0.0, 0.0);
@@ -156,23 +149,19 @@ fn check_offered(definition: &BodyDefinition) -> Result<()> {
 
 /// Where what is drawn is to be looked for: by tiles of nodes, whose boxes each step finds anew.
 #[derive(Debug)]
-pub(super) struct Search {
+pub(super) struct TileSearch {
     /// Of each cell that tile at which it, and what it was copied from, is listed.
     home_of_cell: Vec<u32>,
-    homes: Vec<Home>,
+    homes: Vec<TileItems>,
     /// Nodes of the body as it was made.
     first_count: u32,
 }
 
-saved!(Search {
-    home_of_cell,
-    homes,
-    first_count
-});
+saved! { TileSearch { home_of_cell, homes, first_count } }
 
 /// The items that are listed at one tile.
 #[derive(Clone, Debug, Default)]
-struct Home {
+struct TileItems {
     items: Vec<u32>,
     /// The tiles that nodes which they were made of lie in.
     tiles: Vec<u32>,
@@ -180,7 +169,7 @@ struct Home {
     later: Vec<u32>,
 }
 
-saved!(Home { items, tiles, later });
+saved! { TileItems { items, tiles, later } }
 
 /// The tile at which what lies between these is listed.
 fn home_of<const CORNERS: usize>(corners: [u32; CORNERS], order: &NodeOrder) -> u32 {
@@ -188,9 +177,9 @@ fn home_of<const CORNERS: usize>(corners: [u32; CORNERS], order: &NodeOrder) -> 
     tiles.min().unwrap_or(0)
 }
 
-impl Search {
+impl TileSearch {
     fn new(node_count: usize, material: &CutMaterial, order: &NodeOrder) -> Result<Self> {
-        let mut homes = memory::filled(Home::default(), tile_count(node_count))?;
+        let mut homes = memory::filled(TileItems::default(), tile_count(node_count))?;
         let mut home_of_cell = memory::reserved(material.item_count() as usize)?;
         for item in 0..material.item_count() {
             let corners = material.corners_of(item);

@@ -4,7 +4,7 @@ use super::Body;
 use crate::base::{Error, Result, above_zero, memory, not_negative};
 use crate::soa::{Region, Scale};
 use crate::solver::Changed;
-use crate::springs::{Change, Link};
+use crate::springs::{Link, SpringChange};
 
 impl Body {
     /// Makes what lies between `nodes` alone `stiffness` times as stiff and `length` times as long at rest, as cautery stiffens and
@@ -43,7 +43,7 @@ impl Body {
     }
 
     /// How the springs within a region are to change.
-    fn springs_in(&self, region: &Region, scale: Scale) -> Result<Vec<Change>> {
+    fn springs_in(&self, region: &Region, scale: Scale) -> Result<Vec<SpringChange>> {
         let mut changes = Vec::new();
         let mut result = Ok(());
         for &node in region.nodes() {
@@ -57,7 +57,7 @@ impl Body {
                     ..before
                 };
                 if after.stiffness.is_finite() && after.rest_length.is_finite() {
-                    result = memory::push(&mut changes, Change { node, before, after });
+                    result = memory::push(&mut changes, SpringChange { node, before, after });
                 } else {
                     let [a, b] = [node, before.neighbour].map(|node| self.system.order.caller(node));
                     result = Err(Error::invalid(format!(

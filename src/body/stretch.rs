@@ -19,13 +19,13 @@ const LANES: usize = 16;
 
 /// A spring that is not to become too long, in the body's own numbers, the lower first.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Watched {
+pub(super) struct WatchedSpring {
     pub nodes: [u32; 2],
     /// Of the longest that it may be, m².
     pub longest_squared: f32,
 }
 
-saved!(Watched { nodes, longest_squared });
+saved! { WatchedSpring { nodes, longest_squared } }
 
 /// What is known of some springs.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,11 +35,11 @@ struct Chunk {
     is_any_too_long: bool,
 }
 
-saved!(Chunk { slack, is_any_too_long });
+saved! { Chunk { slack, is_any_too_long } }
 
 /// What is known of the lengths of springs.
 #[derive(Debug)]
-pub(super) struct Stretch {
+pub(super) struct StretchBound {
     chunks: Vec<Chunk>,
     /// Where nodes were when springs were last measured.
     measured: Vectors,
@@ -51,15 +51,9 @@ pub(super) struct Stretch {
     drifts: Vec<Bounds>,
 }
 
-saved!(Stretch {
-    chunks,
-    measured,
-    is_measured,
-    looked,
-    drifts
-});
+saved! { StretchBound { chunks, measured, is_measured, looked, drifts } }
 
-impl Stretch {
+impl StretchBound {
     /// Of so many nodes, with room for more up to so many in all.
     pub fn new(node_count: usize, room: usize) -> Result<Self> {
         let mut measured = Vectors::zeros(node_count)?;
@@ -94,7 +88,7 @@ impl Stretch {
 
     /// Looks for springs that are too long, for all of which there is room. Those of which nodes have not gone far enough since they were
     /// measured are not looked at.
-    pub fn look(&mut self, springs: &[Watched], positions: &Vectors, (kernel, team): (ChosenKernel, &Team)) {
+    pub fn look(&mut self, springs: &[WatchedSpring], positions: &Vectors, (kernel, team): (ChosenKernel, &Team)) {
         let axes = positions.axes();
         let count = springs.len().div_ceil(CHUNK);
         self.chunks.resize(count, Chunk::default());
@@ -111,7 +105,7 @@ impl Stretch {
         team.pass(nodes.div_ceil(NODES), Items::new(&mut self.drifts), |part, drift| {
             let some = part * NODES..nodes.min((part + 1) * NODES);
             let [now, before] = [positions, before].map(|places| places.slices(some.clone()));
-            *drift = kernel.run(Drift { now, before });
+            *drift = kernel.run(Travel { now, before });
         });
         let drift = self.drifts.iter().fold(Bounds::EMPTY, |all, drift| all.and(drift));
         let furthest = drift.magnitudes().max_element();
@@ -126,7 +120,7 @@ impl Stretch {
     }
 
     /// The springs among which [`Self::look`] has found some that are too long, with their places.
-    pub fn found<'a>(&'a self, springs: &'a [Watched]) -> impl Iterator<Item = (usize, &'a Watched)> {
+    pub fn found<'a>(&'a self, springs: &'a [WatchedSpring]) -> impl Iterator<Item = (usize, &'a WatchedSpring)> {
         let chunks = self
             .chunks
             .iter()
@@ -136,12 +130,12 @@ impl Stretch {
     }
 }
 
-fn of_chunk(springs: &[Watched], chunk: usize) -> &[Watched] {
+fn of_chunk(springs: &[WatchedSpring], chunk: usize) -> &[WatchedSpring] {
     &springs[chunk * CHUNK..springs.len().min((chunk + 1) * CHUNK)]
 }
 
 /// What is to be known of some springs.
-fn measured(springs: &[Watched], [x, y, z]: [&[f32]; 3]) -> Chunk {
+fn measured(springs: &[WatchedSpring], [x, y, z]: [&[f32]; 3]) -> Chunk {
     let (y, z) = (&y[..x.len()], &z[..x.len()]);
     let mut chunk = Chunk {
         slack: f32::INFINITY,
@@ -159,12 +153,12 @@ fn measured(springs: &[Watched], [x, y, z]: [&[f32]; 3]) -> Chunk {
 }
 
 /// How far nodes have gone.
-struct Drift<'a> {
+struct Travel<'a> {
     now: [&'a [f32]; 3],
     before: [&'a [f32]; 3],
 }
 
-impl Loops for Drift<'_> {
+impl Loops for Travel<'_> {
     type Output = Bounds;
 
     #[inline(always)]

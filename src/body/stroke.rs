@@ -23,7 +23,7 @@ pub(crate) struct Stroke {
     pub of_solid: SolidStroke,
 }
 
-saved!(Stroke { edge, ends, of_solid });
+saved! { Stroke { edge, ends, of_solid } }
 
 impl Default for Stroke {
     fn default() -> Self {

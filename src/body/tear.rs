@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::cuttable::Cuttable;
 use super::{Body, CutReport};
 use crate::base::{Error, Result, memory};
-use crate::cutting::{CutSurface, Limits, Load};
+use crate::cutting::{CutSurface, Limits, VertexLoad};
 use crate::def::{TearReport, Values, Withheld, check_values};
 use crate::solver::System;
 use crate::springs::{Link, pull};
@@ -135,7 +135,7 @@ impl Body {
     }
 
     /// Where a spring may tear the surface, what is to be tried first before the others.
-    fn torn_apart(&self, cuttable: &Cuttable, spring: [u32; 2]) -> Result<Vec<(u32, Load)>> {
+    fn torn_apart(&self, cuttable: &Cuttable, spring: [u32; 2]) -> Result<Vec<(u32, VertexLoad)>> {
         let Some(surface) = cuttable.material.surface() else {
             return Ok(Vec::new());
         };
@@ -175,7 +175,7 @@ impl Body {
         &mut self,
         cuttable: &mut Cuttable,
         vertex: u32,
-        load: &Load,
+        load: &VertexLoad,
         skin: Option<&mut Skin>,
     ) -> Result<Torn> {
         let Some(surface) = cuttable.material.surface() else {

@@ -4,7 +4,7 @@ use super::cuttable::Cuttable;
 use super::tear::Torn;
 use super::{Body, CutReport};
 use crate::base::{Result, memory};
-use crate::cutting::{CutMaterial, Divided, Limits, Load};
+use crate::cutting::{CutMaterial, Divided, Limits, VertexLoad};
 use crate::def::Withheld;
 use crate::tissue::Skin;
 
@@ -28,7 +28,7 @@ impl Body {
     }
 
     /// The nodes at which a spring may tear its solid, in the order in which they are to be tried.
-    fn stretched_at(&self, cuttable: &Cuttable, spring: [u32; 2]) -> Result<Vec<(u32, Load)>> {
+    fn stretched_at(&self, cuttable: &Cuttable, spring: [u32; 2]) -> Result<Vec<(u32, VertexLoad)>> {
         let Some(solid) = cuttable.material.solid() else {
             return Ok(Vec::new());
         };
@@ -41,7 +41,8 @@ impl Body {
             let load = is_free.then(|| solid.load_at(node, self.positions())).flatten()?;
             Some((node, load))
         };
-        let more = |a: &(u32, Load), b: &(u32, Load)| b.1.tension.total_cmp(&a.1.tension).then(a.0.cmp(&b.0));
+        let more =
+            |a: &(u32, VertexLoad), b: &(u32, VertexLoad)| b.1.tension.total_cmp(&a.1.tension).then(a.0.cmp(&b.0));
         found.extend(callers.iter().filter_map(load_at));
         found.sort_unstable_by(more);
         let ends = found.len();
@@ -50,7 +51,13 @@ impl Body {
         Ok(found)
     }
 
-    fn tear_node(&mut self, cuttable: &mut Cuttable, node: u32, load: &Load, skin: Option<&mut Skin>) -> Result<Torn> {
+    fn tear_node(
+        &mut self,
+        cuttable: &mut Cuttable,
+        node: u32,
+        load: &VertexLoad,
+        skin: Option<&mut Skin>,
+    ) -> Result<Torn> {
         let limits = Limits {
             nodes: self.system.node_room as u32,
             ..Limits::NONE

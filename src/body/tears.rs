@@ -1,14 +1,14 @@
 //! Which springs tear after a step, the most loaded first.
 
 use super::bearing::{Bearing, sorted};
-use super::stretch::Stretch;
+use super::stretch::StretchBound;
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::cutting::Changes;
 use crate::def::{BodyDefinition, Spring, TearReport, Tearing, Withheld};
 use crate::simd::ChosenKernel;
 use crate::soa::{NodeOrder, Vectors};
-use crate::springs::{Change, Link, Rewiring};
+use crate::springs::{Link, Rewiring, SpringChange};
 use crate::threads::Team;
 
 /// A spring beyond its limits.
@@ -20,14 +20,14 @@ struct Beyond {
     nodes: [u32; 2],
 }
 
-saved!(Beyond { load, callers, nodes });
+saved! { Beyond { load, callers, nodes } }
 
 /// The springs of a body that tears, and those beyond their limits after the last step.
 #[derive(Debug)]
 pub(crate) struct Tears {
     asked: Tearing,
     pub(super) bearing: Bearing,
-    stretch: Stretch,
+    stretch: StretchBound,
     /// The most loaded first.
     beyond: Vec<Beyond>,
     /// How many of them have had their turn.
@@ -39,16 +39,7 @@ pub(crate) struct Tears {
     pub(super) report: TearReport,
 }
 
-saved!(Tears {
-    asked,
-    bearing,
-    stretch,
-    beyond,
-    seen,
-    tried,
-    torn,
-    report
-});
+saved! { Tears { asked, bearing, stretch, beyond, seen, tried, torn, report } }
 
 impl Tears {
     /// With springs in the body's own numbers; `None`: the body is not to tear. Of tetrahedra that are elements edges without a spring tear too.
@@ -72,7 +63,7 @@ impl Tears {
         let mut tears = Self {
             asked,
             bearing: Bearing::new(springs, [asked.strain, asked.force], node_count, room)?,
-            stretch: Stretch::new(node_count, room)?,
+            stretch: StretchBound::new(node_count, room)?,
             beyond: Vec::new(),
             seen: 0,
             tried: 0,
@@ -118,7 +109,7 @@ impl Tears {
     }
 
     /// Springs have other stiffnesses or rest lengths; limits stay.
-    pub fn change(&mut self, changes: &[Change]) {
+    pub fn change(&mut self, changes: &[SpringChange]) {
         self.bearing.change(changes);
         self.stretch.forget();
     }

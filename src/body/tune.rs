@@ -4,7 +4,7 @@ use super::Body;
 use crate::base::{Error, Result, memory};
 use crate::def::{Values, check_values};
 use crate::solver::{Changed, make_up_for};
-use crate::springs::{Change, Link, not_joined, pull};
+use crate::springs::{Link, SpringChange, not_joined, pull};
 
 /// A spring as it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +60,7 @@ impl Body {
                 rest_length: rest_lengths.map_or(before.rest_length, |values| values.get(index)),
                 ..before
             };
-            changes.push((index, Change { node, before, after }));
+            changes.push((index, SpringChange { node, before, after }));
         }
         // The last of each pair first.
         changes.sort_unstable_by_key(|(index, change)| {
@@ -74,9 +74,9 @@ impl Body {
     }
 
     /// Changes springs, each once. Changes nothing where it fails.
-    pub(super) fn change_springs(&mut self, changes: &[Change]) -> Result<()> {
+    pub(super) fn change_springs(&mut self, changes: &[SpringChange]) -> Result<()> {
         let mut nodes = memory::reserved(2 * changes.len())?;
-        nodes.extend(changes.iter().flat_map(Change::ends).map(|(node, _)| node));
+        nodes.extend(changes.iter().flat_map(SpringChange::ends).map(|(node, _)| node));
         nodes.sort_unstable();
         nodes.dedup();
         if let Some(scaling) = &mut self.system.scaling {
@@ -103,12 +103,12 @@ impl Body {
     }
 
     /// Keeps the velocities at the time of the positions as they are.
-    fn make_up_for_changes(&mut self, changes: &[Change]) {
+    fn make_up_for_changes(&mut self, changes: &[SpringChange]) {
         if self.system.carry.closing.is_none() {
             return;
         }
         self.forget_velocities();
-        for &Change { node, before, after } in changes {
+        for &SpringChange { node, before, after } in changes {
             let [here, there] = [node, after.neighbour].map(|node| self.system.state.positions().get(node as usize));
             let [before, after_it] = [before, after].map(|link| pull(node as usize, &link, there - here, None));
             make_up_for(&mut self.system, node, before - after_it);

@@ -2,15 +2,16 @@
 
 use super::body::sinew_body_id;
 use super::guard::{sinew_world, with_world, with_world_mut};
+use super::id::converts;
 use super::memory;
 use super::status::sinew_status;
 use super::tool::{sinew_tool_id, write_wrench};
-use crate::base::{AttachmentId, Result, SlotId};
+use crate::base::{AttachmentId, Result};
 use crate::def::{Anchor, SurfacePoint};
 
 /// Id of an attachment or a suture; all zero means none.
 #[repr(C)]
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct sinew_attachment_id {
     /// Slot of the attachment, counted from 1.
     pub index1: u32,
@@ -18,28 +19,9 @@ pub struct sinew_attachment_id {
     pub generation: u32,
 }
 
-impl sinew_attachment_id {
-    pub(super) fn id(self) -> AttachmentId {
-        AttachmentId(SlotId {
-            index1: self.index1,
-            generation: self.generation,
-        })
-    }
-}
-
-impl From<AttachmentId> for sinew_attachment_id {
-    fn from(AttachmentId(id): AttachmentId) -> Self {
-        Self {
-            index1: id.index1,
-            generation: id.generation,
-        }
-    }
-}
+converts!(sinew_attachment_id, AttachmentId);
 
 /// Attaches one node of a body to a tool, like sinew_body_attach_nodes.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_attach_node(
     world: *mut sinew_world,
@@ -67,9 +49,6 @@ pub unsafe extern "C" fn sinew_body_attach_node(
 /// nothing is attached.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node is pinned, massless or held by another tool.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_attach_nodes(
     world: *mut sinew_world,
@@ -98,9 +77,6 @@ pub unsafe extern "C" fn sinew_body_attach_nodes(
 /// shared by points split their force by weight. Otherwise like sinew_body_attach_nodes.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a corner is pinned, massless or held by another tool.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_attach_points(
     world: *mut sinew_world,
@@ -133,9 +109,6 @@ pub unsafe extern "C" fn sinew_body_attach_points(
 /// nothing is attached.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if both nodes of a pair are the same.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_attach_nodes_to_nodes(
     world: *mut sinew_world,
@@ -164,9 +137,6 @@ pub unsafe extern "C" fn sinew_body_attach_nodes_to_nodes(
 ///
 /// `other_triangles` and `other_weights` are as in sinew_body_attach_points, but the surface may rotate about each
 /// point. Otherwise like sinew_body_attach_nodes_to_nodes.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_attach_nodes_to_points(
     world: *mut sinew_world,
@@ -198,9 +168,6 @@ pub unsafe extern "C" fn sinew_body_attach_nodes_to_points(
 /// Attaches surface points of a body to surface points of another or the same body, pair by pair.
 ///
 /// Points are as in sinew_body_attach_nodes_to_points, the rest as in sinew_body_attach_nodes_to_nodes.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_attach_points_to_points(
     world: *mut sinew_world,
@@ -283,9 +250,6 @@ fn write(out: &mut [sinew_attachment_id], ids: Vec<AttachmentId>) {
 /// Releases an attachment or cuts a suture; its nodes keep their velocities.
 ///
 /// Errors: SINEW_STATUS_STALE_ID also if it broke, or if a body or the tool was destroyed.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_release(
     world: *mut sinew_world,
@@ -299,9 +263,6 @@ pub unsafe extern "C" fn sinew_attachment_release(
 ///
 /// `force` [N] receives 3 floats in world axes, 0 before the first step. After sinew_body_rest_state it is the
 /// force of the tool in equilibrium.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `force` is NULL or writable for 3 floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_get_force(
     world: *const sinew_world,
@@ -312,8 +273,7 @@ pub unsafe extern "C" fn sinew_attachment_get_force(
     unsafe {
         with_world(world, |world| {
             let held = world.attachment_force(attachment.id())?;
-            *memory::output("force", force.cast::<[f32; 3]>())? = held.to_array();
-            Ok(())
+            memory::write("force", force.cast::<[f32; 3]>(), held.to_array())
         })
     }
 }
@@ -322,9 +282,6 @@ pub unsafe extern "C" fn sinew_attachment_get_force(
 ///
 /// `out` receives at most `capacity` ids, `count` the number that broke. The ids are stale: compare them with those
 /// you stored.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or as long as stated; `count` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_slipped(
     world: *const sinew_world,
@@ -351,10 +308,6 @@ pub unsafe extern "C" fn sinew_world_get_slipped(
 ///
 /// `tools` holds `count` different ids. `point` [m] is 3 floats. `force` [N] and `torque` [N m], about `point`,
 /// receive 3 floats each; both are nullable.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `tools` is NULL or as long as stated, `point` NULL or 3 floats; `force` and
-/// `torque` are NULL or writable for 3 floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tools_get_wrench(
     world: *const sinew_world,
@@ -371,8 +324,7 @@ pub unsafe extern "C" fn sinew_tools_get_wrench(
             let point = memory::vector("point", point)?;
             let mut tools = crate::base::memory::reserved(count)?;
             tools.extend(given.iter().map(|tool| tool.id()));
-            let (of_force, of_torque) = world.wrench_about(&tools, point)?;
-            write_wrench([force, torque], [of_force, of_torque])
+            write_wrench(world.wrench_about(&tools, point)?, force, torque)
         })
     }
 }

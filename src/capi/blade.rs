@@ -3,22 +3,25 @@
 use glam::{Quat, Vec3};
 
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
+use super::id::converts;
 use super::memory::{self, Versioned};
 use super::status::{SINEW_STATUS_OK, sinew_status, status_of};
-use crate::base::{BladeId, SlotId};
+use crate::base::BladeId;
 use crate::contact::Pose;
 use crate::def::CollisionFilter;
 use crate::world::BladeDefinition;
 
 /// Id of a blade; all zero means none.
 #[repr(C)]
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct sinew_blade_id {
     /// Slot of the blade, counted from 1.
     pub index1: u32,
     /// Number of the use of that slot.
     pub generation: u32,
 }
+
+converts!(sinew_blade_id, BladeId);
 
 /// Edge and settings of a blade.
 ///
@@ -73,25 +76,10 @@ pub struct sinew_blade_report {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_blade_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_blade_def";
-}
+unsafe impl Versioned for sinew_blade_def {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_blade_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_blade_report";
-}
-
-impl sinew_blade_id {
-    pub(super) fn id(self) -> BladeId {
-        BladeId(SlotId {
-            index1: self.index1,
-            generation: self.generation,
-        })
-    }
-}
+unsafe impl Versioned for sinew_blade_report {}
 
 impl sinew_blade_def {
     fn defaults() -> Self {
@@ -125,9 +113,6 @@ impl sinew_blade_def {
 }
 
 /// Fills a blade definition with its defaults; `struct_size` is sizeof(sinew_blade_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_def_init(def: *mut sinew_blade_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -140,9 +125,6 @@ pub unsafe extern "C" fn sinew_blade_def_init(def: *mut sinew_blade_def, struct_
 /// reported in sinew_blade_report and leaves the step successful. Tissue that moves onto the edge is cut too.
 /// Moving along the edge or back through the cut meets no resistance. A triangle needs about 10 spare_nodes. A step
 /// that cuts may allocate.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_create(
     world: *mut sinew_world,
@@ -154,20 +136,13 @@ pub unsafe extern "C" fn sinew_blade_create(
         with_world_mut(world, |world| {
             let out = memory::output("out", out)?;
             let def = memory::definition("def", def, sinew_blade_def::defaults())?;
-            let BladeId(id) = world.create_blade(&def.definition())?;
-            *out = sinew_blade_id {
-                index1: id.index1,
-                generation: id.generation,
-            };
+            *out = world.create_blade(&def.definition())?.into();
             Ok(())
         })
     }
 }
 
 /// Destroys a blade; its cuts remain.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_destroy(world: *mut sinew_world, blade: sinew_blade_id) -> sinew_status {
     // SAFETY: the same contract.
@@ -178,9 +153,6 @@ pub unsafe extern "C" fn sinew_blade_destroy(world: *mut sinew_world, blade: sin
 ///
 /// The blade moves along a straight line at constant speed. `position` [m] is 3 floats, each within 1e9;
 /// `orientation` is x y z w, not zero, nullable: unchanged.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_set_pose(
     world: *mut sinew_world,
@@ -201,9 +173,6 @@ pub unsafe extern "C" fn sinew_blade_set_pose(
 /// Sets the collision category and mask of a blade, from the next step on.
 ///
 /// A body that it no longer meets lets go of the blade.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_set_collision(
     world: *mut sinew_world,
@@ -217,9 +186,6 @@ pub unsafe extern "C" fn sinew_blade_set_collision(
 }
 
 /// Writes the cuts of a blade and the load on it in the last step.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_get_report(
     world: *const sinew_world,

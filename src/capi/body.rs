@@ -4,9 +4,10 @@ use glam::Vec3;
 
 use super::definition::sinew_body_def;
 use super::guard::{sinew_world, with_world, with_world_mut};
+use super::id::converts;
 use super::memory;
 use super::status::sinew_status;
-use crate::base::{BodyId, Error, Result, SlotId};
+use crate::base::{BodyId, Error, Result};
 use crate::body::Body;
 use crate::def::CollisionFilter;
 
@@ -19,13 +20,15 @@ pub const SINEW_AXIS_Z: u32 = 4;
 
 /// Id of a body; all zero means none.
 #[repr(C)]
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct sinew_body_id {
     /// Slot of the body, counted from 1.
     pub index1: u32,
     /// Number of the use of that slot.
     pub generation: u32,
 }
+
+converts!(sinew_body_id, BodyId);
 
 /// Borrowed array of vectors of 3 floats; vector i starts at (const char *)data + i * stride.
 ///
@@ -39,24 +42,6 @@ pub struct sinew_vec3_view {
     pub count: usize,
     /// [bytes] Distance from one vector to the next.
     pub stride: usize,
-}
-
-impl sinew_body_id {
-    pub(super) fn id(self) -> BodyId {
-        BodyId(SlotId {
-            index1: self.index1,
-            generation: self.generation,
-        })
-    }
-}
-
-impl From<BodyId> for sinew_body_id {
-    fn from(BodyId(id): BodyId) -> Self {
-        Self {
-            index1: id.index1,
-            generation: id.generation,
-        }
-    }
 }
 
 impl sinew_vec3_view {
@@ -98,10 +83,6 @@ pub(super) unsafe fn with_body_mut(
 /// Creates a body in a world, and copies everything that `def` points to.
 ///
 /// Errors: SINEW_STATUS_CAPACITY if a node has more than springs_per_node springs (FAST_LINK).
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
-/// the lengths that it states; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_create(
     world: *mut sinew_world,
@@ -122,9 +103,6 @@ pub unsafe extern "C" fn sinew_body_create(
 }
 
 /// Destroys a body and ends the views of it.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_destroy(world: *mut sinew_world, body: sinew_body_id) -> sinew_status {
     // SAFETY: the same contract.
@@ -135,9 +113,6 @@ pub unsafe extern "C" fn sinew_body_destroy(world: *mut sinew_world, body: sinew
 ///
 /// `force` [N] points to 3 floats. Forces are constant during the step and cleared when it succeeds. They have no
 /// effect on a pinned or attached node, nor along a pinned axis.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `force` is NULL or 3 floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_apply_force(
     world: *mut sinew_world,
@@ -157,9 +132,6 @@ pub unsafe extern "C" fn sinew_body_apply_force(
 ///
 /// `nodes` holds `count` indices, which may repeat; `forces` [N] holds 3 * count floats. See
 /// sinew_body_apply_force. On failure no force is added.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_apply_forces(
     world: *mut sinew_world,
@@ -181,9 +153,6 @@ pub unsafe extern "C" fn sinew_body_apply_forces(
 ///
 /// Lifetime: until the next step, sinew_body_set_positions, sinew_body_set_velocities, sinew_body_rest_state or
 /// topology change of the body, or its destruction.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_positions(
     world: *const sinew_world,
@@ -193,8 +162,7 @@ pub unsafe extern "C" fn sinew_body_get_positions(
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            *memory::output("out", out)? = sinew_vec3_view::of(body.positions());
-            Ok(())
+            memory::write("out", out, sinew_vec3_view::of(body.positions()))
         })
     }
 }
@@ -203,9 +171,6 @@ pub unsafe extern "C" fn sinew_body_get_positions(
 ///
 /// A pinned node has the velocity of its pin in the last step. The first call after a step computes the velocities,
 /// at the cost of about one substep. Lifetime: as for sinew_body_get_positions.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_velocities(
     world: *const sinew_world,
@@ -215,8 +180,7 @@ pub unsafe extern "C" fn sinew_body_get_velocities(
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            *memory::output("out", out)? = sinew_vec3_view::of(body.velocities());
-            Ok(())
+            memory::write("out", out, sinew_vec3_view::of(body.velocities()))
         })
     }
 }
@@ -224,9 +188,6 @@ pub unsafe extern "C" fn sinew_body_get_velocities(
 /// Writes 1 if the surface of a body is closed, else 0.
 ///
 /// Only a closed body pushes out what is inside it. Removing a spring on its surface opens it.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_is_closed(
     world: *const sinew_world,
@@ -236,8 +197,7 @@ pub unsafe extern "C" fn sinew_body_is_closed(
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            *memory::output("out", out)? = u32::from(body.is_closed());
-            Ok(())
+            memory::write("out", out, u32::from(body.is_closed()))
         })
     }
 }
@@ -245,9 +205,6 @@ pub unsafe extern "C" fn sinew_body_is_closed(
 /// Sets the collision category and mask of a body from the next step on.
 ///
 /// See sinew_body_def. Tools and bodies inside it are pushed out once they collide with it.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_collision(
     world: *mut sinew_world,
@@ -268,9 +225,6 @@ pub unsafe extern "C" fn sinew_body_set_collision(
 ///
 /// `positions` [m] holds 3 * node_count floats. Velocities stay. Pinned nodes move too, and attached nodes stay
 /// attached at their new positions. `node_count` must be the body's.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `positions` is NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_positions(
     world: *mut sinew_world,
@@ -292,9 +246,6 @@ pub unsafe extern "C" fn sinew_body_set_positions(
 ///
 /// `velocities` [m/s] holds 3 * node_count floats. Pinned nodes and pinned axes keep theirs. `node_count` must be
 /// the body's number of nodes.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `velocities` is NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_velocities(
     world: *mut sinew_world,
@@ -315,9 +266,6 @@ pub unsafe extern "C" fn sinew_body_set_velocities(
 /// Pins a node at its current position; no effect on a pinned node.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_pin(world: *mut sinew_world, body: sinew_body_id, node: u32) -> sinew_status {
     // SAFETY: the same contract.
@@ -330,9 +278,6 @@ pub unsafe extern "C" fn sinew_body_pin(world: *mut sinew_world, body: sinew_bod
 /// velocity of its pin. Changing the axes cancels a pending sinew_body_move_pin.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds it, or a node of mass 0 would be free.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_pin_axes(
     world: *mut sinew_world,
@@ -359,9 +304,6 @@ pub unsafe extern "C" fn sinew_body_pin_axes(
 /// The node keeps the velocity of its pin in the last step.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or its mass is 0.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_unpin(world: *mut sinew_world, body: sinew_body_id, node: u32) -> sinew_status {
     // SAFETY: the same contract.
@@ -373,9 +315,6 @@ pub unsafe extern "C" fn sinew_body_unpin(world: *mut sinew_world, body: sinew_b
 /// The node moves along a straight line, and only along its pinned axes. `position` [m] is 3 floats.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_move_pin(
     world: *mut sinew_world,
@@ -396,9 +335,6 @@ pub unsafe extern "C" fn sinew_body_move_pin(
 /// `force` [N] receives 3 floats, 0 along free axes.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `force` is NULL or writable for 3 floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_pin_force(
     world: *const sinew_world,
@@ -409,8 +345,7 @@ pub unsafe extern "C" fn sinew_body_get_pin_force(
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            *memory::output("force", force.cast::<[f32; 3]>())? = body.pin_force(node)?.to_array();
-            Ok(())
+            memory::write("force", force.cast::<[f32; 3]>(), body.pin_force(node)?.to_array())
         })
     }
 }
@@ -421,9 +356,6 @@ pub unsafe extern "C" fn sinew_body_get_pin_force(
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the pair has a spring; SINEW_STATUS_CAPACITY if a node has no free slot
 /// (FAST_LINK).
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_add_spring(
     world: *mut sinew_world,
@@ -445,9 +377,6 @@ pub unsafe extern "C" fn sinew_body_add_spring(
 /// `pressure` is in [Pa]; see sinew_body_def. Open cavities stay without pressure.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body was created with neither pressure nor enclosed_stiffness.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_pressure(
     world: *mut sinew_world,
@@ -463,9 +392,6 @@ pub unsafe extern "C" fn sinew_body_set_pressure(
 /// Elements are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the edge.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if there is nothing between the nodes.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_remove_spring(
     world: *mut sinew_world,

@@ -24,9 +24,6 @@ impl From<BudgetReport> for sinew_step_report {
 /// Tools, pins and blades complete their motion. `report` is nullable.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED with fixed substeps or a tolerance.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `report` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_step_with_budget(
     world: *mut sinew_world,
@@ -42,9 +39,6 @@ pub unsafe extern "C" fn sinew_world_step_with_budget(
 ///
 /// The first calls do little work and measure. A step can be late if the machine or the scene became slower. For a
 /// bitwise replay record `work` of `report`.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `report` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_step_within(
     world: *mut sinew_world,

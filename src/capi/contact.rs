@@ -66,9 +66,6 @@ impl From<ContactChange> for sinew_contact_change {
 /// Writes the contacts of a tool at the end of the last step.
 ///
 /// `contacts` receives at most `capacity` entries, `count` the number that exist.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `contacts` is NULL or writable for `capacity` of them; `count` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_contacts(
     world: *const sinew_world,
@@ -93,9 +90,6 @@ pub unsafe extern "C" fn sinew_tool_get_contacts(
 ///
 /// `changes` receives at most `capacity` entries, `count` the number that exist. Destroying a tool or body does not
 /// report an end.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `changes` is NULL or writable for `capacity` of them; `count` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_contact_changes(
     world: *const sinew_world,

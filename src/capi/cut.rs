@@ -92,17 +92,20 @@ pub struct sinew_triangle_view {
     pub count: usize,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_cut_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_cut_report";
+impl sinew_triangle_view {
+    pub(super) fn of(triangles: &[[u32; 3]]) -> Self {
+        Self {
+            data: triangles.as_ptr().cast(),
+            count: triangles.len(),
+        }
+    }
 }
 
+// SAFETY: repr(C), begins with struct_size, numbers alone.
+unsafe impl Versioned for sinew_cut_report {}
+
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
-unsafe impl Versioned for sinew_topology_changes {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_topology_changes";
-}
+unsafe impl Versioned for sinew_topology_changes {}
 
 // The lists are lent as they are kept.
 const _: () = assert!(size_of::<sinew_new_node>() == size_of::<NewNodeSource>());
@@ -116,10 +119,6 @@ const _: () = assert!(size_of::<sinew_rim_edge>() == size_of::<NewRimEdge>());
 /// nothing changes.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED without spare_nodes; SINEW_STATUS_CAPACITY if too few are left.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated; `report` is NULL or writable for the size that it
-/// states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_cut(
     world: *mut sinew_world,
@@ -161,9 +160,6 @@ pub unsafe extern "C" fn sinew_body_cut(
 /// attributes of new nodes from their sources and reads the listed triangles again.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the version is in the future.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_topology_changes(
     world: *const sinew_world,
@@ -195,9 +191,6 @@ pub unsafe extern "C" fn sinew_body_get_topology_changes(
 /// Writes a view of the render and contact surface: the triangles of a body after all cuts.
 ///
 /// Lifetime: until the next topology change of the body, or its destruction.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_triangles(
     world: *const sinew_world,
@@ -207,12 +200,7 @@ pub unsafe extern "C" fn sinew_body_get_triangles(
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            let triangles = body.surface();
-            *memory::output("out", out)? = sinew_triangle_view {
-                data: triangles.as_ptr().cast(),
-                count: triangles.len(),
-            };
-            Ok(())
+            memory::write("out", out, sinew_triangle_view::of(body.surface()))
         })
     }
 }
@@ -221,9 +209,6 @@ pub unsafe extern "C" fn sinew_body_get_triangles(
 ///
 /// Nodes are connected by springs, elements and the surface. `pieces` receives `count` numbers from 0, where
 /// `count` is the number of nodes. `pieces` and `piece_count` are nullable.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `pieces` is NULL or as long as stated, `piece_count` NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_pieces(
     world: *const sinew_world,
@@ -253,9 +238,6 @@ pub unsafe extern "C" fn sinew_body_get_pieces(
 }
 
 /// Writes the mass of a node [kg]; 0 for a permanent pin or a node bound to others.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_node_mass(
     world: *const sinew_world,
@@ -264,12 +246,7 @@ pub unsafe extern "C" fn sinew_body_get_node_mass(
     out: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            *memory::output("out", out)? = body.node_mass(node)?;
-            Ok(())
-        })
-    }
+    unsafe { with_body(world, body, |body| memory::write("out", out, body.node_mass(node)?)) }
 }
 
 /// Both ends of a blade's edge.

@@ -54,10 +54,7 @@ pub struct sinew_debug_draw {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers and pointers alone; what is no function is the caller's breach.
-unsafe impl Versioned for sinew_debug_draw {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_debug_draw";
-}
+unsafe impl Versioned for sinew_debug_draw {}
 
 impl sinew_debug_draw {
     fn defaults() -> Self {
@@ -124,9 +121,6 @@ impl DebugCanvas for Callbacks {
 }
 
 /// Fills a debug drawing with its defaults; `struct_size` is sizeof(sinew_debug_draw).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_debug_draw_init(def: *mut sinew_debug_draw, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -136,10 +130,6 @@ pub unsafe extern "C" fn sinew_debug_draw_init(def: *mut sinew_debug_draw, struc
 /// Draws what `def` asks for through its callbacks, as the last step left it.
 ///
 /// It allocates nothing. The callbacks may use the world as a const sinew_world only.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `def` is NULL or of the size that it states, its callbacks NULL or functions of
-/// their types.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_debug_draw(
     world: *const sinew_world,

@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world};
 use super::memory::{self, Versioned};
+use super::overlaps::{DetectorSide, Method, Overlaps, of_body};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
 use crate::base::memory::reserved;
@@ -12,7 +13,7 @@ use crate::base::{Error, Result};
 use crate::body::Body;
 use crate::def::{Detection, finite_vector};
 use crate::detection::exact::{self, Exact};
-use crate::detection::image_space::{self, Form, ImageSpace, ImageSpaceDefinition, Placed, Surface, Views};
+use crate::detection::image_space::{Form, ImageSpace, ImageSpaceDefinition, Placed, Surface, Views};
 use crate::mesh::{self, ClosedSurface};
 use crate::world::World;
 
@@ -135,74 +136,27 @@ pub struct sinew_dvec3_view {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_detector_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_detector_def";
-}
+unsafe impl Versioned for sinew_detector_def {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_detector_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_detector_report";
-}
+unsafe impl Versioned for sinew_detector_report {}
 
 /// Detector of the overlap of two bodies; it applies no forces.
 ///
 /// The caller owns it; it may outlive its world. Any number of threads may use a `const sinew_detector *` at the
 /// same time; a `sinew_detector *` needs exclusive access.
 pub struct sinew_detector {
-    sides: [Side; 2],
+    sides: [DetectorSide; 2],
     method: Method,
     found: Overlaps,
 }
-
-/// One of the two bodies.
-struct Side {
-    body: sinew_body_id,
-    surface: Surface,
-    /// When the detector was made.
-    was_closed: bool,
-    thickness: f32,
-}
-
-enum Method {
-    ImageSpace(Box<ImageSpace>),
-    /// What each closed body encloses, and what of the other lies within it.
-    Exact([Option<Box<Exact>>; 2], [exact::Overlap; 2]),
-}
-
-/// What the last detection found; as it was where one fails.
-struct Overlaps {
-    /// Whether volumes are measured.
-    has_volume: bool,
-    report: sinew_detector_report,
-    points: [Vec<sinew_point_inside>; 2],
-    edges: [Vec<sinew_edge_inside>; 2],
-    gradients: [Vec<DVec3>; 2],
-}
-
-const NOTHING: sinew_detector_report = sinew_detector_report {
-    struct_size: size_of::<sinew_detector_report>(),
-    volume: 0.0,
-    normal: [0.0; 3],
-    depth: 0.0,
-    pixel: 0.0,
-    point_counts: [0; 2],
-    edge_counts: [0; 2],
-    unlisted: [0; 2],
-    closed: [0; 2],
-    reserved: 0,
-};
 
 impl sinew_detector_def {
     fn defaults() -> Self {
         let image = ImageSpaceDefinition::new(0.0);
         Self {
             struct_size: size_of::<Self>(),
-            bodies: [sinew_body_id {
-                index1: 0,
-                generation: 0,
-            }; 2],
+            bodies: [sinew_body_id::default(); 2],
             detection: SINEW_DETECTION_EXACT,
             form: SINEW_IMAGE_FORM_INTERVALS,
             pixel: image.pixel,
@@ -276,7 +230,7 @@ impl sinew_detector_def {
         Ok(sinew_detector { sides, method, found })
     }
 
-    fn side(&self, side: usize, body: &Body) -> Result<Side> {
+    fn side(&self, side: usize, body: &Body) -> Result<DetectorSide> {
         let thickness = self.thickness[side];
         if !(thickness >= 0.0 && thickness.is_finite()) {
             return Err(Error::invalid(format!(
@@ -295,7 +249,7 @@ impl sinew_detector_def {
         } else {
             Surface::open(node_count, triangles)
         };
-        Ok(Side {
+        Ok(DetectorSide {
             body: self.bodies[side],
             surface: surface.map_err(|error| of_body(side, error))?,
             was_closed,
@@ -304,7 +258,7 @@ impl sinew_detector_def {
     }
 
     /// What a closed body encloses.
-    fn solid(number: usize, side: &Side, body: &Body) -> Result<Option<Box<Exact>>> {
+    fn solid(number: usize, side: &DetectorSide, body: &Body) -> Result<Option<Box<Exact>>> {
         if !side.was_closed {
             return Ok(None);
         }
@@ -316,39 +270,6 @@ impl sinew_detector_def {
             )));
         }
         Ok(Some(crate::base::memory::boxed(Exact::changing(&surface)?)?))
-    }
-}
-
-/// Says which of the two bodies is meant.
-fn of_body(side: usize, error: Error) -> Error {
-    match error {
-        Error::InvalidArgument(why) => Error::InvalidArgument(format!("bodies: body {side}: {why}")),
-        Error::Unsupported(why) => Error::Unsupported(format!("bodies: body {side}: {why}")),
-        error => error,
-    }
-}
-
-impl Side {
-    /// The body, where it is still what the detector was made for.
-    fn body<'a>(&self, number: usize, world: &'a World) -> Result<&'a Body> {
-        let sinew_body_id { index1, generation } = self.body;
-        let Ok(body) = world.body(self.body.id()) else {
-            return Err(Error::invalid(format!(
-                "world: body {number} of the detector, of index1 {index1} and generation {generation}, is not there: it was destroyed, or \
-                 this is another world"
-            )));
-        };
-        if body.node_count() != self.surface.node_count() || body.surface() != self.surface.triangles() {
-            return Err(Error::invalid(format!(
-                "world: body {number} of the detector, of index1 {index1} and generation {generation}, has another surface in this world, of \
-                 {} nodes and {} triangles: the detector was made with another world, for {} and {}",
-                body.node_count(),
-                body.surface().len(),
-                self.surface.node_count(),
-                self.surface.triangles().len()
-            )));
-        }
-        Ok(body)
     }
 }
 
@@ -389,105 +310,7 @@ impl sinew_detector {
     }
 }
 
-impl Overlaps {
-    fn reserved(sides: &[Side; 2], method: &Method, has_volume: bool) -> Result<Self> {
-        let node_counts = [0, 1].map(|side| sides[side].surface.node_count());
-        let edges = sides.iter().map(|side| side.surface.edges().len()).max().unwrap_or(0);
-        // As many as an image-space detection lists.
-        let edges = match method {
-            Method::ImageSpace(_) => 4 * edges,
-            Method::Exact(..) => edges,
-        };
-        let gradients = node_counts.map(|count| if has_volume { count } else { 0 });
-        Ok(Self {
-            has_volume,
-            report: NOTHING,
-            points: [reserved(node_counts[0])?, reserved(node_counts[1])?],
-            edges: [reserved(edges)?, reserved(edges)?],
-            gradients: [reserved(gradients[0])?, reserved(gradients[1])?],
-        })
-    }
-
-    fn clear(&mut self) {
-        self.report = NOTHING;
-        self.points.iter_mut().for_each(Vec::clear);
-        self.edges.iter_mut().for_each(Vec::clear);
-        self.gradients.iter_mut().for_each(Vec::clear);
-    }
-
-    /// Makes room before anything is lost of what was found before.
-    fn begin(&mut self, point_counts: [usize; 2], edge_counts: [usize; 2]) -> Result<()> {
-        for side in 0..2 {
-            let (points, edges) = (&mut self.points[side], &mut self.edges[side]);
-            points.try_reserve(point_counts[side].saturating_sub(points.len()))?;
-            edges.try_reserve(edge_counts[side].saturating_sub(edges.len()))?;
-        }
-        self.clear();
-        self.report.point_counts = point_counts.map(|count| count as u32);
-        self.report.edge_counts = edge_counts.map(|count| count as u32);
-        Ok(())
-    }
-
-    fn take_image(&mut self, overlap: &image_space::Overlap, surfaces: [&Surface; 2]) -> Result<()> {
-        let inside = &overlap.inside;
-        self.begin(
-            [inside[0].points.len(), inside[1].points.len()],
-            [inside[0].edges.len(), inside[1].edges.len()],
-        )?;
-        for (side, inside) in inside.iter().enumerate() {
-            self.points[side].extend(inside.points.iter().map(|point| sinew_point_inside {
-                node: point.node,
-                triangle: point.triangle,
-                depth: point.depth,
-                normal: [0.0; 3],
-            }));
-            self.edges[side].extend(inside.edges.iter().map(|part| sinew_edge_inside {
-                nodes: surfaces[side].edges()[part.edge as usize],
-                entry: part.entry,
-                exit: part.exit,
-                depth: part.depth,
-            }));
-            self.report.unlisted[side] = inside.unlisted;
-        }
-        self.report.volume = overlap.volume;
-        self.report.normal = overlap.normal.to_array();
-        self.report.depth = overlap.depth;
-        self.report.pixel = overlap.pixel;
-        if self.has_volume && surfaces.iter().all(|surface| surface.is_closed()) {
-            for (kept, gradient) in self.gradients.iter_mut().zip(&overlap.gradients) {
-                kept.extend_from_slice(gradient);
-            }
-        }
-        Ok(())
-    }
-
-    fn take_exact(&mut self, overlaps: &[exact::Overlap; 2], surfaces: [&Surface; 2]) -> Result<()> {
-        self.begin(
-            [overlaps[0].points.len(), overlaps[1].points.len()],
-            [overlaps[0].edges.len(), overlaps[1].edges.len()],
-        )?;
-        for (side, overlap) in overlaps.iter().enumerate() {
-            self.points[side].extend(overlap.points.iter().map(|point| sinew_point_inside {
-                node: point.point,
-                triangle: SINEW_NO_TRIANGLE,
-                depth: point.depth,
-                normal: point.normal.to_array(),
-            }));
-            self.edges[side].extend(overlap.edges.iter().map(|part| sinew_edge_inside {
-                nodes: surfaces[side].edges()[part.edge as usize],
-                entry: part.enters,
-                exit: part.leaves,
-                depth: 0.0,
-            }));
-        }
-        Ok(())
-    }
-}
-
 /// Fills a detector definition with its defaults; `struct_size` is sizeof(sinew_detector_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_def_init(def: *mut sinew_detector_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -501,9 +324,6 @@ pub unsafe extern "C" fn sinew_detector_def_init(def: *mut sinew_detector_def, s
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bodies are the same, one has no surface, or both are open; with
 /// EXACT also if a closed surface is inverted, self-intersecting or degenerate. SINEW_STATUS_UNSUPPORTED for
 /// SINEW_DETECTION_DISTANCE_FIELD.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_create(
     world: *const sinew_world,
@@ -529,10 +349,6 @@ pub unsafe extern "C" fn sinew_detector_create(
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface; SINEW_STATUS_CAPACITY if
 /// one ray has more than `crossings`.
-///
-/// # Safety
-/// `detector` is NULL or a detector nobody else uses; `world` is NULL or a world nobody changes; `report` is NULL or writable for the size
-/// that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_find(
     detector: *mut sinew_detector,
@@ -556,9 +372,6 @@ pub unsafe extern "C" fn sinew_detector_find(
 /// `side` 0 is the first body, 1 the second. The list is empty before the first search and with COUNTED.
 ///
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-///
-/// # Safety
-/// `detector` is NULL or a detector nobody changes; `points` and `count` are NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_get_points(
     detector: *const sinew_detector,
@@ -570,10 +383,7 @@ pub unsafe extern "C" fn sinew_detector_get_points(
     guard(|| unsafe {
         let detector = memory::reference("detector", detector)?;
         let found = &detector.found.points[index_of(side)?];
-        let points = memory::output("points", points)?;
-        *memory::output("count", count)? = found.len();
-        *points = found.as_ptr();
-        Ok(())
+        memory::write_both(("points", points, found.as_ptr()), ("count", count, found.len()))
     })
 }
 
@@ -583,9 +393,6 @@ pub unsafe extern "C" fn sinew_detector_get_points(
 /// search.
 ///
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-///
-/// # Safety
-/// `detector` is NULL or a detector nobody changes; `edges` and `count` are NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_get_edges(
     detector: *const sinew_detector,
@@ -597,10 +404,7 @@ pub unsafe extern "C" fn sinew_detector_get_edges(
     guard(|| unsafe {
         let detector = memory::reference("detector", detector)?;
         let found = &detector.found.edges[index_of(side)?];
-        let edges = memory::output("edges", edges)?;
-        *memory::output("count", count)? = found.len();
-        *edges = found.as_ptr();
-        Ok(())
+        memory::write_both(("edges", edges, found.as_ptr()), ("count", count, found.len()))
     })
 }
 
@@ -610,9 +414,6 @@ pub unsafe extern "C" fn sinew_detector_get_edges(
 /// the first search, with COUNTED or EXACT, and if a body is open.
 ///
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-///
-/// # Safety
-/// `detector` is NULL or a detector nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_get_gradient(
     detector: *const sinew_detector,
@@ -623,19 +424,19 @@ pub unsafe extern "C" fn sinew_detector_get_gradient(
     guard(|| unsafe {
         let detector = memory::reference("detector", detector)?;
         let gradient = &detector.found.gradients[index_of(side)?];
-        *memory::output("out", out)? = sinew_dvec3_view {
-            data: gradient.as_ptr().cast(),
-            count: gradient.len(),
-            stride: size_of::<DVec3>(),
-        };
-        Ok(())
+        memory::write(
+            "out",
+            out,
+            sinew_dvec3_view {
+                data: gradient.as_ptr().cast(),
+                count: gradient.len(),
+                stride: size_of::<DVec3>(),
+            },
+        )
     })
 }
 
 /// Destroys a detector and ends its lists and views; NULL has no effect.
-///
-/// # Safety
-/// `detector` is NULL or a detector that is not destroyed and that nobody uses any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_destroy(detector: *mut sinew_detector) {
     if !detector.is_null() {

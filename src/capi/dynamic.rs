@@ -25,10 +25,7 @@ pub struct sinew_mass_properties {
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers, which any bits are.
-unsafe impl Versioned for sinew_mass_properties {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_mass_properties";
-}
+unsafe impl Versioned for sinew_mass_properties {}
 
 impl sinew_mass_properties {
     const NONE: Self = Self {
@@ -55,9 +52,6 @@ impl From<MassProperties> for sinew_mass_properties {
 /// `density` [kg/m^3] is above 0. `out` sets struct_size.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_mass_of_density(
     world: *const sinew_world,
@@ -82,9 +76,6 @@ pub unsafe extern "C" fn sinew_tool_get_mass_of_density(
 /// other tools are not. Bodies near a dynamic tool do not sleep. force_limit has no effect.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if attachments or a haptic handle use the tool.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_mass(
     world: *mut sinew_world,
@@ -109,9 +100,6 @@ pub unsafe extern "C" fn sinew_tool_set_mass(
 }
 
 /// Writes the mass properties of a dynamic tool; all zero if the tool is kinematic.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_mass(
     world: *const sinew_world,
@@ -134,9 +122,6 @@ pub unsafe extern "C" fn sinew_tool_get_mass(
 /// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] are 3 floats each.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_velocity(
     world: *mut sinew_world,
@@ -159,9 +144,6 @@ pub unsafe extern "C" fn sinew_tool_set_velocity(
 /// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] receive 3 floats each; both are nullable.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_velocity(
     world: *const sinew_world,
@@ -172,15 +154,11 @@ pub unsafe extern "C" fn sinew_tool_get_velocity(
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let velocity = memory::optional_output_array("velocity", velocity, 3)?;
-            let spin = memory::optional_output_array("angular_velocity", angular_velocity, 3)?;
             let (linear, angular) = world.tool_velocity(tool.id())?;
-            for (place, vector) in [(velocity, linear), (spin, angular)] {
-                if let Some(place) = place {
-                    place.copy_from_slice(&vector.to_array());
-                }
-            }
-            Ok(())
+            memory::write_wanted(
+                ("velocity", velocity.cast(), linear.to_array()),
+                ("angular_velocity", angular_velocity.cast(), angular.to_array()),
+            )
         })
     }
 }
@@ -190,9 +168,6 @@ pub unsafe extern "C" fn sinew_tool_get_velocity(
 /// `force` [N] acts at the center of mass, `torque` [N m] about it; they are 3 floats each.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_apply_wrench(
     world: *mut sinew_world,
@@ -216,9 +191,6 @@ pub unsafe extern "C" fn sinew_tool_apply_wrench(
 /// is pushed out over the next steps. A dynamic tool keeps its velocity; a pending sinew_tool_set_pose is dropped.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if attachments or a haptic handle use the tool.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_teleport(
     world: *mut sinew_world,

@@ -43,10 +43,7 @@ pub struct sinew_embedding_def {
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
-unsafe impl Versioned for sinew_embedding_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_embedding_def";
-}
+unsafe impl Versioned for sinew_embedding_def {}
 
 impl sinew_embedding_def {
     fn defaults() -> Self {
@@ -76,9 +73,6 @@ impl sinew_embedding_def {
 }
 
 /// Fills an embedding definition with its defaults; `struct_size` is sizeof(sinew_embedding_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_def_init(def: *mut sinew_embedding_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -91,10 +85,6 @@ pub unsafe extern "C" fn sinew_embedding_def_init(def: *mut sinew_embedding_def,
 /// sinew_embedding_destroy, before or after the body and its world.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if no tetrahedron has a volume, or the body has no surface.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states, with arrays of the lengths that it states;
-/// `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_create(
     world: *const sinew_world,
@@ -115,9 +105,6 @@ pub unsafe extern "C" fn sinew_embedding_create(
 }
 
 /// Destroys an embedding and ends its views; NULL has no effect.
-///
-/// # Safety
-/// `embedding` is NULL or an embedding that is not destroyed and that nobody uses any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_destroy(embedding: *mut sinew_embedding) {
     if !embedding.is_null() {
@@ -136,9 +123,6 @@ pub unsafe extern "C" fn sinew_embedding_destroy(embedding: *mut sinew_embedding
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the nodes are not those it is bound to; SINEW_STATUS_UNSUPPORTED if the
 /// body was cut, and it is bound to triangles or to part of the tetrahedra.
-///
-/// # Safety
-/// `embedding` is NULL or an embedding nobody else uses; `world` is NULL or the body's world, which nobody changes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_update(
     embedding: *mut sinew_embedding,
@@ -159,9 +143,6 @@ pub unsafe extern "C" fn sinew_embedding_update(
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body had another number of nodes at the last
 /// sinew_embedding_update.
-///
-/// # Safety
-/// `embedding` is NULL or an embedding nobody else uses; `positions` is NULL or 3 `node_count` floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_update_from(
     embedding: *mut sinew_embedding,
@@ -181,9 +162,6 @@ pub unsafe extern "C" fn sinew_embedding_update_from(
 /// Writes a view of the vertex positions [m], in the given order.
 ///
 /// Lifetime: until the embedding is destroyed; updates change its contents.
-///
-/// # Safety
-/// `embedding` is NULL or an embedding nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_get_positions(
     embedding: *const sinew_embedding,
@@ -193,8 +171,7 @@ pub unsafe extern "C" fn sinew_embedding_get_positions(
         // SAFETY: the same contract.
         unsafe {
             let embedding = memory::reference("embedding", embedding)?;
-            *memory::output("out", out)? = sinew_vec3_view::of(embedding.embedding.positions());
-            Ok(())
+            memory::write("out", out, sinew_vec3_view::of(embedding.embedding.positions()))
         }
     })
 }
@@ -202,9 +179,6 @@ pub unsafe extern "C" fn sinew_embedding_get_positions(
 /// Writes a view of the triangles, in the given order, without those across a cut.
 ///
 /// Lifetime: until the first update after the next cut, or the embedding's destruction.
-///
-/// # Safety
-/// `embedding` is NULL or an embedding nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_get_triangles(
     embedding: *const sinew_embedding,
@@ -214,11 +188,7 @@ pub unsafe extern "C" fn sinew_embedding_get_triangles(
         // SAFETY: the same contract.
         unsafe {
             let triangles = memory::reference("embedding", embedding)?.embedding.triangles();
-            *memory::output("out", out)? = sinew_triangle_view {
-                data: triangles.as_ptr().cast(),
-                count: triangles.len(),
-            };
-            Ok(())
+            memory::write("out", out, sinew_triangle_view::of(triangles))
         }
     })
 }
@@ -227,9 +197,6 @@ pub unsafe extern "C" fn sinew_embedding_get_triangles(
 ///
 /// They are area-weighted and point outward; 0 without area. The view is empty without triangles. It needs
 /// exclusive access. Lifetime: until the embedding is destroyed; the next call after an update changes them.
-///
-/// # Safety
-/// `embedding` is NULL or an embedding nobody else uses; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_get_normals(
     embedding: *mut sinew_embedding,
@@ -254,10 +221,6 @@ pub unsafe extern "C" fn sinew_embedding_get_normals(
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` is too fine or too coarse,
 /// or elements, springs, rest positions or lists of values are given.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of the lengths that it states;
-/// `out_body` is NULL or writable, and so is `out_embedding`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_create_from_surface(
     world: *mut sinew_world,

@@ -8,7 +8,7 @@ use super::body::{sinew_body_id, with_body};
 use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
-use super::tool::{put_pose, sinew_tool_id};
+use super::tool::{sinew_tool_id, write_pose};
 use crate::world::World;
 
 /// 1 where there is a world that has something, else 0.
@@ -30,9 +30,6 @@ unsafe fn is_there(world: *const sinew_world, has: impl FnOnce(&World) -> bool) 
 /// Returns 1 if a body with this id exists in the world, else 0.
 ///
 /// It returns 0 for a NULL world and a null id.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_is_valid(world: *const sinew_world, body: sinew_body_id) -> u32 {
     // SAFETY: the same contract.
@@ -42,9 +39,6 @@ pub unsafe extern "C" fn sinew_body_is_valid(world: *const sinew_world, body: si
 /// Returns 1 if a tool with this id exists in the world, else 0.
 ///
 /// It returns 0 for a NULL world and a null id.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_is_valid(world: *const sinew_world, tool: sinew_tool_id) -> u32 {
     // SAFETY: the same contract.
@@ -54,9 +48,6 @@ pub unsafe extern "C" fn sinew_tool_is_valid(world: *const sinew_world, tool: si
 /// Returns 1 if a blade with this id exists in the world, else 0.
 ///
 /// It returns 0 for a NULL world and a null id.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_is_valid(world: *const sinew_world, blade: sinew_blade_id) -> u32 {
     // SAFETY: the same contract.
@@ -66,9 +57,6 @@ pub unsafe extern "C" fn sinew_blade_is_valid(world: *const sinew_world, blade: 
 /// Returns 1 if an attachment with this id exists in the world, else 0.
 ///
 /// It returns 0 for a NULL world and a null id.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_is_valid(world: *const sinew_world, attachment: sinew_attachment_id) -> u32 {
     // SAFETY: the same contract.
@@ -78,9 +66,6 @@ pub unsafe extern "C" fn sinew_attachment_is_valid(world: *const sinew_world, at
 /// Stores a pointer of the caller with a world; snapshots do not hold it.
 ///
 /// `user_data` is nullable.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_user_data(world: *mut sinew_world, user_data: *mut c_void) -> sinew_status {
     // SAFETY: the same contract.
@@ -93,16 +78,12 @@ pub unsafe extern "C" fn sinew_world_set_user_data(world: *mut sinew_world, user
 }
 
 /// Writes the pointer that is stored with a world; NULL by default.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_user_data(world: *const sinew_world, out: *mut *mut c_void) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            *memory::output("out", out)? = world.user_data() as *mut c_void;
-            Ok(())
+            memory::write("out", out, world.user_data() as *mut c_void)
         })
     }
 }
@@ -110,9 +91,6 @@ pub unsafe extern "C" fn sinew_world_get_user_data(world: *const sinew_world, ou
 /// Stores a pointer of the caller with a tool; snapshots do not hold it.
 ///
 /// `user_data` is nullable.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_user_data(
     world: *mut sinew_world,
@@ -124,9 +102,6 @@ pub unsafe extern "C" fn sinew_tool_set_user_data(
 }
 
 /// Writes the pointer that is stored with a tool; NULL by default.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_user_data(
     world: *const sinew_world,
@@ -136,8 +111,7 @@ pub unsafe extern "C" fn sinew_tool_get_user_data(
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            *memory::output("out", out)? = world.tool_user_data(tool.id())? as *mut c_void;
-            Ok(())
+            memory::write("out", out, world.tool_user_data(tool.id())? as *mut c_void)
         })
     }
 }
@@ -145,9 +119,6 @@ pub unsafe extern "C" fn sinew_tool_get_user_data(
 /// Writes the time [s] that a world has been stepped, and the number of steps.
 ///
 /// Both outputs are nullable.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_time(
     world: *const sinew_world,
@@ -157,38 +128,24 @@ pub unsafe extern "C" fn sinew_world_get_time(
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let time = memory::optional_output_array("out_time", out_time, 1)?;
-            let steps = memory::optional_output_array("out_steps", out_steps, 1)?;
-            if let Some(time) = time {
-                time[0] = world.time();
-            }
-            if let Some(steps) = steps {
-                steps[0] = world.step_count();
-            }
-            Ok(())
+            let time = ("out_time", out_time, world.time());
+            memory::write_wanted(time, ("out_steps", out_steps, world.step_count()))
         })
     }
 }
 
 /// Writes the gravitational acceleration [m/s^2] of a world, 3 floats.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_gravity(world: *const sinew_world, out_gravity: *mut f32) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            *memory::output("out_gravity", out_gravity.cast())? = world.gravity().to_array();
-            Ok(())
+            memory::write("out_gravity", out_gravity.cast(), world.gravity().to_array())
         })
     }
 }
 
 /// Writes the friction coefficient of a tool.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_friction(
     world: *const sinew_world,
@@ -196,18 +153,10 @@ pub unsafe extern "C" fn sinew_tool_get_friction(
     out: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            *memory::output("out", out)? = world.friction(tool.id())?;
-            Ok(())
-        })
-    }
+    unsafe { with_world(world, |world| memory::write("out", out, world.friction(tool.id())?)) }
 }
 
 /// Writes the largest force [N] that moves a tool; infinity: unlimited.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_force_limit(
     world: *const sinew_world,
@@ -215,18 +164,10 @@ pub unsafe extern "C" fn sinew_tool_get_force_limit(
     out: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            *memory::output("out", out)? = world.force_limit(tool.id())?;
-            Ok(())
-        })
-    }
+    unsafe { with_world(world, |world| memory::write("out", out, world.force_limit(tool.id())?)) }
 }
 
 /// Writes the collision category and mask of a tool.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_collision(
     world: *const sinew_world,
@@ -238,20 +179,13 @@ pub unsafe extern "C" fn sinew_tool_get_collision(
     unsafe {
         with_world(world, |world| {
             let filter = world.collision_filter(tool.id())?;
-            let (category, mask) = (
-                memory::output("out_category", out_category)?,
-                memory::output("out_mask", out_mask)?,
-            );
-            (*category, *mask) = (filter.category, filter.mask);
-            Ok(())
+            let category = ("out_category", out_category, filter.category);
+            memory::write_both(category, ("out_mask", out_mask, filter.mask))
         })
     }
 }
 
 /// Writes the collision category and mask of a body.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_collision(
     world: *const sinew_world,
@@ -263,20 +197,13 @@ pub unsafe extern "C" fn sinew_body_get_collision(
     unsafe {
         with_body(world, body, |body| {
             let filter = body.collision_filter();
-            let (category, mask) = (
-                memory::output("out_category", out_category)?,
-                memory::output("out_mask", out_mask)?,
-            );
-            (*category, *mask) = (filter.category, filter.mask);
-            Ok(())
+            let category = ("out_category", out_category, filter.category);
+            memory::write_both(category, ("out_mask", out_mask, filter.mask))
         })
     }
 }
 
 /// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_pressure(
     world: *const sinew_world,
@@ -284,20 +211,12 @@ pub unsafe extern "C" fn sinew_body_get_pressure(
     out: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            *memory::output("out", out)? = body.pressure();
-            Ok(())
-        })
-    }
+    unsafe { with_body(world, body, |body| memory::write("out", out, body.pressure())) }
 }
 
 /// Writes the current pose of a blade.
 ///
 /// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_get_pose(
     world: *const sinew_world,
@@ -308,11 +227,7 @@ pub unsafe extern "C" fn sinew_blade_get_pose(
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let pose = world.blade_pose(blade.id())?;
-            let position = memory::optional_output_array("position", position.cast(), 1)?;
-            let orientation = memory::optional_output_array("orientation", orientation.cast(), 1)?;
-            put_pose(pose, position, orientation);
-            Ok(())
+            write_pose(world.blade_pose(blade.id())?, position, orientation)
         })
     }
 }

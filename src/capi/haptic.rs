@@ -103,26 +103,17 @@ pub struct sinew_haptic_contact {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_haptic_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_haptic_def";
-}
+unsafe impl Versioned for sinew_haptic_def {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_haptic_result {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_haptic_result";
-}
+unsafe impl Versioned for sinew_haptic_result {}
 
 impl sinew_haptic_def {
     fn defaults() -> Self {
         let defaults = HapticDefinition::new(ToolId::default());
         Self {
             struct_size: size_of::<Self>(),
-            tool: sinew_tool_id {
-                index1: 0,
-                generation: 0,
-            },
+            tool: sinew_tool_id::default(),
             stiffness: defaults.stiffness,
             angular_stiffness: defaults.angular_stiffness,
             damping_ratio: defaults.damping_ratio,
@@ -184,9 +175,6 @@ impl From<&HapticContact> for sinew_haptic_contact {
 }
 
 /// Fills a haptic definition with its defaults; `struct_size` is sizeof(sinew_haptic_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_def_init(def: *mut sinew_haptic_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -199,9 +187,6 @@ pub unsafe extern "C" fn sinew_haptic_def_init(def: *mut sinew_haptic_def, struc
 /// the latest proxy pose. The tool should start at the device's pose.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if another handle drives the tool.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_create(
     world: *mut sinew_world,
@@ -224,9 +209,6 @@ pub unsafe extern "C" fn sinew_haptic_create(
 /// Destroys a haptic handle, before or after its world; NULL has no effect.
 ///
 /// The tool is then moved by sinew_tool_set_pose again.
-///
-/// # Safety
-/// `haptic` is NULL or a handle that is not destroyed and that nobody uses any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_destroy(haptic: *mut sinew_haptic) {
     if !haptic.is_null() {
@@ -243,10 +225,6 @@ pub unsafe extern "C" fn sinew_haptic_destroy(haptic: *mut sinew_haptic) {
 /// `position` [m] is 3 floats; `orientation` is x y z w, nullable: unchanged. `velocity` [m/s] and
 /// `angular_velocity` [rad/s] are 3 floats each in world axes, nullable: estimated. `dt` [s] is the time since the
 /// last tick, above 0, at most 1. After an error apply no force to the device.
-///
-/// # Safety
-/// `haptic` is NULL or a handle nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4, `velocity` and `angular_velocity` NULL or
-/// 3; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_tick(
     haptic: *mut sinew_haptic,
@@ -287,9 +265,6 @@ pub unsafe extern "C" fn sinew_haptic_tick(
 ///
 /// `contacts` receives at most `capacity` entries, `count` the number that exist, at most 32; with more, those with
 /// the largest force.
-///
-/// # Safety
-/// `haptic` is NULL or a handle nobody else uses; `contacts` is NULL or writable for `capacity` contacts; `count` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_get_contacts(
     haptic: *const sinew_haptic,

@@ -83,9 +83,6 @@ pub(super) fn failed(error: &Error) {
 ///
 /// `level` is a sinew_log_level value. `callback` and `context` are nullable; without a callback there are no messages. Other
 /// threads may still be in the callback that it replaces.
-///
-/// # Safety
-/// `callback` is NULL or a function that may be called from any thread with `context` until another is set.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_set_log_callback(level: u32, callback: sinew_log, context: *mut c_void) -> sinew_status {
     guard(|| {

@@ -46,17 +46,11 @@ pub struct sinew_material_preset {
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
-unsafe impl Versioned for sinew_material_preset {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_material_preset";
-}
+unsafe impl Versioned for sinew_material_preset {}
 
 /// Writes the material values of a tissue.
 ///
 /// `preset` is a sinew_preset value; presets are numbered from 0 without a gap.
-///
-/// # Safety
-/// `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_material_get_preset(preset: u32, out: *mut sinew_material_preset) -> sinew_status {
     // SAFETY: the same contract.

@@ -16,9 +16,7 @@ use crate::base::{Error, Result, memory};
 /// bits is a value of it.
 pub(super) unsafe trait Versioned: Copy {
     /// The sizes that earlier headers gave it, and today's last.
-    const SIZES: &'static [usize];
-    /// Its name in the header.
-    const NAME: &'static str;
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
 }
 
 /// The value that `pointer` points to.
@@ -39,6 +37,49 @@ pub(super) unsafe fn output<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mu
     aligned(name, pointer)?;
     // SAFETY: aligned; the caller vouches for a valid T where the pointer is not NULL.
     unsafe { pointer.as_mut() }.ok_or_else(|| null(name))
+}
+
+/// Writes a result.
+///
+/// # Safety
+/// As [`output`].
+pub(super) unsafe fn write<T>(name: &str, pointer: *mut T, value: T) -> Result<()> {
+    // SAFETY: the same contract.
+    *unsafe { output(name, pointer) }? = value;
+    Ok(())
+}
+
+/// A result, the place that it goes to, and the name of that.
+type Output<'a, T> = (&'a str, *mut T, T);
+
+/// Writes two results, or neither.
+///
+/// # Safety
+/// As [`output`], for both.
+pub(super) unsafe fn write_both<A, B>((name, place, value): Output<A>, other: Output<B>) -> Result<()> {
+    // SAFETY: the same contract.
+    let (place, other_place) = unsafe { (output(name, place)?, output(other.0, other.1)?) };
+    (*place, *other_place) = (value, other.2);
+    Ok(())
+}
+
+/// Writes those of two results whose place is not NULL, or neither.
+///
+/// # Safety
+/// As [`output`], for both.
+pub(super) unsafe fn write_wanted<A, B>((name, place, value): Output<A>, other: Output<B>) -> Result<()> {
+    // SAFETY: the same contract.
+    let (place, other_place) = unsafe {
+        let place = optional_output_array(name, place, 1)?;
+        (place, optional_output_array(other.0, other.1, 1)?)
+    };
+    if let Some(place) = place {
+        place[0] = value;
+    }
+    if let Some(place) = other_place {
+        place[0] = other.2;
+    }
+    Ok(())
 }
 
 /// The array of `count` values that `pointer` points to; NULL is allowed where `count` is 0.
@@ -225,9 +266,9 @@ fn known_size<T: Versioned>(name: &dyn fmt::Display, size: usize) -> Result<()> 
     if T::SIZES.contains(&size) {
         return Ok(());
     }
+    let (_, type_name) = std::any::type_name::<T>().rsplit_once(':').unwrap_or_default();
     Err(Error::invalid(format!(
-        "{name} is {size}: this library knows a {} of {:?} bytes",
-        T::NAME,
+        "{name} is {size}: this library knows a {type_name} of {:?} bytes",
         T::SIZES
     )))
 }
@@ -266,7 +307,6 @@ mod tests {
     // SAFETY: repr(C), no padding, begins with struct_size.
     unsafe impl Versioned for Grown {
         const SIZES: &'static [usize] = &[16, 24];
-        const NAME: &'static str = "grown";
     }
 
     const DEFAULTS: Grown = Grown {

@@ -88,7 +88,6 @@ pub struct sinew_mesh_view {
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
 unsafe impl Versioned for sinew_mesh_view {
     const SIZES: &'static [usize] = &[offset_of!(Self, cells), size_of::<Self>()];
-    const NAME: &'static str = "sinew_mesh_view";
 }
 
 impl sinew_mesh {
@@ -162,9 +161,6 @@ pub(super) unsafe fn create(out: *mut *mut sinew_mesh, make: impl FnOnce() -> Re
 /// 0.
 ///
 /// Errors: SINEW_STATUS_IO if the file is missing or malformed; the message names the line or byte.
-///
-/// # Safety
-/// `path` is NULL or ends with NUL; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_load(
     path: *const c_char,
@@ -193,9 +189,6 @@ pub unsafe extern "C" fn sinew_mesh_load(
 ///
 /// `size` [m] holds the 2 extents along x and z, above 0; `cells` the 2 cell counts, at least 1, of two triangles
 /// each.
-///
-/// # Safety
-/// `size` is NULL or 2 floats, `cells` NULL or 2 numbers; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_create_cloth(
     size: *const f32,
@@ -215,9 +208,6 @@ pub unsafe extern "C" fn sinew_mesh_create_cloth(
 /// Creates a box of tetrahedra, centered at the origin.
 ///
 /// `size` [m] holds the 3 extents, above 0; `cells` the 3 cell counts, at least 1.
-///
-/// # Safety
-/// `size` is NULL or 3 floats, `cells` NULL or 3 numbers; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_create_block(
     size: *const f32,
@@ -237,9 +227,6 @@ pub unsafe extern "C" fn sinew_mesh_create_block(
 /// Creates a lattice of cubes, centered at the origin.
 ///
 /// `edge` [m] is the edge length of a cube, above 0; `cells` holds the 3 cell counts, at least 1.
-///
-/// # Safety
-/// `cells` is NULL or 3 numbers; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_create_lattice(
     edge: f32,
@@ -258,9 +245,6 @@ pub unsafe extern "C" fn sinew_mesh_create_lattice(
 /// Creates a liver-like organ of tetrahedra, centered at the origin and thin in y.
 ///
 /// `length` [m] is its extent along x and `spacing` [m] the node spacing, both above 0.
-///
-/// # Safety
-/// `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_create_organ(length: f32, spacing: f32, out: *mut *mut sinew_mesh) -> sinew_status {
     // SAFETY: the same contract.
@@ -270,9 +254,6 @@ pub unsafe extern "C" fn sinew_mesh_create_organ(length: f32, spacing: f32, out:
 /// Writes a view of the contents of a mesh without copying.
 ///
 /// Lifetime: until the mesh is destroyed.
-///
-/// # Safety
-/// `mesh` is NULL or a mesh that is not destroyed; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_get_view(mesh: *const sinew_mesh, out: *mut sinew_mesh_view) -> sinew_status {
     // SAFETY: the same contract.
@@ -284,9 +265,6 @@ pub unsafe extern "C" fn sinew_mesh_get_view(mesh: *const sinew_mesh, out: *mut 
 }
 
 /// Destroys a mesh and ends its views; NULL has no effect.
-///
-/// # Safety
-/// `mesh` is NULL or a mesh that is not destroyed and that nobody uses any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_destroy(mesh: *mut sinew_mesh) {
     if !mesh.is_null() {

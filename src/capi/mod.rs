@@ -3,11 +3,23 @@
 //! The headers of `include/` are generated from here. Every function checks its pointers, catches what might panic, and writes
 //! its outputs only when it answers [`SINEW_STATUS_OK`](status::SINEW_STATUS_OK).
 //!
+//! # Safety
+//!
+//! The contract of every function: a pointer is NULL or as its comment says, a struct has the size and arrays that it
+//! states, and a callback keeps its word. Until the call returns nobody changes what is behind `*const`, and nobody
+//! else uses what is behind `*mut`. What a call writes overlaps nothing else that it is given. What has been destroyed
+//! is not used any more.
+//!
 #![doc = include_str!("functions.md")]
 #![allow(unsafe_code)]
 #![allow(non_camel_case_types)]
+// One contract for all, above.
+#![allow(clippy::missing_safety_doc)]
 
+mod body_definition;
+mod id;
 mod memory;
+mod overlaps;
 
 // The order of functions.md. Units in brackets are no links.
 #[allow(rustdoc::broken_intra_doc_links)]

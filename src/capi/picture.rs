@@ -38,10 +38,7 @@ pub struct sinew_picture_def {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_picture_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_picture_def";
-}
+unsafe impl Versioned for sinew_picture_def {}
 
 impl sinew_picture_def {
     fn defaults() -> Self {
@@ -78,9 +75,6 @@ impl sinew_picture_def {
 }
 
 /// Fills an image definition with its defaults; `struct_size` is sizeof(sinew_picture_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_picture_def_init(def: *mut sinew_picture_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -142,10 +136,6 @@ impl sinew_body_values {
 /// replaced once the image is complete.
 ///
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states; `path` is NULL or
-/// ends with NUL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_save_picture(
     world: *const sinew_world,
@@ -167,9 +157,6 @@ pub unsafe extern "C" fn sinew_world_save_picture(
 /// sinew_world_save_picture.
 ///
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
-///
-/// # Safety
-/// As for sinew_world_save_picture; `coloured` is NULL or as long as stated, with arrays of the lengths that they state.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_save_picture_of_values(
     world: *const sinew_world,

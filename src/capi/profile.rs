@@ -51,10 +51,7 @@ pub struct sinew_profile {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_profile {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_profile";
-}
+unsafe impl Versioned for sinew_profile {}
 
 impl From<StepProfile> for sinew_profile {
     fn from(profile: StepProfile) -> Self {
@@ -84,9 +81,6 @@ impl From<StepProfile> for sinew_profile {
 /// Turns the profile of each step on (1) or off (0, the default).
 ///
 /// A step that is not profiled reads no clock. Profiling changes no result.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_profiling(world: *mut sinew_world, enabled: u32) -> sinew_status {
     // SAFETY: the same contract.
@@ -101,9 +95,6 @@ pub unsafe extern "C" fn sinew_world_set_profiling(world: *mut sinew_world, enab
 /// Writes the profile of the last step; 0 before the first.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED while profiling is off.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_profile(world: *const sinew_world, out: *mut sinew_profile) -> sinew_status {
     // SAFETY: the same contract.

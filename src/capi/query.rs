@@ -31,20 +31,13 @@ pub struct sinew_surface_point {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_surface_point {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_surface_point";
-}
+unsafe impl Versioned for sinew_surface_point {}
 
 impl From<Option<SurfaceHit>> for sinew_surface_point {
     fn from(found: Option<SurfaceHit>) -> Self {
-        let id = found.map(|found| found.body.0).unwrap_or_default();
         Self {
             struct_size: size_of::<Self>(),
-            body: sinew_body_id {
-                index1: id.index1,
-                generation: id.generation,
-            },
+            body: found.map_or(sinew_body_id::default(), |found| found.body.into()),
             triangle: found.map_or(0, |found| found.triangle),
             weights: found.map_or([0.0; 3], |found| found.weights),
             position: found.map_or([0.0; 3], |found| found.position.to_array()),
@@ -60,10 +53,6 @@ impl From<Option<SurfaceHit>> for sinew_surface_point {
 /// `origin` [m] and `direction` are 3 floats each; the direction may have any length but 0. `max_distance` [m] is
 /// at least 0. Without a hit out->body is all zero. A triangle parallel to the ray is not hit. The first query near
 /// a body builds a tree, which may allocate; nodes that moved refit it.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `origin` and `direction` are NULL or 3 floats; `out` is NULL or writable for
-/// `out->struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_cast_ray(
     world: *const sinew_world,
@@ -88,9 +77,6 @@ pub unsafe extern "C" fn sinew_world_cast_ray(
 ///
 /// `point` [m] is 3 floats; `max_distance` [m] is at least 0. If no surface is within it out->body is all zero. It
 /// uses the trees of sinew_world_cast_ray.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `point` is NULL or 3 floats; `out` is NULL or writable for `out->struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_find_nearest(
     world: *const sinew_world,
@@ -134,23 +120,14 @@ pub struct sinew_ray_hit {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_ray_hit {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_ray_hit";
-}
+unsafe impl Versioned for sinew_ray_hit {}
 
 impl From<Option<RayHit>> for sinew_ray_hit {
     fn from(hit: Option<RayHit>) -> Self {
         let nothing = Self {
             struct_size: size_of::<Self>(),
-            body: sinew_body_id {
-                index1: 0,
-                generation: 0,
-            },
-            tool: sinew_tool_id {
-                index1: 0,
-                generation: 0,
-            },
+            body: sinew_body_id::default(),
+            tool: sinew_tool_id::default(),
             triangle: 0,
             weights: [0.0; 3],
             position: [0.0; 3],
@@ -189,9 +166,6 @@ impl From<Option<RayHit>> for sinew_ray_hit {
 ///
 /// The ray meets bodies and tools as if it had this category and mask. Otherwise like sinew_world_cast_ray; without a hit
 /// both ids are all zero.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_cast_ray_filtered(
     world: *const sinew_world,

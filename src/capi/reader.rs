@@ -42,10 +42,7 @@ pub struct sinew_frame {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers and pointers alone.
-unsafe impl Versioned for sinew_frame {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_frame";
-}
+unsafe impl Versioned for sinew_frame {}
 
 /// Creates a reader of a body.
 ///
@@ -53,9 +50,6 @@ unsafe impl Versioned for sinew_frame {
 /// incomplete step never is. A body with readers keeps two copies of its positions more than it has readers.
 ///
 /// Errors: SINEW_STATUS_CAPACITY if the body has 126 readers.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_reader_create(
     world: *mut sinew_world,
@@ -74,9 +68,6 @@ pub unsafe extern "C" fn sinew_reader_create(
 }
 
 /// Destroys a reader on any thread, before or after its body and world; NULL has no effect.
-///
-/// # Safety
-/// `reader` is NULL or a reader that is not destroyed and that nobody uses any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_reader_destroy(reader: *mut sinew_reader) {
     if !reader.is_null() {
@@ -91,9 +82,6 @@ pub unsafe extern "C" fn sinew_reader_destroy(reader: *mut sinew_reader) {
 /// Writes the latest frame of the body without copying, allocating, locking or waiting.
 ///
 /// It returns the same frame again if there is no newer one. It ends the views of the previous frame.
-///
-/// # Safety
-/// `reader` is NULL or a reader nobody else uses, whatever happens to the world; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_reader_read(reader: *mut sinew_reader, out: *mut sinew_frame) -> sinew_status {
     guard(|| {
@@ -105,10 +93,7 @@ pub unsafe extern "C" fn sinew_reader_read(reader: *mut sinew_reader, out: *mut 
         let value = sinew_frame {
             struct_size: size_of::<sinew_frame>(),
             positions: sinew_vec3_view::of(frame.positions),
-            triangles: sinew_triangle_view {
-                data: frame.triangles.as_ptr().cast(),
-                count: frame.triangles.len(),
-            },
+            triangles: sinew_triangle_view::of(frame.triangles),
             version: frame.version,
             topology_version: frame.topology_version,
             step: frame.step,

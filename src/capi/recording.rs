@@ -30,10 +30,7 @@ pub struct sinew_replay_report {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_replay_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_replay_report";
-}
+unsafe impl Versioned for sinew_replay_report {}
 
 impl From<ReplayReport> for sinew_replay_report {
     fn from(report: ReplayReport) -> Self {
@@ -56,9 +53,6 @@ impl From<ReplayReport> for sinew_replay_report {
 /// replaced. `path` is UTF-8. A recorded step writes to the file and may allocate; a full disk ends the recording, not the step.
 ///
 /// Errors: SINEW_STATUS_IO.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `path` is NULL or ends with NUL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_start_recording(world: *mut sinew_world, path: *const c_char) -> sinew_status {
     // SAFETY: the same contract.
@@ -74,9 +68,6 @@ pub unsafe extern "C" fn sinew_world_start_recording(world: *mut sinew_world, pa
 /// `out_steps` is nullable.
 ///
 /// Errors: SINEW_STATUS_IO or SINEW_STATUS_OUT_OF_MEMORY if the recording ended earlier; it is stopped in any case.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `out_steps` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_stop_recording(world: *mut sinew_world, out_steps: *mut u64) -> sinew_status {
     // SAFETY: the same contract.
@@ -98,9 +89,6 @@ pub unsafe extern "C" fn sinew_world_stop_recording(world: *mut sinew_world, out
 ///
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_INVALID_ARGUMENT if the file is no recording or damaged;
 /// SINEW_STATUS_UNSUPPORTED for another library version.
-///
-/// # Safety
-/// `path` is NULL or ends with NUL; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_replay(
     path: *const c_char,

@@ -85,22 +85,13 @@ pub struct sinew_enclosed_report {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_energy {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_energy";
-}
+unsafe impl Versioned for sinew_energy {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_storage_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_storage_report";
-}
+unsafe impl Versioned for sinew_storage_report {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_enclosed_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_enclosed_report";
-}
+unsafe impl Versioned for sinew_enclosed_report {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_solver_report {
@@ -109,13 +100,9 @@ unsafe impl Versioned for sinew_solver_report {
         offset_of!(Self, solver),
         size_of::<Self>(),
     ];
-    const NAME: &'static str = "sinew_solver_report";
 }
 
 /// Writes the energy of a body.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_energy(
     world: *const sinew_world,
@@ -138,9 +125,6 @@ pub unsafe extern "C" fn sinew_body_get_energy(
 }
 
 /// Writes the memory use of the springs of a body.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_storage_report(
     world: *const sinew_world,
@@ -164,9 +148,6 @@ pub unsafe extern "C" fn sinew_body_get_storage_report(
 }
 
 /// Writes how the solver of a body took the last step.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_solver_report(
     world: *const sinew_world,
@@ -199,9 +180,6 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
 }
 
 /// Writes the volume and the pressure of the cavities of a body.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_enclosed_report(
     world: *const sinew_world,

@@ -39,16 +39,10 @@ pub struct sinew_rest_state_report {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_rest_state_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_rest_state_def";
-}
+unsafe impl Versioned for sinew_rest_state_def {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_rest_state_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_rest_state_report";
-}
+unsafe impl Versioned for sinew_rest_state_report {}
 
 impl sinew_rest_state_def {
     fn defaults() -> Self {
@@ -61,9 +55,6 @@ impl sinew_rest_state_def {
 }
 
 /// Fills a definition with its defaults; `struct_size` is sizeof(sinew_rest_state_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_rest_state_def_init(def: *mut sinew_rest_state_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -78,10 +69,6 @@ pub unsafe extern "C" fn sinew_rest_state_def_init(def: *mut sinew_rest_state_de
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part; SINEW_STATUS_UNSTABLE if not
 /// found.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states; `report` is NULL or
-/// writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_rest_state(
     world: *mut sinew_world,

@@ -19,9 +19,6 @@ fn flag(name: &str, value: u32) -> Result<bool> {
 /// Sets the number of substeps per step and its limit, from the next step on.
 ///
 /// See sinew_world_def.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_substeps(
     world: *mut sinew_world,
@@ -33,9 +30,6 @@ pub unsafe extern "C" fn sinew_world_set_substeps(
 }
 
 /// Writes the number of substeps per step and its limit; both outputs are nullable.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; the outputs are NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_substeps(
     world: *const sinew_world,
@@ -46,14 +40,10 @@ pub unsafe extern "C" fn sinew_world_get_substeps(
     unsafe {
         with_world(world, |world| {
             let [substeps, max_substeps] = world.substeps();
-            let out_substeps = memory::optional_output_array("out_substeps", out_substeps, 1)?;
-            let out_max_substeps = memory::optional_output_array("out_max_substeps", out_max_substeps, 1)?;
-            for (out, value) in [(out_substeps, substeps), (out_max_substeps, max_substeps)] {
-                if let Some(out) = out {
-                    out[0] = value;
-                }
-            }
-            Ok(())
+            memory::write_wanted(
+                ("out_substeps", out_substeps, substeps),
+                ("out_max_substeps", out_max_substeps, max_substeps),
+            )
         })
     }
 }
@@ -79,10 +69,7 @@ pub struct sinew_body_settings {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_body_settings {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_body_settings";
-}
+unsafe impl Versioned for sinew_body_settings {}
 
 impl From<BodySettings> for sinew_body_settings {
     fn from(settings: BodySettings) -> Self {
@@ -103,9 +90,6 @@ impl From<BodySettings> for sinew_body_settings {
 /// What is closer than a new contact_thickness is pushed off. A new sleep wakes the body.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a body that was cut change, other than both to 0.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `settings` is NULL or of the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_settings(
     world: *mut sinew_world,
@@ -135,9 +119,6 @@ pub unsafe extern "C" fn sinew_body_set_settings(
 }
 
 /// Writes the settings of a body that can change.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_settings(
     world: *const sinew_world,
@@ -154,9 +135,6 @@ pub unsafe extern "C" fn sinew_body_get_settings(
 }
 
 /// Sets the drag [N s/m] on each node of a body, at least 0, from the next step on.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_node_damping(
     world: *mut sinew_world,
@@ -168,9 +146,6 @@ pub unsafe extern "C" fn sinew_body_set_node_damping(
 }
 
 /// Writes the drag [N s/m] on a node.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; the outputs are NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_node_damping(
     world: *const sinew_world,
@@ -179,10 +154,5 @@ pub unsafe extern "C" fn sinew_body_get_node_damping(
     out: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            *memory::output("out", out)? = body.node_damping(node)?;
-            Ok(())
-        })
-    }
+    unsafe { with_body(world, body, |body| memory::write("out", out, body.node_damping(node)?)) }
 }

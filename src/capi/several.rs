@@ -8,9 +8,6 @@ use super::status::sinew_status;
 /// Pins nodes at their current positions; see sinew_body_pin.
 ///
 /// `nodes` holds `count` indices. On failure no node changes.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_pin_nodes(
     world: *mut sinew_world,
@@ -29,9 +26,6 @@ pub unsafe extern "C" fn sinew_body_pin_nodes(
 /// Unpins nodes along all axes; see sinew_body_unpin.
 ///
 /// `nodes` holds `count` indices. On failure no node changes.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_unpin_nodes(
     world: *mut sinew_world,
@@ -52,9 +46,6 @@ pub unsafe extern "C" fn sinew_body_unpin_nodes(
 /// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_pin_box(
     world: *mut sinew_world,
@@ -82,9 +73,6 @@ pub unsafe extern "C" fn sinew_body_pin_box(
 /// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_unpin_box(
     world: *mut sinew_world,
@@ -111,9 +99,6 @@ pub unsafe extern "C" fn sinew_body_unpin_box(
 ///
 /// `forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool holds. `node_count` must
 /// be the body's number of nodes.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_pin_forces(
     world: *const sinew_world,

@@ -8,9 +8,6 @@ use super::world::sinew_world;
 /// Writes the fraction of the nodes that are awake, from 0 to 1.
 ///
 /// It is 1 for a body that never sleeps.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_awake_share(
     world: *const sinew_world,
@@ -18,20 +15,12 @@ pub unsafe extern "C" fn sinew_body_get_awake_share(
     out: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            *memory::output("out", out)? = body.awake_share();
-            Ok(())
-        })
-    }
+    unsafe { with_body(world, body, |body| memory::write("out", out, body.awake_share())) }
 }
 
 /// Wakes all nodes of a body until they come to rest again.
 ///
 /// Forces, contacts, cuts and property changes wake a body automatically.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_wake(world: *mut sinew_world, body: sinew_body_id) -> sinew_status {
     // SAFETY: the same contract.

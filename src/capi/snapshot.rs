@@ -12,9 +12,6 @@ use crate::world::World;
 /// Writes the number of bytes that sinew_world_save_snapshot needs now.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or the size exceeds what memory can address.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_snapshot_size(world: *const sinew_world, out: *mut usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -34,9 +31,6 @@ pub unsafe extern "C" fn sinew_world_get_snapshot_size(world: *const sinew_world
 /// this library version can read it. A checksum detects damage, not tampering.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `bytes` is NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_save_snapshot(
     world: *const sinew_world,
@@ -59,9 +53,6 @@ pub unsafe extern "C" fn sinew_world_save_snapshot(
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bytes are damaged; SINEW_STATUS_UNSUPPORTED for another library
 /// version or kernel, or if a thread could not be started.
-///
-/// # Safety
-/// `bytes` is NULL or as long as stated; `run_tasks` is NULL or keeps its word, as long as the world lives; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_load_snapshot(
     bytes: *const u8,

@@ -10,9 +10,6 @@ use crate::def::{Values, expect_count};
 ///
 /// `pairs` receives 2 * count indices; `count` must be spring_count of sinew_body_get_storage_report. The order
 /// stays until springs are added or removed.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `pairs` is NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_spring_pairs(
     world: *const sinew_world,
@@ -38,9 +35,6 @@ pub unsafe extern "C" fn sinew_body_get_spring_pairs(
 /// nullable. PACKED merges rest lengths that differ only by rounding.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_springs(
     world: *const sinew_world,
@@ -77,9 +71,6 @@ pub unsafe extern "C" fn sinew_body_get_springs(
 /// stay. On failure no spring changes.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_springs(
     world: *mut sinew_world,
@@ -105,9 +96,6 @@ pub unsafe extern "C" fn sinew_body_set_springs(
 /// It changes springs, tetrahedra, bending and fibers whose nodes are all among `nodes`, which may repeat; anchor
 /// springs change only their stiffness. `stiffness_factor` is at least 0, where 0 is permanent; `length_factor` is
 /// above 0. Repeated calls multiply. Masses, damping, positions and velocities stay. On failure nothing changes.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `nodes` is NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_scale_region(
     world: *mut sinew_world,

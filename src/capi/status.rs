@@ -126,9 +126,6 @@ pub extern "C" fn sinew_status_name(status: sinew_status) -> *const c_char {
 ///
 /// The text is cut to `capacity` bytes and always ends with NUL. `buffer` is nullable. Returns the number of bytes
 /// that the whole message needs, NUL included; 1 if no call has failed.
-///
-/// # Safety
-/// `buffer` must be writable for `capacity` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_last_error(buffer: *mut c_char, capacity: usize) -> usize {
     let has_room = !buffer.is_null() && capacity > 0;

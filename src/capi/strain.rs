@@ -37,9 +37,6 @@ unsafe fn strains_of<'a>(strains: *mut sinew_strain, count: usize) -> Result<&'a
 /// the springs, which takes longer. `strains` receives `count` floats.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring and `rest_lengths` is NULL.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_spring_strains(
     world: *const sinew_world,
@@ -68,9 +65,6 @@ pub unsafe extern "C" fn sinew_body_get_spring_strains(
 ///
 /// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `triangles` holds 3 * triangle_count
 /// indices; `strains` receives one entry per triangle. `node_count` must be the body's.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_triangle_strains(
     world: *const sinew_world,
@@ -96,9 +90,6 @@ pub unsafe extern "C" fn sinew_body_get_triangle_strains(
 ///
 /// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `tetrahedra` holds 4 * tetrahedron_count
 /// indices; `strains` receives one entry per tetrahedron. `node_count` must be the body's.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_tetrahedron_strains(
     world: *const sinew_world,
@@ -124,9 +115,6 @@ pub unsafe extern "C" fn sinew_body_get_tetrahedron_strains(
 ///
 /// `elements` holds corners * element_count node indices, `corners` is 2, 3 or 4, `values` holds element_count
 /// finite floats, and `means` receives node_count floats. Use it to color an image by strain.
-///
-/// # Safety
-/// The arrays are NULL or as long as stated, and do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mean_at_nodes(
     elements: *const u32,

@@ -40,16 +40,10 @@ pub struct sinew_suture_report {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_suture_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_suture_def";
-}
+unsafe impl Versioned for sinew_suture_def {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_suture_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_suture_report";
-}
+unsafe impl Versioned for sinew_suture_report {}
 
 impl sinew_suture_def {
     fn defaults() -> Self {
@@ -64,9 +58,6 @@ impl sinew_suture_def {
 }
 
 /// Fills a suture definition with its defaults; `struct_size` is sizeof(sinew_suture_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_suture_def_init(def: *mut sinew_suture_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -80,10 +71,6 @@ pub unsafe extern "C" fn sinew_suture_def_init(def: *mut sinew_suture_def, struc
 /// m/s. Release and force are those of an attachment; a torn suture is in sinew_world_get_slipped.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if both points are the same.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `weights` and `other_weights` are NULL or 3 floats; `def` is NULL or a definition of the
-/// size that it states; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_suture_points(
     world: *mut sinew_world,
@@ -134,9 +121,6 @@ unsafe fn anchor(name: &str, triangle: u32, weights: *const f32) -> Result<Ancho
 /// The length is at least 0. It shortens by at most 0.25 m/s, over as many steps as that takes.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_suture_set_length(
     world: *mut sinew_world,
@@ -150,9 +134,6 @@ pub unsafe extern "C" fn sinew_suture_set_length(
 /// Writes the current state of a suture.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `report` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_suture_get_report(
     world: *const sinew_world,

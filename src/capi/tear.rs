@@ -27,15 +27,9 @@ pub struct sinew_tear_report {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_tear_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_tear_report";
-}
+unsafe impl Versioned for sinew_tear_report {}
 
 /// Writes which tears the last step of a body made or refused.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_tear_report(
     world: *const sinew_world,
@@ -68,9 +62,6 @@ pub unsafe extern "C" fn sinew_body_get_tear_report(
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a pair without spring and edge; SINEW_STATUS_UNSUPPORTED if most_tears
 /// is 0.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_tear_limits(
     world: *mut sinew_world,

@@ -5,21 +5,24 @@ use std::mem::offset_of;
 use glam::{Quat, Vec3};
 
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
+use super::id::converts;
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::base::{Error, Result, SlotId, ToolId};
+use crate::base::{Error, Result, ToolId};
 use crate::contact::{Pose, Shape, ToolDefinition};
 use crate::def::{CollisionFilter, Detection};
 
 /// Id of a tool; all zero means none.
 #[repr(C)]
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct sinew_tool_id {
     /// Slot of the tool, counted from 1.
     pub index1: u32,
     /// Number of the use of that slot.
     pub generation: u32,
 }
+
+converts!(sinew_tool_id, ToolId);
 
 /// Sphere about the origin.
 pub const SINEW_SHAPE_SPHERE: u32 = 0;
@@ -105,25 +108,6 @@ unsafe impl Versioned for sinew_tool_def {
         offset_of!(Self, half_extents),
         size_of::<Self>(),
     ];
-    const NAME: &'static str = "sinew_tool_def";
-}
-
-impl From<ToolId> for sinew_tool_id {
-    fn from(ToolId(id): ToolId) -> Self {
-        Self {
-            index1: id.index1,
-            generation: id.generation,
-        }
-    }
-}
-
-impl sinew_tool_id {
-    pub(super) fn id(self) -> ToolId {
-        ToolId(SlotId {
-            index1: self.index1,
-            generation: self.generation,
-        })
-    }
 }
 
 /// The way of detection of this number.
@@ -208,9 +192,6 @@ impl sinew_tool_def {
 }
 
 /// Fills a tool definition with its defaults; `struct_size` is sizeof(sinew_tool_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_def_init(def: *mut sinew_tool_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -220,10 +201,6 @@ pub unsafe extern "C" fn sinew_tool_def_init(def: *mut sinew_tool_def, struct_si
 /// Creates a tool in a world, and copies everything that `def` points to.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD of a round shape, or either of a plane.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
-/// the lengths that it states; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_create(
     world: *mut sinew_world,
@@ -242,9 +219,6 @@ pub unsafe extern "C" fn sinew_tool_create(
 }
 
 /// Destroys a tool and releases everything attached to it.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_destroy(world: *mut sinew_world, tool: sinew_tool_id) -> sinew_status {
     // SAFETY: the same contract.
@@ -258,9 +232,6 @@ pub unsafe extern "C" fn sinew_tool_destroy(world: *mut sinew_world, tool: sinew
 /// early, the rest is discarded: call again for every step.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_pose(
     world: *mut sinew_world,
@@ -279,9 +250,6 @@ pub unsafe extern "C" fn sinew_tool_set_pose(
 }
 
 /// Sets the friction coefficient of a tool, at least 0, from the next step on.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_friction(
     world: *mut sinew_world,
@@ -295,9 +263,6 @@ pub unsafe extern "C" fn sinew_tool_set_friction(
 /// Sets the largest force [N] that moves a tool, from the next step on.
 ///
 /// It is at least 0; 0 or infinity: unlimited. See sinew_tool_def.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_force_limit(
     world: *mut sinew_world,
@@ -311,9 +276,6 @@ pub unsafe extern "C" fn sinew_tool_set_force_limit(
 /// Sets the collision category and mask of a tool from the next step on.
 ///
 /// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_collision(
     world: *mut sinew_world,
@@ -333,9 +295,6 @@ pub unsafe extern "C" fn sinew_tool_set_collision(
 ///
 /// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. A tool with a
 /// force_limit can be short of its commanded pose.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `position` is NULL or writable for 3 floats, `orientation` for 4.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_pose(
     world: *const sinew_world,
@@ -344,24 +303,13 @@ pub unsafe extern "C" fn sinew_tool_get_pose(
     orientation: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let pose = world.pose(tool.id())?;
-            let position = memory::optional_output_array("position", position.cast(), 1)?;
-            let orientation = memory::optional_output_array("orientation", orientation.cast(), 1)?;
-            put_pose(pose, position, orientation);
-            Ok(())
-        })
-    }
+    unsafe { with_world(world, |world| write_pose(world.pose(tool.id())?, position, orientation)) }
 }
 
 /// Writes the pose that the last step moved a tool to, before the force_limit.
 ///
 /// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. Replaying these poses
 /// with sinew_tool_set_pose reproduces the steps, also those that a haptic handle drove.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `position` is NULL or writable for 3 floats, `orientation` for 4.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_target(
     world: *const sinew_world,
@@ -372,48 +320,36 @@ pub unsafe extern "C" fn sinew_tool_get_target(
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let pose = world.tool_target(tool.id())?;
-            let position = memory::optional_output_array("position", position.cast(), 1)?;
-            let orientation = memory::optional_output_array("orientation", orientation.cast(), 1)?;
-            put_pose(pose, position, orientation);
-            Ok(())
+            write_pose(world.tool_target(tool.id())?, position, orientation)
         })
     }
 }
 
 /// Writes a pose where it is wanted.
-pub(super) fn put_pose(pose: Pose, position: Option<&mut [[f32; 3]]>, orientation: Option<&mut [[f32; 4]]>) {
-    if let Some(place) = position {
-        place[0] = pose.position.to_array();
-    }
-    if let Some(place) = orientation {
-        place[0] = pose.orientation.to_array();
-    }
+///
+/// # Safety
+/// Each place is NULL or writable: for 3 floats, and for 4.
+pub(super) unsafe fn write_pose(pose: Pose, position: *mut f32, orientation: *mut f32) -> Result<()> {
+    let position = ("position", position.cast(), pose.position.to_array());
+    let orientation = ("orientation", orientation.cast(), pose.orientation.to_array());
+    // SAFETY: the same contract.
+    unsafe { memory::write_wanted(position, orientation) }
 }
 
 /// Writes a force and a torque where they are wanted.
 ///
 /// # Safety
 /// Each place is NULL or writable for 3 floats.
-pub(super) unsafe fn write_wrench([force, torque]: [*mut f32; 2], wrench: [Vec3; 2]) -> Result<()> {
+pub(super) unsafe fn write_wrench(wrench: (Vec3, Vec3), force: *mut f32, torque: *mut f32) -> Result<()> {
+    let force = ("force", force.cast(), wrench.0.to_array());
+    let torque = ("torque", torque.cast(), wrench.1.to_array());
     // SAFETY: the same contract.
-    let force = unsafe { memory::optional_output_array("force", force.cast::<[f32; 3]>(), 1) }?;
-    // SAFETY: the same contract.
-    let torque = unsafe { memory::optional_output_array("torque", torque.cast::<[f32; 3]>(), 1) }?;
-    for (place, value) in [force, torque].into_iter().zip(wrench) {
-        if let Some(place) = place {
-            place[0] = value.to_array();
-        }
-    }
-    Ok(())
+    unsafe { memory::write_wanted(force, torque) }
 }
 
 /// Writes the force and torque on a tool, averaged over the last step, in world axes.
 ///
 /// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each; both are nullable.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `force` and `torque` are NULL or writable for 3 floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_wrench(
     world: *const sinew_world,
@@ -422,10 +358,5 @@ pub unsafe extern "C" fn sinew_tool_get_wrench(
     torque: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let (of_force, of_torque) = world.wrench(tool.id())?;
-            write_wrench([force, torque], [of_force, of_torque])
-        })
-    }
+    unsafe { with_world(world, |world| write_wrench(world.wrench(tool.id())?, force, torque)) }
 }

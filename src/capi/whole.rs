@@ -19,9 +19,6 @@ use crate::mesh::{LoadedMesh, Mesh, tidy};
 ///
 /// `positions` [m] holds 3 * node_count floats, `triangles` 3 * triangle_count and `tetrahedra` 4 * tetrahedron_count
 /// node indices. node_of_vertex of sinew_mesh_view maps the given nodes to those of the mesh.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_create(
     positions: *const f32,
@@ -51,9 +48,6 @@ pub unsafe extern "C" fn sinew_mesh_create(
 /// sinew_body_create_from_surface makes of the same surface, with the rest positions.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` too fine or too coarse.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_create_filled(
     surface: *const sinew_mesh,
@@ -75,9 +69,6 @@ pub unsafe extern "C" fn sinew_mesh_create_filled(
 /// created.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED for a mesh of cells if `def` is of an older header without them.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_def_set_mesh(def: *mut sinew_body_def, mesh: *const sinew_mesh) -> sinew_status {
     // SAFETY: the same contract.
@@ -100,9 +91,6 @@ pub unsafe extern "C" fn sinew_body_def_set_mesh(def: *mut sinew_body_def, mesh:
 ///
 /// `translation` [m] is 3 floats, `rotation` x y z w, not zero, and `pivot` [m] 3 floats; all are nullable: none, none,
 /// and the center of the bounding box. Nothing is swept; otherwise like sinew_body_set_positions.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_transform(
     world: *mut sinew_world,
@@ -127,9 +115,6 @@ pub unsafe extern "C" fn sinew_body_transform(
 /// Writes the bounding box of the nodes of a body.
 ///
 /// `out_min` [m] and `out_max` [m] receive 3 floats each.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_bounds(
     world: *const sinew_world,
@@ -140,13 +125,8 @@ pub unsafe extern "C" fn sinew_body_get_bounds(
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            let bounds = body.bounds().map(|corner| corner.to_array());
-            let (low, high) = (
-                memory::output("out_min", out_min.cast())?,
-                memory::output("out_max", out_max.cast())?,
-            );
-            (*low, *high) = (bounds[0], bounds[1]);
-            Ok(())
+            let [min, max] = body.bounds().map(|corner| corner.to_array());
+            memory::write_both(("out_min", out_min.cast(), min), ("out_max", out_max.cast(), max))
         })
     }
 }
@@ -155,9 +135,6 @@ pub unsafe extern "C" fn sinew_body_get_bounds(
 ///
 /// They are area-weighted and point outward; 0 for a node without a triangle. `normals` receives 3 * node_count floats;
 /// `node_count` must be the body's number of nodes.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_normals(
     world: *const sinew_world,
@@ -176,9 +153,6 @@ pub unsafe extern "C" fn sinew_body_get_normals(
 /// Writes the masses [kg] of all nodes of a body; see sinew_body_get_node_mass.
 ///
 /// `masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_masses(
     world: *const sinew_world,
@@ -198,9 +172,6 @@ pub unsafe extern "C" fn sinew_body_get_masses(
 ///
 /// `nodes` holds `count` indices, which may repeat; `impulses` [N s] holds 3 * count floats. They have no effect on a
 /// pinned or attached node, nor along a pinned axis. On failure no velocity changes.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_apply_impulses(
     world: *mut sinew_world,
@@ -221,9 +192,6 @@ pub unsafe extern "C" fn sinew_body_apply_impulses(
 /// Sets the factor of the world's gravity on a body, from the next step on.
 ///
 /// `scale` is finite: 0 means no gravity.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_gravity_scale(
     world: *mut sinew_world,
@@ -235,9 +203,6 @@ pub unsafe extern "C" fn sinew_body_set_gravity_scale(
 }
 
 /// Writes the factor of the world's gravity on a body.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_gravity_scale(
     world: *const sinew_world,
@@ -245,20 +210,12 @@ pub unsafe extern "C" fn sinew_body_get_gravity_scale(
     out: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            *memory::output("out", out)? = body.gravity_scale();
-            Ok(())
-        })
-    }
+    unsafe { with_body(world, body, |body| memory::write("out", out, body.gravity_scale())) }
 }
 
 /// Stores a pointer of the caller with a body; snapshots do not hold it.
 ///
 /// `user_data` is nullable.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_user_data(
     world: *mut sinew_world,
@@ -275,9 +232,6 @@ pub unsafe extern "C" fn sinew_body_set_user_data(
 }
 
 /// Writes the pointer that is stored with a body; NULL by default.
-///
-/// # Safety
-/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_user_data(
     world: *const sinew_world,
@@ -287,8 +241,7 @@ pub unsafe extern "C" fn sinew_body_get_user_data(
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            *memory::output("out", out)? = body.user_data() as *mut c_void;
-            Ok(())
+            memory::write("out", out, body.user_data() as *mut c_void)
         })
     }
 }

@@ -121,7 +121,6 @@ pub struct sinew_step_report {
 // SAFETY: repr(C), begins with struct_size, numbers and pointers alone; what is no function is the caller's breach.
 unsafe impl Versioned for sinew_world_def {
     const SIZES: &'static [usize] = &[offset_of!(Self, run_tasks), size_of::<Self>()];
-    const NAME: &'static str = "sinew_world_def";
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -131,7 +130,6 @@ unsafe impl Versioned for sinew_step_report {
         offset_of!(Self, limit_body),
         size_of::<Self>(),
     ];
-    const NAME: &'static str = "sinew_step_report";
 }
 
 impl sinew_world_def {
@@ -200,9 +198,6 @@ impl From<StepReport> for sinew_step_report {
 }
 
 /// Fills a world definition with its defaults; `struct_size` is sizeof(sinew_world_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_def_init(def: *mut sinew_world_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -212,10 +207,6 @@ pub unsafe extern "C" fn sinew_world_def_init(def: *mut sinew_world_def, struct_
 /// Creates an empty world; destroy it with sinew_world_destroy.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED if a thread could not be started or the processor lacks the kernel.
-///
-/// # Safety
-/// `def` is NULL or a definition of the size that it states, with a `run_tasks` that keeps its word; `out` is NULL or
-/// writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *mut *mut sinew_world) -> sinew_status {
     guard(|| {
@@ -231,9 +222,6 @@ pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *m
 }
 
 /// Destroys a world with all its bodies, tools and blades; NULL has no effect.
-///
-/// # Safety
-/// `world` is NULL or a world that is not destroyed and that nobody uses any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_destroy(world: *mut sinew_world) {
     if !world.is_null() {
@@ -251,9 +239,6 @@ pub unsafe extern "C" fn sinew_world_destroy(world: *mut sinew_world) {
 ///
 /// Errors: SINEW_STATUS_UNSTABLE if the step needs more than max_substeps, or more than the fixed number of
 /// substeps.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `report` is NULL or writable for the size that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_step(
     world: *mut sinew_world,
@@ -304,9 +289,6 @@ pub(super) unsafe fn step_and_report<Report: Into<sinew_step_report>>(
 /// Sets the gravitational acceleration from the next step on.
 ///
 /// `gravity` [m/s^2] points to 3 floats.
-///
-/// # Safety
-/// `world` is NULL or a world nobody else uses; `gravity` is NULL or 3 floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_gravity(world: *mut sinew_world, gravity: *const f32) -> sinew_status {
     // SAFETY: the same contract.
@@ -316,16 +298,8 @@ pub unsafe extern "C" fn sinew_world_set_gravity(world: *mut sinew_world, gravit
 /// Computes a hash over everything that the next step depends on.
 ///
 /// Compare hashes only between worlds of the same library version.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_state_hash(world: *const sinew_world, out: *mut u64) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            *memory::output("out", out)? = world.state_hash();
-            Ok(())
-        })
-    }
+    unsafe { with_world(world, |world| memory::write("out", out, world.state_hash())) }
 }

@@ -62,9 +62,9 @@ pub(crate) const fn least_of_field<T, F: Saved>(_: fn(&T) -> &F) -> usize {
     F::LEAST
 }
 
-/// Writes and reads a structure field by field: `saved!(Name { all, its, fields })`, what is generic as `saved!([T: Saved] Name<T> { .. })`. One that
+/// Writes and reads a structure field by field: `saved! { Name { all, its, fields } }`, what is generic as `saved! { [T: Saved] Name<T> { .. } }`. One that
 /// is left out does not compile, unless `leaves { field: value }` says what it is after loading. With
-/// `where check` what is read must pass a check. `saved!(Name)` is of one without fields.
+/// `where check` what is read must pass a check. `saved! { Name }` is of one without fields.
 macro_rules! saved {
     ($name:ident) => {
         impl $crate::codec::Saved for $name {
@@ -381,7 +381,7 @@ macro_rules! saved_tuples {
 
 saved_tuples!((A 0, B 1)(A 0, B 1, C 2));
 
-saved!([T: Saved] std::ops::Range<T> { start, end });
+saved! { [T: Saved] std::ops::Range<T> { start, end } }
 
 saved_enum!(Error {
     0 => InvalidArgument(message),
@@ -397,32 +397,16 @@ saved_enum!(Error {
 
 saved_enum!(LimitKind { 0 => Spring, 1 => Element, 2 => Term, 3 => Cavity, 4 => Parts, 5 => Tolerance });
 
-saved!(SubstepLimit {
-    kind,
-    nodes,
-    node_count
-});
+saved! { SubstepLimit { kind, nodes, node_count } }
 
-saved!(StepLimit {
-    body,
-    of,
-    needed,
-    is_chosen
-});
+saved! { StepLimit { body, of, needed, is_chosen } }
 
-saved!(StepReport {
-    substeps,
-    stable_substep,
-    bodies_restored,
-    error_estimate,
-    crossings,
-    limit
-});
+saved! { StepReport { substeps, stable_substep, bodies_restored, error_estimate, crossings, limit } }
 
-saved!(BodyId { 0 });
+saved! { BodyId { 0 } }
 
-saved!(ToolId { 0 });
+saved! { ToolId { 0 } }
 
-saved!(AttachmentId { 0 });
+saved! { AttachmentId { 0 } }
 
-saved!(SlotId { index1, generation });
+saved! { SlotId { index1, generation } }

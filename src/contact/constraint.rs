@@ -2,7 +2,7 @@
 
 use glam::{BVec3, DVec3, Vec3, Vec3A};
 
-use super::driven::Yielding;
+use super::driven::YieldingTool;
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
 use super::impulses::{LEVERAGE, pushed_out};
@@ -64,32 +64,11 @@ pub(super) struct Constraint {
     pub rounded: Option<([Vec3; 2], f32)>,
 }
 
-saved!(Constraint {
-    feature,
-    weights,
-    nodes,
-    count,
-    starts,
-    shares,
-    answers,
-    normal,
-    least_speed,
-    surface_velocity,
-    arm,
-    depth,
-    friction,
-    tool,
-    yielding,
-    tip,
-    effective_mass,
-    free_mass,
-    give,
-    firmness,
-    impulse,
-    friction_impulse,
-    counted,
-    rounded
-});
+saved! { Constraint {
+    feature, weights, nodes, count, starts, shares, answers, normal, least_speed, surface_velocity, arm, depth,
+    friction, tool, yielding, tip, effective_mass, free_mass, give, firmness, impulse, friction_impulse, counted,
+    rounded,
+} }
 
 impl Constraint {
     /// A contact that has given nothing yet, of a feature that these nodes move, which are held along these axes but have a mobility, with a
@@ -218,7 +197,7 @@ impl Constraint {
     }
 
     /// What it asks of the velocities at these places of its nodes.
-    pub fn press(&self, place_of: impl Fn(u32) -> u32, yielding: &[Yielding]) -> Press {
+    pub fn press(&self, place_of: impl Fn(u32) -> u32, yielding: &[YieldingTool]) -> Press {
         let mut places = [0; MOST];
         for (place, &node) in places.iter_mut().zip(self.nodes()) {
             *place = place_of(node);
@@ -255,7 +234,7 @@ impl Constraint {
     }
 
     /// The part of such a way out, m, that a dynamic tool goes.
-    pub fn push_back(&self, tool: &mut Yielding, way: f32) {
+    pub fn push_back(&self, tool: &mut YieldingTool, way: f32) {
         tool.push_out(-self.normal * (way * self.effective_mass));
     }
 

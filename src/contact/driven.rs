@@ -7,9 +7,9 @@
 
 use glam::{DVec3, Mat3A, Vec3, Vec3A};
 
-use super::contacts::Load;
+use super::contacts::ToolLoad;
 use super::path::ToolPath;
-use super::rigid::{Rigid, RigidMass, RigidMotion};
+use super::rigid::{Rigid, RigidMass, RigidState};
 use super::tool::Pose;
 use crate::base::{Result, memory};
 use crate::geometry::rotation::{turn_between, turned};
@@ -21,7 +21,7 @@ pub(crate) struct DynamicTool {
     pub index: usize,
     /// Its mass, divided among the bodies that it presses.
     pub mass: RigidMass,
-    pub motion: RigidMotion,
+    pub motion: RigidState,
     /// What accelerates it beside contacts, m/s² and N m, divided as the mass is.
     pub drive: (DVec3, DVec3),
     /// Among how many bodies it is divided.
@@ -35,7 +35,7 @@ struct Copied {
     /// What part of the step it has gone.
     gone: f64,
     /// What of its load has moved it.
-    taken: Load,
+    taken: ToolLoad,
     /// The energy that contact gave it, J.
     received: f64,
     /// For how long its drive has acted, s, and acts in the slice in progress.
@@ -55,7 +55,7 @@ pub(super) struct Driven {
 
 /// A dynamic tool while contacts are solved: how it answers impulses, and by how much it has become faster.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Yielding {
+pub(super) struct YieldingTool {
     /// From the tool's position to its centre of mass, m.
     pub center: Vec3A,
     /// 1/kg
@@ -79,7 +79,7 @@ impl DynamicTool {
         Self {
             index,
             mass: rigid.mass.part(part),
-            motion: RigidMotion {
+            motion: RigidState {
                 angular_momentum: rigid.motion.angular_momentum * part,
                 ..rigid.motion
             },
@@ -89,7 +89,7 @@ impl DynamicTool {
     }
 
     /// Where it is after a step in which nothing is in its way.
-    fn free(&self, dt: f32) -> RigidMotion {
+    fn free(&self, dt: f32) -> RigidState {
         let mut motion = self.motion;
         motion.fly(&self.mass, self.drive, f64::from(dt));
         motion
@@ -106,10 +106,10 @@ impl DynamicTool {
 
     /// Puts together where bodies that pressed it moved their parts of it in a step: the change of its momentum is the sum of what they
     /// gave it, and its place the mean over all parts, of which the others flew freely.
-    pub fn joined(&self, dt: f32, ends: impl Iterator<Item = RigidMotion>) -> RigidMotion {
+    pub fn joined(&self, dt: f32, ends: impl Iterator<Item = RigidState>) -> RigidState {
         let free = self.free(dt);
         let part = 1.0 / f64::from(self.shares);
-        let mut whole = RigidMotion {
+        let mut whole = RigidState {
             angular_momentum: free.angular_momentum / part,
             ..free
         };
@@ -125,7 +125,7 @@ impl DynamicTool {
     }
 }
 
-impl Yielding {
+impl YieldingTool {
     /// How much faster its surface becomes at this arm from its centre of mass along this direction for an impulse along it, 1/kg.
     pub fn answer(&self, arm: Vec3A, direction: Vec3A) -> f32 {
         let moment = arm.cross(direction);
@@ -187,7 +187,7 @@ impl Driven {
         self.copies.extend(dynamic.iter().map(|&tool| Copied {
             tool,
             gone: 0.0,
-            taken: Load::default(),
+            taken: ToolLoad::default(),
             received: 0.0,
             driven_for: 0.0,
             kick: 0.0,
@@ -208,7 +208,7 @@ impl Driven {
     }
 
     /// Where a tool is when the step has ended.
-    pub fn end(&self, index: usize, dt: f32) -> Option<RigidMotion> {
+    pub fn end(&self, index: usize, dt: f32) -> Option<RigidState> {
         let mut copy = self.copies[self.place(index)?];
         copy.fly_to(1.0, f64::from(dt));
         // The half kick that closes a step may have been left to the next.
@@ -243,10 +243,10 @@ impl Driven {
     }
 
     /// Shows the solver each tool as it answers impulses.
-    pub fn show_yielding(&self, mut show: impl FnMut(Yielding)) {
+    pub fn show_yielding(&self, mut show: impl FnMut(YieldingTool)) {
         for Copied { tool, .. } in &self.copies {
             let (mass, motion) = (&tool.mass, &tool.motion);
-            show(Yielding {
+            show(YieldingTool {
                 center: (motion.orientation * mass.center).as_vec3a(),
                 inverse_mass: (1.0 / mass.mass) as f32,
                 inverse_inertia: mass.inverse_inertia_at(motion.orientation).as_mat3().into(),
@@ -259,7 +259,7 @@ impl Driven {
     }
 
     /// Moves the tools through the slice that they were looked ahead for, with what has been added to their loads, and by so much more, m.
-    pub fn arrive(&mut self, loads: &[Load], end: f64, yielding: &[Yielding]) {
+    pub fn arrive(&mut self, loads: &[ToolLoad], end: f64, yielding: &[YieldingTool]) {
         for (copy, yielding) in self.copies.iter_mut().zip(yielding) {
             copy.kick();
             copy.take(loads);
@@ -271,7 +271,7 @@ impl Driven {
     }
 
     /// The same for what they have taken since, on a way that they have gone.
-    pub fn amend(&mut self, loads: &[Load]) {
+    pub fn amend(&mut self, loads: &[ToolLoad]) {
         for copy in &mut self.copies {
             let before = copy.tool.motion;
             copy.take(loads);
@@ -304,7 +304,7 @@ impl Copied {
         }
     }
 
-    fn take(&mut self, loads: &[Load]) {
+    fn take(&mut self, loads: &[ToolLoad]) {
         let DynamicTool {
             index, mass, motion, ..
         } = &mut self.tool;

@@ -22,14 +22,7 @@ pub(super) struct Features {
     uses: Option<Box<EdgeUses>>,
 }
 
-saved!(Features {
-    node_count,
-    edges,
-    faces,
-    edge_lengths,
-    face_lengths,
-    uses
-});
+saved! { Features { node_count, edges, faces, edge_lengths, face_lengths, uses } }
 
 /// The corners of an edge that is none.
 pub(super) const HOLE: [u32; 2] = [u32::MAX; 2];
@@ -41,7 +34,7 @@ pub(super) struct Feature {
     count: u8,
 }
 
-saved!(Feature { nodes, count });
+saved! { Feature { nodes, count } }
 
 impl Feature {
     pub fn node(node: u32) -> Self {

@@ -37,12 +37,7 @@ pub(super) struct Meets {
     pub tilts: [[f64; 3]; 3],
 }
 
-saved!(Meets {
-    weights,
-    normal,
-    gap,
-    tilts
-});
+saved! { Meets { weights, normal, gap, tilts } }
 
 impl Gauge {
     /// Of a feature with these corners, 1 to 3.

@@ -16,7 +16,7 @@ const STICKING: f64 = 0.99;
 
 /// Friction of one tool at one node.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Grip {
+pub(super) struct NodeFriction {
     pub node: u32,
     /// The tool's place among those of the step, and in the world.
     pub tool: usize,
@@ -40,21 +40,9 @@ pub(super) struct Grip {
     pub drag: Drag,
 }
 
-saved!(Grip {
-    node,
-    tool,
-    slot,
-    friction,
-    normal,
-    slip,
-    stiffness,
-    kept,
-    multiplier,
-    most,
-    holds_on,
-    pressed,
-    drag
-});
+saved! { NodeFriction {
+    node, tool, slot, friction, normal, slip, stiffness, kept, multiplier, most, holds_on, pressed, drag,
+} }
 
 /// What it does with the node where it was last.
 #[derive(Clone, Copy, Debug, Default)]
@@ -67,7 +55,7 @@ pub(super) struct Drag {
     slip: DVec3,
 }
 
-saved!(Drag { force, stiffness, slip });
+saved! { Drag { force, stiffness, slip } }
 
 /// What friction did at the end of a step: the next begins with it.
 #[derive(Clone, Copy, Debug)]
@@ -81,24 +69,19 @@ struct Dragged {
     sticks: bool,
 }
 
-saved!(Dragged {
-    slot,
-    node,
-    force,
-    sticks
-});
+saved! { Dragged { slot, node, force, sticks } }
 
 /// The friction of a body with all tools in the equation in progress.
 #[derive(Debug, Default)]
 pub(super) struct Grips {
     /// In the order of nodes and tools.
-    grips: Vec<Grip>,
+    grips: Vec<NodeFriction>,
     /// What it did before the equation in progress, and before the step; both in the order of tools and nodes.
     last: Vec<Dragged>,
     settled: Vec<Dragged>,
 }
 
-saved!(Grips { grips, last, settled });
+saved! { Grips { grips, last, settled } }
 
 impl Grips {
     /// Makes room for so many.
@@ -155,14 +138,14 @@ impl Grips {
 
     /// Adds `part` of one with the normal and the slip of its contact to that of the same node and tool, which is new as long as there is
     /// room: `pressed` is the sum of the parts until [`Grips::begin`].
-    pub fn add(&mut self, part: f64, grip: Grip) {
+    pub fn add(&mut self, part: f64, grip: NodeFriction) {
         let place = self.grips.partition_point(|known| known.key() < grip.key());
         let is_known = self.grips.get(place).is_some_and(|known| known.key() == grip.key());
         if !is_known {
             if self.grips.len() == self.grips.capacity() {
                 return;
             }
-            let none = Grip {
+            let none = NodeFriction {
                 normal: DVec3::ZERO,
                 slip: DVec3::ZERO,
                 ..grip
@@ -193,7 +176,7 @@ impl Grips {
 
     /// Where that of a node and a tool is.
     pub fn place(&self, node: u32, tool: usize) -> Option<usize> {
-        self.grips.binary_search_by_key(&(node, tool), Grip::key).ok()
+        self.grips.binary_search_by_key(&(node, tool), NodeFriction::key).ok()
     }
 
     /// Nothing presses any node.
@@ -227,7 +210,7 @@ impl Grips {
 
     /// How much more they would do with better multipliers and limits, N.
     pub fn missing(&self, push_of: impl Fn(usize) -> DVec3) -> f64 {
-        let missing = |grip: &Grip| {
+        let missing = |grip: &NodeFriction| {
             let better = grip.better().answer(push_of(grip.node as usize));
             (better.force - grip.drag.force).length()
         };
@@ -287,14 +270,14 @@ impl Grips {
 
     /// What they do on the nodes' ways, J: none does more than on the way of its tool.
     pub fn work(&self, way_of: impl Fn(usize) -> DVec3) -> f64 {
-        let work = |grip: &Grip| {
+        let work = |grip: &NodeFriction| {
             let Drag { force, slip, .. } = grip.drag;
             (way_of(grip.node as usize) - slip).dot(force) + slip.dot(force).min(0.0)
         };
         self.grips.iter().map(work).sum()
     }
 
-    fn of(&self, nodes: &Range<usize>) -> &[Grip] {
+    fn of(&self, nodes: &Range<usize>) -> &[NodeFriction] {
         let place = |node: usize| self.grips.partition_point(|grip| (grip.node as usize) < node);
         if self.grips.is_empty() {
             return &[];
@@ -309,7 +292,7 @@ impl Dragged {
     }
 }
 
-impl Grip {
+impl NodeFriction {
     fn key(&self) -> (u32, usize) {
         (self.node, self.tool)
     }

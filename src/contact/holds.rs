@@ -12,84 +12,16 @@ use glam::{DVec3, Vec3};
 
 use super::constraint::Constraint;
 use super::features::Feature;
-use super::gauge::{Gauge, Meets};
-use super::grip::{Grip, Grips, add};
-use super::supports::{MOST, Supports, Ties};
+use super::gauge::Meets;
+use super::grip::{Grips, NodeFriction, add};
+use super::hold::{Answer, Hold};
+use super::supports::{MOST, Supports};
 use crate::base::{Result, StateHasher};
 use crate::codec::saved;
 use crate::nodes::Bindings;
 
 /// How much stiffer a contact is than its nodes: the more, the faster its multiplier is found, and the worse what lies between.
 const STIFFER: f32 = 3.0;
-
-/// A contact as the equation sees it.
-#[derive(Clone, Copy, Debug)]
-struct Hold {
-    /// The nodes that move the feature.
-    nodes: [u32; MOST],
-    count: usize,
-    corner_count: usize,
-    ties: Option<Ties>,
-    /// Where its corners are without a push, m.
-    free: [DVec3; 3],
-    gauge: Gauge,
-    /// The gap is at least this, m: below 0 where it began inside.
-    least: f64,
-    /// N/m
-    stiffness: f64,
-    /// N
-    multiplier: f64,
-    /// What part of its force becomes its multiplier: less than 1 where it gives way, as what holds nodes leaves them no way out.
-    kept: f64,
-    /// Whether it may pull: where it pushed before, the first solution takes it for one that goes on, though a node that were left
-    /// alone might go away from the tool for once.
-    holds_on: bool,
-    /// Whether it pushed in the last equation.
-    lasts: bool,
-    /// What acts on the tissue with the nodes where they were last.
-    answer: Answer,
-    /// Whether it pushed when it was last asked.
-    pushed: bool,
-    /// The friction of its nodes.
-    grips: [Option<usize>; MOST],
-}
-
-saved!(Hold {
-    nodes,
-    count,
-    corner_count,
-    ties,
-    free,
-    gauge,
-    least,
-    stiffness,
-    multiplier,
-    kept,
-    holds_on,
-    lasts,
-    answer,
-    pushed,
-    grips
-});
-
-/// What a contact does.
-#[derive(Clone, Copy, Debug, Default)]
-struct Answer {
-    meets: Meets,
-    /// Along the normal, N.
-    force: f64,
-    /// What of it acts on each node.
-    shares: [f64; MOST],
-    /// How it falls as each node goes along the normal, for each that goes, N/m.
-    stiffness: [[f64; MOST]; MOST],
-}
-
-saved!(Answer {
-    meets,
-    force,
-    shares,
-    stiffness
-});
 
 /// The part of a node in a hold.
 #[derive(Clone, Copy, Debug)]
@@ -100,7 +32,7 @@ struct Share {
     place: usize,
 }
 
-saved!(Share { node, hold, place });
+saved! { Share { node, hold, place } }
 
 /// What a contact did at the end of a step: where it is found again the next begins with it.
 #[derive(Clone, Copy, Debug)]
@@ -119,15 +51,7 @@ struct Push {
     arm: Vec3,
 }
 
-saved!(Push {
-    slot,
-    feature,
-    tip,
-    force,
-    drag,
-    normal,
-    arm
-});
+saved! { Push { slot, feature, tip, force, drag, normal, arm } }
 
 /// The contacts of a body with all tools in the equation in progress.
 #[derive(Debug, Default)]
@@ -143,14 +67,7 @@ pub(crate) struct Holds {
     grips: Grips,
 }
 
-saved!(Holds {
-    holds,
-    shares,
-    order,
-    last,
-    settled,
-    grips
-});
+saved! { Holds { holds, shares, order, last, settled, grips } }
 
 impl Holds {
     /// Makes room for so many contacts, and for friction of as many nodes if that belongs to them.
@@ -305,7 +222,7 @@ impl Holds {
                 free[place] = constraint.starts[place].as_dvec3() + way.as_dvec3();
                 softness += share * share / stiffness;
                 if drags && constraint.friction > 0.0 && share > 0.0 && stiffness.is_finite() {
-                    let grip = Grip {
+                    let grip = NodeFriction {
                         node,
                         tool: constraint.tool,
                         slot: slot_of(constraint.tool),
@@ -314,7 +231,7 @@ impl Holds {
                         slip: (way - constraint.surface_velocity * duration).as_dvec3(),
                         stiffness: f64::from(STIFFER * constraint.firmness * stiffness),
                         kept: hold.kept,
-                        ..Grip::default()
+                        ..NodeFriction::default()
                     };
                     self.grips.add(share.into(), grip);
                 }
@@ -620,117 +537,5 @@ impl Holds {
 impl Push {
     fn key(&self) -> (usize, Feature, u8) {
         (self.slot, self.feature, self.tip)
-    }
-}
-
-impl Hold {
-    /// What it does with these pushes of the nodes, m.
-    fn answer_to(&self, push_of: impl Fn(usize) -> DVec3) -> Answer {
-        let mut corners = self.free;
-        for (corner, push) in corners.iter_mut().zip(self.corner_vectors(push_of)) {
-            *corner += push;
-        }
-        let meets = self.gauge.meet(&corners[..self.corner_count]);
-        let mut force = self.multiplier + self.stiffness * (self.least - meets.gap);
-        if !self.holds_on {
-            force = force.max(0.0);
-        }
-        let shares = self.shared(meets.weights);
-        let mut stiffness = [[0.0; MOST]; MOST];
-        if force != 0.0 {
-            let tilts = self.shared(meets.tilts.map(|row| self.shared(row)));
-            for (row, entries) in stiffness.iter_mut().enumerate() {
-                for (column, entry) in entries.iter_mut().enumerate() {
-                    *entry = self.stiffness * shares[row] * shares[column] + force.max(0.0) * tilts[row][column];
-                }
-            }
-        }
-        Answer {
-            meets,
-            force,
-            shares,
-            stiffness,
-        }
-    }
-
-    /// The vectors of its corners, which those of its nodes make.
-    fn corners(&self, vectors: [DVec3; MOST]) -> [DVec3; 3] {
-        let [a, b, c, _] = vectors;
-        let Some(ties) = &self.ties else {
-            return [a, b, c];
-        };
-        ties.map(|tie| {
-            let parts = vectors.iter().zip(tie);
-            parts.map(|(&vector, part)| vector * f64::from(part)).sum()
-        })
-    }
-
-    fn corner_vectors(&self, vector_of: impl Fn(usize) -> DVec3) -> [DVec3; 3] {
-        let mut vectors = [DVec3::ZERO; MOST];
-        for (vector, &node) in vectors.iter_mut().zip(&self.nodes).take(self.count) {
-            *vector = vector_of(node as usize);
-        }
-        self.corners(vectors)
-    }
-
-    /// What its nodes have of what its corners have.
-    fn shared<T: Shared>(&self, of_corners: [T; 3]) -> [T; MOST] {
-        let Some(ties) = &self.ties else {
-            let [a, b, c] = of_corners;
-            return [a, b, c, T::default()];
-        };
-        let mut shared = [T::default(); MOST];
-        for (tie, of_corner) in ties.iter().zip(of_corners) {
-            for (sum, &part) in shared.iter_mut().zip(tie) {
-                sum.add(of_corner, f64::from(part));
-            }
-        }
-        shared
-    }
-
-    /// The matter's part along the normal.
-    fn weighted(&self, vector_of: impl Fn(usize) -> DVec3) -> f64 {
-        let nodes = self.nodes.iter().zip(self.answer.shares).take(self.count);
-        let sum: DVec3 = nodes.map(|(&node, share)| vector_of(node as usize) * share).sum();
-        sum.dot(self.answer.meets.normal)
-    }
-
-    /// The product of its stiffness with the vectors, for each of its nodes along the normal.
-    fn products(&self, vector_of: impl Fn(usize) -> DVec3) -> [f64; MOST] {
-        let mut products = [0.0; MOST];
-        for (place, &node) in self.nodes.iter().enumerate().take(self.count) {
-            let along = vector_of(node as usize).dot(self.answer.meets.normal);
-            for (product, row) in products.iter_mut().zip(&self.answer.stiffness) {
-                *product += row[place] * along;
-            }
-        }
-        products
-    }
-
-    fn share_out(&self, answer: &Answer, force: f64, add: &mut impl FnMut(usize, DVec3)) {
-        for (&node, share) in self.nodes.iter().zip(answer.shares).take(self.count) {
-            if share > 0.0 && force != 0.0 {
-                add(node as usize, answer.meets.normal * (force * share));
-            }
-        }
-    }
-}
-
-/// What corners share out to their nodes.
-trait Shared: Copy + Default {
-    fn add(&mut self, other: Self, part: f64);
-}
-
-impl Shared for f64 {
-    fn add(&mut self, other: Self, part: f64) {
-        *self += other * part;
-    }
-}
-
-impl Shared for [f64; MOST] {
-    fn add(&mut self, other: Self, part: f64) {
-        for (sum, other) in self.iter_mut().zip(other) {
-            *sum += other * part;
-        }
     }
 }

@@ -18,7 +18,7 @@ const FURTHER: f32 = 1.5;
 /// (the Illinois method; Dowell, Jarratt 1971), as the force is not linear. Where tissue presses too hard on a tool that stays where it is,
 /// which it may long after it was pressed, that part is below 0: the tool is pushed back the way it was to go.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Reach {
+pub(crate) struct PressSearch {
     /// The part of its way that the step in progress takes it, -1 to 1.
     pub part: f32,
     /// A part that it gets to, and by how much less than the limit it presses there, N; at first where it stands, as the last step left it.
@@ -29,14 +29,9 @@ pub(crate) struct Reach {
     high: Option<(f32, f32)>,
 }
 
-saved!(Reach {
-    part,
-    low,
-    is_known,
-    high
-});
+saved! { PressSearch { part, low, is_known, high } }
 
-impl Reach {
+impl PressSearch {
     /// For a tool that pressed with `force` in the last step and presses with `limit` at most.
     pub fn new(force: f32, limit: f32) -> Self {
         Self {

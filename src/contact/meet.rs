@@ -3,8 +3,8 @@
 use glam::Vec3;
 
 use super::constraint::Constraint;
-use super::contacts::{Meeting, Slice};
 use super::features::Feature;
+use super::meeting::{Meeting, Slice};
 use super::path::{Motion, Placement, Solid};
 use super::supports::{MOST, Supports};
 use super::sweep::{Corners, Segment, Separation};

@@ -1,9 +1,11 @@
 //! What instruments do to tissue, and tissue to them.
 
 mod beside_tissue;
+mod broad_phase;
 mod candidates;
 pub(crate) mod closest;
 mod constraint;
+mod contact_solver;
 mod contacts;
 mod cuboid;
 mod distance;
@@ -14,12 +16,15 @@ pub(crate) mod exact;
 mod features;
 mod gauge;
 mod grip;
+mod hold;
 mod holds;
 pub(crate) mod image_space;
 pub(crate) mod impulses;
 mod limit;
 mod meet;
+mod meeting;
 mod mesh_solid;
+mod narrow_phase;
 mod node_contacts;
 mod path;
 mod press;
@@ -35,11 +40,13 @@ pub(crate) mod sweep;
 #[cfg(test)]
 mod sweep_tests;
 mod tool;
+mod zone;
 
-pub(crate) use contacts::{Contacts, Meeting};
+pub(crate) use contacts::Contacts;
 pub(crate) use driven::DynamicTool;
 pub(crate) use holds::Holds;
 pub(crate) use limit::TRIES;
+pub(crate) use meeting::Meeting;
 pub(crate) use path::{Frame, ToolPath};
 pub use report::{Contact, ContactChange};
 pub use rigid::MassProperties;

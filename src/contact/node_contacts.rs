@@ -6,11 +6,11 @@
 use glam::{BVec3, Vec3};
 
 use super::candidates::NearestPlane;
-use super::contacts::{Meeting, Slice};
 use super::distance::closest_on_segment;
 use super::features::Feature;
 use super::impulses::{Effort, LEVERAGE, Sweep, pushed_out, relax};
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded, mesh_geometry, round_geometry};
+use super::meeting::{Meeting, Slice};
 use super::path::{Motion, Solid};
 use super::sweep::{Corners, FLAT, Segment, Separation, TOUCHING};
 use crate::base::{Result, memory};
@@ -212,24 +212,10 @@ pub(super) struct NodeContact {
     pub counted: Vec3,
 }
 
-saved!(NodeContact {
-    node,
-    tool,
-    start,
-    normal,
-    surface_velocity,
-    arm,
-    depth,
-    friction,
-    least_speed,
-    answer,
-    effective_mass,
-    free_mass,
-    give,
-    impulse,
-    friction_impulse,
-    counted
-});
+saved! { NodeContact {
+    node, tool, start, normal, surface_velocity, arm, depth, friction, least_speed, answer, effective_mass, free_mass,
+    give, impulse, friction_impulse, counted,
+} }
 
 impl NodeContact {
     /// A contact that has given nothing yet; `None` where the node cannot move along the normal.
@@ -359,7 +345,7 @@ fn solve(contacts: &mut [NodeContact], velocities: &mut Vectors, sweeps: u32) {
 #[derive(Debug, Default)]
 pub(super) struct NodeContacts(Vec<NodeContact>);
 
-saved!(NodeContacts { 0 });
+saved! { NodeContacts { 0 } }
 
 impl NodeContacts {
     pub fn reserve(&mut self, count: usize) -> Result<()> {

@@ -45,7 +45,7 @@ pub(super) struct Placement {
     pub orientation: Quat,
 }
 
-saved!(Placement { centre, orientation });
+saved! { Placement { centre, orientation } }
 
 impl Placement {
     /// A point in the mesh's own frame.
@@ -264,7 +264,7 @@ impl ToolPath {
     }
 
     /// What it sweeps over the step; `None` for a plane, which has no end.
-    pub fn sweep(&self, origin: DVec3) -> Option<Sweep> {
+    pub fn sweep(&self, origin: DVec3) -> Option<ToolSweep> {
         let centres = Bounds::of([self.begun, 1.0].map(|end| self.centre_at(end, origin)).into_iter());
         let (bounds, reach, thickness) = match &self.form {
             Form::HalfSpace => return None,
@@ -280,7 +280,7 @@ impl ToolPath {
                 (Bounds::of(corners).extended(height), solid.reach(), solid.thickness())
             }
         };
-        Some(Sweep {
+        Some(ToolSweep {
             bounds: bounds.extended(self.strays),
             travel: self.start.position.distance(self.end.position) + self.turn.length() * reach + self.strays,
             thickness,
@@ -311,7 +311,7 @@ impl ToolPath {
 
 /// What a tool sweeps over a step.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sweep {
+pub(crate) struct ToolSweep {
     /// A box about all of it.
     pub bounds: Bounds,
     /// The furthest that any point of its axis or its mesh goes, m.

@@ -5,7 +5,7 @@
 use glam::{Vec3, Vec3A};
 
 use super::constraint::Constraint;
-use super::driven::Yielding;
+use super::driven::YieldingTool;
 use super::impulses::{Effort, Sweep, relax};
 use super::supports::MOST;
 use crate::base::{Result, memory};
@@ -42,28 +42,15 @@ pub(super) struct Press {
     pub friction_impulse: Vec3A,
 }
 
-saved!(Press {
-    yielding,
-    arm,
-    is_backed,
-    places,
-    shares,
-    answers,
-    normal,
-    surface_velocity,
-    least_speed,
-    friction,
-    effective_mass,
-    free_mass,
-    give,
-    impulse,
-    friction_impulse
-});
+saved! { Press {
+    yielding, arm, is_backed, places, shares, answers, normal, surface_velocity, least_speed, friction, effective_mass,
+    free_mass, give, impulse, friction_impulse,
+} }
 
 impl Press {
     /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.
     #[inline]
-    fn solve(&mut self, velocities: &mut [Vec3A], yielding: &mut [Yielding]) -> f32 {
+    fn solve(&mut self, velocities: &mut [Vec3A], yielding: &mut [YieldingTool]) -> f32 {
         let places = self.places.map(|place| place as usize);
         let mut velocity = velocities[places[0]] * self.shares[0];
         for index in 1..MOST {
@@ -98,7 +85,7 @@ impl Press {
     }
 
     /// The same for nodes that are held from behind: what goes against that is taken there.
-    fn solve_backed(&mut self, velocities: &mut [Vec3A], yielding: &mut [Yielding], backs: &mut [Back]) -> f32 {
+    fn solve_backed(&mut self, velocities: &mut [Vec3A], yielding: &mut [YieldingTool], backs: &mut [Back]) -> f32 {
         let places = self.places.map(|place| place as usize);
         let before = places.map(|place| velocities[place]);
         let change = self.solve(velocities, yielding);
@@ -137,12 +124,12 @@ pub(super) struct Presses {
     nodes: Vec<u32>,
     velocities: Vec<Vec3A>,
     /// Dynamic tools; empty where there are none.
-    pub yielding: Vec<Yielding>,
+    pub yielding: Vec<YieldingTool>,
     /// What holds each node against a dynamic tool.
     backs: Vec<Back>,
 }
 
-saved!(Presses { presses, nodes, velocities } leaves { yielding: Vec::new(), backs: Vec::new() });
+saved! { Presses { presses, nodes, velocities } leaves { yielding: Vec::new(), backs: Vec::new() } }
 
 /// A tool that is led and presses a node: it takes what a dynamic tool gives the node against it.
 #[derive(Clone, Copy, Debug)]
@@ -305,7 +292,7 @@ impl Presses {
 }
 
 /// Gives the impulse of one contact as if there were no others.
-pub(super) fn solve_alone(constraint: &mut Constraint, velocities: &mut Vectors, yielding: &mut [Yielding]) {
+pub(super) fn solve_alone(constraint: &mut Constraint, velocities: &mut Vectors, yielding: &mut [YieldingTool]) {
     let mut own = [Vec3A::ZERO; MOST];
     for (velocity, &node) in own.iter_mut().zip(constraint.nodes()) {
         *velocity = velocities.get(node as usize).into();

@@ -16,7 +16,7 @@ use crate::simd::Loops;
 /// Nodes side by side.
 const LANES: usize = 16;
 
-type Lanes = [f32; LANES];
+type Sixteen = [f32; LANES];
 
 /// The nodes and the tool.
 pub(super) struct PressNodes<'a> {
@@ -57,21 +57,21 @@ pub(super) enum PressingSolid<'a> {
 }
 
 /// How sixteen nodes meet the tool.
-struct Met {
+struct MetLanes {
     /// m; below 0 inside.
-    gap: Lanes,
+    gap: Sixteen,
     /// Away from the tool, of unit length.
-    normal: [Lanes; 3],
+    normal: [Sixteen; 3],
     /// Of the tool, m/s.
-    surface_velocity: [Lanes; 3],
+    surface_velocity: [Sixteen; 3],
     /// From the tool's position, m.
-    arm: [Lanes; 3],
+    arm: [Sixteen; 3],
     /// Which of them may be pressed.
     touches: [bool; LANES],
 }
 
 /// What all of them gave to the tool, and the box of the velocities that it gave.
-pub(super) struct Pressed {
+pub(super) struct PressedNodes {
     /// N s
     pub impulse: DVec3,
     /// N m s, about the tool's position.
@@ -81,7 +81,7 @@ pub(super) struct Pressed {
 
 /// A value for each lane.
 #[inline(always)]
-fn each(value: impl Fn(usize) -> f32) -> Lanes {
+fn each(value: impl Fn(usize) -> f32) -> Sixteen {
     let mut lanes = [0.0; LANES];
     for (lane, to) in lanes.iter_mut().enumerate() {
         *to = value(lane);
@@ -90,12 +90,12 @@ fn each(value: impl Fn(usize) -> f32) -> Lanes {
 }
 
 #[inline(always)]
-fn dot(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
+fn dot(a: &[Sixteen; 3], b: &[Sixteen; 3]) -> Sixteen {
     each(|lane| a[0][lane] * b[0][lane] + a[1][lane] * b[1][lane] + a[2][lane] * b[2][lane])
 }
 
 #[inline(always)]
-fn vectors(of: impl Fn(usize, usize) -> f32) -> [Lanes; 3] {
+fn vectors(of: impl Fn(usize, usize) -> f32) -> [Sixteen; 3] {
     [
         each(|lane| of(0, lane)),
         each(|lane| of(1, lane)),
@@ -105,7 +105,7 @@ fn vectors(of: impl Fn(usize, usize) -> f32) -> [Lanes; 3] {
 
 /// The vectors of these nodes; those of a run lie side by side.
 #[inline(always)]
-fn gathered(from: [&[f32]; 3], nodes: &[usize; LANES]) -> [Lanes; 3] {
+fn gathered(from: [&[f32]; 3], nodes: &[usize; LANES]) -> [Sixteen; 3] {
     if is_run(nodes) {
         let first = nodes[0];
         let [x, y, z] = from.map(|axis| &axis[first..first + LANES]);
@@ -120,11 +120,11 @@ fn is_run(nodes: &[usize; LANES]) -> bool {
 }
 
 impl Loops for PressNodes<'_> {
-    type Output = Pressed;
+    type Output = PressedNodes;
 
     #[inline(always)]
-    fn run(mut self) -> Pressed {
-        let mut pressed = Pressed {
+    fn run(mut self) -> PressedNodes {
+        let mut pressed = PressedNodes {
             impulse: DVec3::ZERO,
             angular_impulse: DVec3::ZERO,
             velocities: Bounds::EMPTY,
@@ -138,7 +138,7 @@ impl Loops for PressNodes<'_> {
 
 impl PressNodes<'_> {
     #[inline(always)]
-    fn take(&mut self, first: usize, chunk: &[u32], pressed: &mut Pressed) {
+    fn take(&mut self, first: usize, chunk: &[u32], pressed: &mut PressedNodes) {
         let substep = self.substep;
         let part_out = pushed_out(substep);
         let mut nodes = [chunk[0] as usize; LANES];
@@ -162,7 +162,7 @@ impl PressNodes<'_> {
                 flat,
             ),
         };
-        let Some(Met {
+        let Some(MetLanes {
             gap,
             normal,
             surface_velocity,
@@ -212,8 +212,8 @@ impl PressNodes<'_> {
                 0.0
             }
         });
-        let sum = |lanes: &Lanes| lanes.iter().map(|&lane| f64::from(lane)).sum::<f64>();
-        let sums = |[x, y, z]: &[Lanes; 3]| DVec3::new(sum(x), sum(y), sum(z));
+        let sum = |lanes: &Sixteen| lanes.iter().map(|&lane| f64::from(lane)).sum::<f64>();
+        let sums = |[x, y, z]: &[Sixteen; 3]| DVec3::new(sum(x), sum(y), sum(z));
         pressed.impulse -= sums(&given);
         pressed.angular_impulse -= sums(&turned);
 
@@ -272,7 +272,7 @@ impl PressNodes<'_> {
 
     /// The change of velocity of each node for an impulse, 1/kg.
     #[inline(always)]
-    fn answers(&self, nodes: &[usize; LANES]) -> Lanes {
+    fn answers(&self, nodes: &[usize; LANES]) -> Sixteen {
         let inverse_masses = each(|lane| self.inverse_masses[nodes[lane]]);
         match self.damping {
             None => inverse_masses,
@@ -286,10 +286,10 @@ impl PressNodes<'_> {
     fn meet_round(
         &mut self,
         (chunk, nodes): (&[u32], &[usize; LANES]),
-        positions: &[Lanes; 3],
+        positions: &[Sixteen; 3],
         segment: &Segment,
         spin: Vec3,
-    ) -> Option<Met> {
+    ) -> Option<MetLanes> {
         let (radius, around) = (segment.radius, segment.radius + self.thickness);
         let [a, b] = segment.ends.map(|end| end.to_array());
         let [first, last] = segment.steps.map(|step| step.to_array());
@@ -331,7 +331,7 @@ impl PressNodes<'_> {
         let (spin, centre) = (spin.to_array(), self.centre.to_array());
         let surface = vectors(|k, lane| normal[k][lane] * radius);
         let per_substep = 1.0 / self.substep;
-        Some(Met {
+        Some(MetLanes {
             gap: each(|lane| distance[lane] - around),
             normal,
             surface_velocity: vectors(|k, lane| {
@@ -347,11 +347,11 @@ impl PressNodes<'_> {
     fn meet_planes(
         &mut self,
         (chunk, nodes): (&[u32], &[usize; LANES]),
-        positions: &[Lanes; 3],
+        positions: &[Sixteen; 3],
         (planes, slot): (&[NearestPlane], u32),
         [from, to]: [&Placement; 2],
         flat: f32,
-    ) -> Option<Met> {
+    ) -> Option<MetLanes> {
         let near = self.thickness + self.closing;
         let last = chunk.len() - 1;
         let plane = |lane: usize| &planes[lane.min(last)];
@@ -399,7 +399,7 @@ impl PressNodes<'_> {
         }
         let per_substep = 1.0 / self.substep;
         let position = self.centre.to_array();
-        Some(Met {
+        Some(MetLanes {
             gap: each(|lane| distance[lane] - self.thickness),
             normal,
             surface_velocity: vectors(|k, lane| step[k][lane] * per_substep),
@@ -415,7 +415,7 @@ fn columns(turn: Quat) -> [[f32; 3]; 3] {
 }
 
 #[inline(always)]
-fn turned(columns: &[[f32; 3]; 3], of: &[Lanes; 3]) -> [Lanes; 3] {
+fn turned(columns: &[[f32; 3]; 3], of: &[Sixteen; 3]) -> [Sixteen; 3] {
     let [x, y, z] = columns;
     vectors(|k, lane| x[k] * of[0][lane] + y[k] * of[1][lane] + z[k] * of[2][lane])
 }

@@ -46,10 +46,4 @@ pub(crate) struct Touch {
     pub force: Vec3,
 }
 
-saved!(Touch {
-    slot,
-    nodes,
-    weights,
-    normal,
-    force
-});
+saved! { Touch { slot, nodes, weights, normal, force } }

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 
-use super::contacts::Load;
+use super::contacts::ToolLoad;
 use super::tool::{Form, Pose};
 use crate::base::{Error, Result, StateHasher, above_zero};
 use crate::codec::saved;
@@ -42,11 +42,11 @@ pub(crate) struct RigidMass {
     inverse_inertia: DMat3,
 }
 
-saved!(RigidMass { mass, center, inertia, inverse_inertia } where RigidMass::is_sound);
+saved! { RigidMass { mass, center, inertia, inverse_inertia } where RigidMass::is_sound }
 
 /// Where a rigid tool is and how it moves.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RigidMotion {
+pub(crate) struct RigidState {
     /// The centre of mass, m.
     pub center: DVec3,
     pub orientation: DQuat,
@@ -56,36 +56,21 @@ pub(crate) struct RigidMotion {
     pub angular_momentum: DVec3,
 }
 
-saved!(RigidMotion {
-    center,
-    orientation,
-    velocity,
-    angular_momentum
-});
+saved! { RigidState { center, orientation, velocity, angular_momentum } }
 
 /// A tool that is a rigid body.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rigid {
     pub properties: MassProperties,
     pub mass: RigidMass,
-    pub motion: RigidMotion,
+    pub motion: RigidState,
     /// What the caller applies in the next step: at the centre of mass, N, and about it, N m.
     pub force: DVec3,
     pub torque: DVec3,
 }
 
-saved!(MassProperties {
-    mass,
-    center_of_mass,
-    inertia
-});
-saved!(Rigid {
-    properties,
-    mass,
-    motion,
-    force,
-    torque
-});
+saved! { MassProperties { mass, center_of_mass, inertia } }
+saved! { Rigid { properties, mass, motion, force, torque } }
 
 impl MassProperties {
     /// Of a shape that is filled evenly, kg/m³ (Eberly, Polyhedral Mass Properties, 2002, for meshes); refused where it has no end.
@@ -241,7 +226,7 @@ impl RigidMass {
     }
 }
 
-impl RigidMotion {
+impl RigidState {
     /// Where the tool is.
     pub fn pose(&self, mass: &RigidMass) -> Pose {
         Pose {
@@ -293,7 +278,7 @@ impl RigidMotion {
     }
 
     /// Takes an impulse, given with its moment about the tool's position.
-    pub fn take(&mut self, mass: &RigidMass, load: &Load) {
+    pub fn take(&mut self, mass: &RigidMass, load: &ToolLoad) {
         let arm = self.orientation * mass.center;
         self.velocity += load.impulse / mass.mass;
         self.angular_momentum += load.angular_impulse - arm.cross(load.impulse);
@@ -314,7 +299,7 @@ impl Rigid {
         let mut rigid = Self {
             properties: *properties,
             mass,
-            motion: RigidMotion {
+            motion: RigidState {
                 center: DVec3::ZERO,
                 orientation: DQuat::IDENTITY,
                 velocity: DVec3::ZERO,
@@ -348,7 +333,7 @@ impl Rigid {
     }
 
     /// A step has moved it so. Where that leads beyond all bounds it stops instead.
-    pub fn arrive(&mut self, motion: RigidMotion) {
+    pub fn arrive(&mut self, motion: RigidState) {
         (self.force, self.torque) = (DVec3::ZERO, DVec3::ZERO);
         let reaches = motion.position(&self.mass).abs().max_element() <= f64::from(FURTHEST);
         if motion.is_finite() && reaches {

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::contacts::{Meeting, Slice};
 use super::distance::closest_on_segment;
+use super::meeting::{Meeting, Slice};
 use super::path::{Motion, Solid};
 use super::sweep::{Segment, TOUCHING};
 use crate::geometry::Bounds;

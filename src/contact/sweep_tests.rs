@@ -169,7 +169,7 @@ const PARTS: i64 = 4;
 const REACH: usize = 1 << 10;
 
 /// Points on straight ways through whole numbers, with all the ways in which such queries degenerate.
-struct Source {
+struct Degenerate {
     random: Random,
     /// All lie in one plane.
     is_flat: bool,
@@ -177,7 +177,7 @@ struct Source {
     time: i64,
 }
 
-impl Source {
+impl Degenerate {
     fn new(random: &mut Random) -> Self {
         Self {
             is_flat: random.below(4) == 0,
@@ -278,7 +278,7 @@ impl Source {
 fn touching(is_face: bool) -> Vec<Query> {
     let mut random = Random(11);
     let mut query = |_| {
-        let mut source = Source::new(&mut random);
+        let mut source = Degenerate::new(&mut random);
         let ways = if is_face {
             source.node_on_face()
         } else {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 
 use super::cuboid;
-use super::limit::Reach;
+use super::limit::PressSearch;
 use super::mesh_solid::MeshSolid;
 use super::rigid::Rigid;
 use super::rounded;
@@ -55,7 +55,7 @@ pub struct Pose {
     pub orientation: Quat,
 }
 
-saved!(Pose { position, orientation });
+saved! { Pose { position, orientation } }
 
 impl Pose {
     /// At the origin, not turned.
@@ -170,7 +170,7 @@ pub(crate) struct Tool {
     /// Where the last step was to move it.
     pub led_to: Pose,
     /// How much of that way the step in progress takes, where it has a limit of force.
-    pub reach: Option<Reach>,
+    pub reach: Option<PressSearch>,
     /// Mean force on it over the last step, N.
     pub force: Vec3,
     /// Mean torque about its position over the last step, N m.
@@ -181,19 +181,9 @@ pub(crate) struct Tool {
     pub user_data: usize,
 }
 
-saved!(Tool {
-    form,
-    friction,
-    force_limit,
-    filter,
-    pose,
-    target,
-    led_to,
-    reach,
-    force,
-    torque,
-    rigid
-} leaves { user_data: 0 });
+saved! { Tool {
+    form, friction, force_limit, filter, pose, target, led_to, reach, force, torque, rigid,
+} leaves { user_data: 0 } }
 
 /// A longer capsule, as a part of its radius, has no caps among triangles with corners in `f32`.
 const SLENDEREST: f32 = 1e4;
@@ -312,7 +302,7 @@ impl Tool {
     pub fn set_out(&mut self) {
         let goes = self.target.is_some_and(|target| target != self.pose);
         let is_limited = self.force_limit < f32::INFINITY && goes;
-        self.reach = is_limited.then(|| Reach::new(self.force.length(), self.force_limit));
+        self.reach = is_limited.then(|| PressSearch::new(self.force.length(), self.force_limit));
     }
 
     /// Adds the bits that the next step depends on.

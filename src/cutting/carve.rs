@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::crossing::{End, meet};
+use super::crossing::{SegmentEnd, meet};
 use super::cut::Cut;
 use super::divided::NONE;
 use super::surface::SurfaceTriangle;
@@ -39,7 +39,7 @@ struct Pierced {
 }
 
 #[derive(Clone, Copy)]
-enum Place {
+enum CrossingPlace {
     Crossed(Edge),
     Pierced(usize),
 }
@@ -62,10 +62,10 @@ impl Cut<'_> {
             let Some(ends) = meet(swept, places, corners) else {
                 continue;
             };
-            let mut segment = [Place::Pierced(0); 2];
+            let mut segment = [CrossingPlace::Pierced(0); 2];
             for (place, end) in segment.iter_mut().zip(ends) {
                 *place = match end {
-                    End::Side(side, along) => {
+                    SegmentEnd::Side(side, along) => {
                         let edge = self.edge(triangle, side);
                         memory::push(
                             &mut crossed,
@@ -75,9 +75,9 @@ impl Cut<'_> {
                                 vertex: NONE,
                             },
                         )?;
-                        Place::Crossed(edge)
+                        CrossingPlace::Crossed(edge)
                     }
-                    End::Inside(side, weights) => {
+                    SegmentEnd::Inside(side, weights) => {
                         let weights = self.weights_in_cell(triangle, weights);
                         let place = self
                             .surface
@@ -92,7 +92,7 @@ impl Cut<'_> {
                                 vertex: NONE,
                             },
                         )?;
-                        Place::Pierced(pierced.len() - 1)
+                        CrossingPlace::Pierced(pierced.len() - 1)
                     }
                 };
             }
@@ -119,10 +119,10 @@ impl Cut<'_> {
         }
         for segment in segments {
             let [from, to] = segment.map(|place| match place {
-                Place::Crossed(edge) => crossed
+                CrossingPlace::Crossed(edge) => crossed
                     .binary_search_by_key(&edge, |crossed| crossed.edge)
                     .map_or(NONE, |at| crossed[at].vertex),
-                Place::Pierced(at) => pierced[at].vertex,
+                CrossingPlace::Pierced(at) => pierced[at].vertex,
             });
             self.connect(from, to)?;
         }

@@ -9,7 +9,7 @@ use crate::base::symbolic_perturbation::{is_above, triple};
 
 /// An end of the segment in which two triangles meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum End {
+pub(crate) enum SegmentEnd {
     /// On the drawn triangle's side from this corner to the next: how far from the vertex of the lower number to the other.
     Side(usize, f64),
     /// Inside the drawn triangle, by weights of its corners, where the swept triangle's side from this corner to the next passes through.
@@ -18,7 +18,7 @@ pub(crate) enum End {
 
 /// The ends of the segment in which a swept triangle meets a drawn one with the given corners and their numbers; differences of places have to be
 /// exact.
-pub(crate) fn meet(swept: [DVec3; 3], corners: [DVec3; 3], numbers: [u32; 3]) -> Option<[End; 2]> {
+pub(crate) fn meet(swept: [DVec3; 3], corners: [DVec3; 3], numbers: [u32; 3]) -> Option<[SegmentEnd; 2]> {
     let sides = [1, 2].map(|k| swept[k] - swept[0]);
     let swept_normal = sides[0].cross(sides[1]);
     let heights = corners.map(|corner| triple(corner - swept[0], sides[0], sides[1]));
@@ -59,7 +59,7 @@ pub(crate) fn meet(swept: [DVec3; 3], corners: [DVec3; 3], numbers: [u32; 3]) ->
             let (low, high) = if numbers[a] < numbers[b] { (a, b) } else { (b, a) };
             let whole = heights[low] - heights[high];
             let along = if whole == 0.0 { 0.5 } else { heights[low] / whole };
-            found(End::Side(i, along.clamp(0.0, 1.0)));
+            found(SegmentEnd::Side(i, along.clamp(0.0, 1.0)));
         }
     }
     for j in 0..3 {
@@ -71,7 +71,7 @@ pub(crate) fn meet(swept: [DVec3; 3], corners: [DVec3; 3], numbers: [u32; 3]) ->
             } else {
                 [1.0 / 3.0; 3]
             };
-            found(End::Inside(j, weights));
+            found(SegmentEnd::Inside(j, weights));
         }
     }
     match (count, ends) {

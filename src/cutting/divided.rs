@@ -20,7 +20,7 @@ pub(crate) struct Node {
     pub(crate) first: u32,
 }
 
-saved!(Node { rest, first });
+saved! { Node { rest, first } }
 
 impl Node {
     /// A point that is bound to others.

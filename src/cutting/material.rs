@@ -325,10 +325,4 @@ pub(crate) struct CutEnd {
     pub size: f64,
 }
 
-saved!(CutEnd {
-    vertex,
-    nodes,
-    weights,
-    slack,
-    size
-});
+saved! { CutEnd { vertex, nodes, weights, slack, size } }

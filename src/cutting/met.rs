@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::crossing::{End, meet};
+use super::crossing::{SegmentEnd, meet};
 use super::cut::Sweep;
 use super::divided::SNAP;
 use super::surface::{CutSurface, SurfaceTriangle};
@@ -29,16 +29,7 @@ pub(crate) struct Met {
     pub is_area: bool,
 }
 
-saved!(Met {
-    item,
-    times,
-    weights,
-    places,
-    amount,
-    profile,
-    size,
-    is_area
-});
+saved! { Met { item, times, weights, places, amount, profile, size, is_area } }
 
 impl Met {
     /// How much is cut over the length of that edge, m; of solids over its square, m².
@@ -102,10 +93,10 @@ impl CutSurface {
 }
 
 /// Weights of the corners, with these numbers, in the end of a segment.
-fn weights_of(end: End, numbers: [u32; 3]) -> [f64; 3] {
+fn weights_of(end: SegmentEnd, numbers: [u32; 3]) -> [f64; 3] {
     match end {
-        End::Inside(_, weights) => weights,
-        End::Side(side, along) => {
+        SegmentEnd::Inside(_, weights) => weights,
+        SegmentEnd::Side(side, along) => {
             let (mut low, mut high) = (side, (side + 1) % 3);
             if numbers[low] > numbers[high] {
                 (low, high) = (high, low);

@@ -39,6 +39,6 @@ pub(crate) use divided::{Divided, weighed};
 pub(crate) use material::{CutEnd, CutMaterial};
 pub(crate) use met::Met;
 pub(crate) use solid::SolidStroke;
-pub use solid::{CutSolid, SolidCell, SolidTriangle, SolidVertex, Tetrahedron};
+pub use solid::{CutSolid, SolidCell, SolidTetrahedron, SolidTriangle, SolidVertex};
 pub use surface::{CutSurface, SurfaceCell, SurfaceTriangle, SurfaceVertex};
-pub(crate) use tear::Load;
+pub(crate) use tear::VertexLoad;

@@ -23,13 +23,7 @@ pub struct SurfaceCell {
     pub(crate) next: [u32; 3],
 }
 
-saved!(SurfaceCell {
-    nodes,
-    area,
-    snap,
-    first,
-    next
-});
+saved! { SurfaceCell { nodes, area, snap, first, next } }
 
 /// A triangle that is drawn and touched.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,13 +40,7 @@ pub struct SurfaceTriangle {
     pub(crate) next: u32,
 }
 
-saved!(SurfaceTriangle {
-    corners,
-    cell,
-    rim,
-    neighbours,
-    next
-});
+saved! { SurfaceTriangle { corners, cell, rim, neighbours, next } }
 
 /// A corner of what is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,12 +55,7 @@ pub struct SurfaceVertex {
     pub(crate) around: u32,
 }
 
-saved!(SurfaceVertex {
-    nodes,
-    weights,
-    point,
-    around
-});
+saved! { SurfaceVertex { nodes, weights, point, around } }
 
 /// A surface that can be cut.
 #[derive(Clone, Debug)]
@@ -83,12 +66,7 @@ pub struct CutSurface {
     pub(crate) vertices: Tracked<SurfaceVertex>,
 }
 
-saved!(CutSurface {
-    nodes,
-    cells,
-    triangles,
-    vertices
-});
+saved! { CutSurface { nodes, cells, triangles, vertices } }
 
 divided!(CutSurface, 3, SurfaceCell { area }, triangles, {
     const EDGES: &'static [[usize; 2]] = &[[0, 1], [1, 2], [2, 0]];

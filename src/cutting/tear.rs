@@ -18,7 +18,7 @@ const MOST_TRIANGLES: usize = 64;
 
 /// What pulls a vertex apart.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Load {
+pub(crate) struct VertexLoad {
     /// N, above 0.
     pub tension: f64,
     /// Across the pull in the surface, 1 long: where a tear goes, or the opposite.
@@ -127,7 +127,7 @@ impl CutSurface {
     }
 
     /// What a tensor of forces, N, does to a vertex in the surface as it is now: its larger principal value there; `None`: nothing pulls it apart.
-    pub(crate) fn load_at(&self, vertex: u32, forces: DMat3, positions: &[Vec3]) -> Result<Option<Load>> {
+    pub(crate) fn load_at(&self, vertex: u32, forces: DMat3, positions: &[Vec3]) -> Result<Option<VertexLoad>> {
         let mut ring = memory::reserved(8)?;
         self.ring(vertex, &mut ring)?;
         let place = |vertex: u32| self.place(vertex, positions).as_dvec3();
@@ -151,11 +151,11 @@ impl CutSurface {
             x * b + y * (tension - a)
         };
         let along = normal.cross(pull.try_normalize().unwrap_or(x));
-        Ok((tension > 0.0).then_some(Load { tension, along, normal }))
+        Ok((tension > 0.0).then_some(VertexLoad { tension, along, normal }))
     }
 
     /// The tear through a vertex that a load pulls apart: of the end of a cut ahead, from elsewhere both ways; `None`: there is nothing.
-    pub(crate) fn tear(&self, vertex: u32, load: &Load, positions: &[Vec3]) -> Result<Option<Tear>> {
+    pub(crate) fn tear(&self, vertex: u32, load: &VertexLoad, positions: &[Vec3]) -> Result<Option<Tear>> {
         let from = self.place(vertex, positions).as_dvec3();
         let mut triangles = memory::reserved(16)?;
         let behind = self.behind(vertex, &mut Vec::new())?;

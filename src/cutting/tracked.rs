@@ -14,7 +14,7 @@ pub(crate) struct Tracked<T> {
     count_before: u32,
 }
 
-saved!([T: Saved] Tracked<T> { values, before, count_before });
+saved! { [T: Saved] Tracked<T> { values, before, count_before } }
 
 impl<T: Copy> Tracked<T> {
     pub(crate) fn new(values: Vec<T>) -> Self {

@@ -11,7 +11,7 @@ pub struct SurfacePoint {
     pub weights: [f32; 3],
 }
 
-saved!(SurfacePoint { triangle, weights });
+saved! { SurfacePoint { triangle, weights } }
 
 /// Where a body is attached to a body.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -30,12 +30,7 @@ pub struct SolverChoice {
     pub step: f32,
 }
 
-saved!(SolverChoice {
-    solver,
-    reason,
-    substeps,
-    step
-});
+saved! { SolverChoice { solver, reason, substeps, step } }
 
 impl SolverChoice {
     /// The definition names it.

@@ -27,7 +27,7 @@ pub struct CollisionFilter {
     pub mask: u32,
 }
 
-saved!(CollisionFilter { category, mask });
+saved! { CollisionFilter { category, mask } }
 
 impl Default for CollisionFilter {
     fn default() -> Self {
@@ -85,15 +85,7 @@ pub struct BodyContact {
     pub filter: CollisionFilter,
 }
 
-saved!(BodyContact {
-    thickness,
-    friction,
-    with_bodies,
-    with_itself,
-    detection,
-    resolution,
-    filter
-});
+saved! { BodyContact { thickness, friction, with_bodies, with_itself, detection, resolution, filter } }
 
 impl Default for BodyContact {
     fn default() -> Self {

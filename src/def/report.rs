@@ -47,13 +47,7 @@ pub struct SolverReport {
     pub converged: bool,
 }
 
-saved!(SolverReport {
-    iterations,
-    error,
-    added_mass,
-    solves,
-    converged
-});
+saved! { SolverReport { iterations, error, added_mass, solves, converged } }
 
 impl SolverReport {
     /// Before anything was solved.

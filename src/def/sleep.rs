@@ -12,7 +12,7 @@ pub struct Sleep {
     pub time: f32,
 }
 
-saved!(Sleep { speed, time });
+saved! { Sleep { speed, time } }
 
 /// What of a body can be set after it was made.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -27,12 +27,7 @@ pub struct Tearing {
     pub smallest_piece: f32,
 }
 
-saved!(Tearing {
-    strain,
-    force,
-    most_per_step,
-    smallest_piece
-});
+saved! { Tearing { strain, force, most_per_step, smallest_piece } }
 
 /// What tore in the last step, and what did not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,13 +45,7 @@ pub struct TearReport {
     pub no_room: u32,
 }
 
-saved!(TearReport {
-    tears,
-    pieces_parted,
-    waiting,
-    small_pieces,
-    no_room
-});
+saved! { TearReport { tears, pieces_parted, waiting, small_pieces, no_room } }
 
 /// Why a spring beyond its limits was not torn. It is not tried again before the topology changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -22,10 +22,7 @@ pub struct Viscosity {
     pub relaxation_time: f32,
 }
 
-saved!(Viscosity {
-    retardation_time,
-    relaxation_time
-});
+saved! { Viscosity { retardation_time, relaxation_time } }
 
 /// The range of times, s: shorter than any step, and longer than anybody looks on.
 const SHORTEST: f32 = 1e-9;
@@ -41,7 +38,7 @@ pub(crate) struct RelaxationStep {
     pub yields: bool,
 }
 
-saved!(RelaxationStep { decay, gain, yields });
+saved! { RelaxationStep { decay, gain, yields } }
 
 impl RelaxationStep {
     /// None: arms hold what they held.
@@ -143,7 +140,7 @@ pub(crate) struct Carried {
     pub damping: f32,
 }
 
-saved!(Carried { stiffness, damping });
+saved! { Carried { stiffness, damping } }
 
 impl Carried {
     /// Adds what forces give with this stiffness, N/m, that have such an arm beside them.

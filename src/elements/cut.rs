@@ -6,7 +6,7 @@
 use glam::{DMat3, DVec3};
 
 use super::parts::{Copy, FemPart, in_group};
-use super::tetrahedra::{GROUP, Group, Groups};
+use super::tetrahedra::{GROUP, Group, TetrahedronGroups};
 use super::{Deformed, Elements, Load, Rest, Sums};
 use crate::base::{Result, memory};
 use crate::codec::saved;
@@ -22,26 +22,26 @@ const NODES: usize = 4 * LATER;
 
 /// Where a tetrahedron is.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct TetrahedronPlace {
     pub part: u32,
     pub group: u16,
     pub lane: u16,
 }
 
-saved!(Place { part, group, lane });
+saved! { TetrahedronPlace { part, group, lane } }
 
 /// What bodies that may be cut know of their tetrahedra.
 #[derive(Debug)]
 pub(super) struct Cells {
     /// Where each is, in the order in which they were given, and then that of cuts.
-    places: Vec<Place>,
+    places: Vec<TetrahedronPlace>,
     /// How many are in the last part that came later.
     used: usize,
     /// Parts that are to come.
     spare: Vec<FemPart>,
 }
 
-saved!(Cells { places, used, spare });
+saved! { Cells { places, used, spare } }
 
 /// A piece of a tetrahedron, in the body's own numbers of nodes.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +54,7 @@ pub(crate) struct PieceOfElement {
     pub part: f32,
 }
 
-impl Place {
+impl TetrahedronPlace {
     pub const NONE: Self = Self {
         part: 0,
         group: 0,
@@ -77,7 +77,7 @@ struct Moved {
     nodes: [u32; 4],
     inverse: [f32; 6],
     volume: f32,
-    from: Place,
+    from: TetrahedronPlace,
 }
 
 impl Elements {
@@ -124,7 +124,7 @@ impl Elements {
         let more = pieces.len().saturating_sub(LATER - cells.used).div_ceil(LATER);
         while cells.spare.len() < more {
             let part = FemPart {
-                groups: Groups::new(memory::filled(Group::EMPTY, GROUPS)?, NODES),
+                groups: TetrahedronGroups::new(memory::filled(Group::EMPTY, GROUPS)?, NODES),
                 nodes: memory::reserved(NODES)?,
                 is_later: true,
             };
@@ -260,7 +260,7 @@ impl Elements {
     }
 
     /// The nodes of a tetrahedron, what it is like at rest, and where it is; `None` where it is none any more.
-    pub(super) fn cell(&self, cell: u32) -> Option<([u32; 4], Rest, Place)> {
+    pub(super) fn cell(&self, cell: u32) -> Option<([u32; 4], Rest, TetrahedronPlace)> {
         let place = *self.cells.as_ref()?.places.get(cell as usize)?;
         let part = &self.parts[place.part as usize];
         let [group, lane] = place.in_part();
@@ -273,7 +273,7 @@ impl Elements {
         let from = self
             .cells
             .as_ref()
-            .map_or(Place::NONE, |cells| cells.places[piece.source as usize]);
+            .map_or(TetrahedronPlace::NONE, |cells| cells.places[piece.source as usize]);
         let [group, lane] = from.in_part();
         let group = &self.parts[from.part as usize].groups.as_slice()[group];
         Moved {
@@ -285,7 +285,7 @@ impl Elements {
     }
 
     /// Puts a tetrahedron into the last part that came later, or the next: where it is then.
-    fn put(&mut self, moved: Moved, beside: &mut Option<&mut Sums>) -> Place {
+    fn put(&mut self, moved: Moved, beside: &mut Option<&mut Sums>) -> TetrahedronPlace {
         let Some(cells) = &mut self.cells else {
             return moved.from;
         };
@@ -322,7 +322,7 @@ impl Elements {
             2 * number as u16
         });
         part.groups.put([group, lane], corners, moved.inverse, moved.volume);
-        let place = Place {
+        let place = TetrahedronPlace {
             part: last as u32,
             group: group as u16,
             lane: lane as u16,

@@ -5,7 +5,7 @@ use crate::codec::saved;
 use crate::def::ElementLaw;
 use glam::{DMat3, DVec3};
 
-use super::laws::{Columns, Hyperelastic, Strained, product_of, with_hyperelastic};
+use super::laws::{Hyperelastic, MatrixColumns, Strained, product_of, with_hyperelastic};
 
 /// St Venant and Kirchhoff's law with a signed volume term, Pa: the energy of a tetrahedron is
 /// `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)`; or one of [`super::laws`] with mu, beside all of lambda as kappa.
@@ -25,13 +25,7 @@ pub(crate) struct Law {
     pub form: ElementLaw,
 }
 
-saved!(Law {
-    lambda,
-    mu,
-    kappa,
-    rings,
-    form
-});
+saved! { Law { lambda, mu, kappa, rings, form } }
 
 /// Poisson's ratio from which volume is kept by rings.
 const RINGS_FROM: f32 = 0.4;
@@ -117,7 +111,7 @@ pub(crate) struct Load {
     pub pressure: f64,
 }
 
-saved!(Load { stress, pressure });
+saved! { Load { stress, pressure } }
 
 impl Load {
     pub const NONE: Self = Self {
@@ -143,7 +137,7 @@ pub(crate) struct Rest {
     pub volume: f64,
 }
 
-saved!(Rest { inverse, volume });
+saved! { Rest { inverse, volume } }
 
 impl Rest {
     /// With these edges from its first corner to the others, m, in any order of hands. One without a volume has an inverse that is not
@@ -317,7 +311,7 @@ impl Deformed {
         [of_strain, of_volume, of_load, growth].map(|change| self.volume * change)
     }
 
-    /// How many times as stiff as at rest it is at most, where its volume is kept by this pressure: what `Groups::forces` bounds frequencies
+    /// How many times as stiff as at rest it is at most, where its volume is kept by this pressure: what `TetrahedronGroups::forces` bounds frequencies
     /// with, one at a time.
     pub fn stiffening(&self, law: Law, pressure: f64) -> f64 {
         let [lambda, mu, kappa] = [law.lambda, law.mu, law.kappa].map(f64::from);
@@ -421,11 +415,11 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
-fn columns(matrix: &DMat3) -> Columns<f64> {
+fn columns(matrix: &DMat3) -> MatrixColumns<f64> {
     matrix.to_cols_array_2d()
 }
 
-fn matrix(columns: Columns<f64>) -> DMat3 {
+fn matrix(columns: MatrixColumns<f64>) -> DMat3 {
     DMat3::from_cols_array_2d(&columns)
 }
 

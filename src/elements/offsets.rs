@@ -42,13 +42,7 @@ pub(super) struct Offsets {
     are_released: bool,
 }
 
-saved!(Offsets {
-    of_nodes,
-    nodes,
-    taken,
-    waited,
-    are_released
-});
+saved! { Offsets { of_nodes, nodes, taken, waited, are_released } }
 
 impl Offsets {
     /// Of each node, m³; nothing where there are none.

@@ -2,9 +2,9 @@
 
 use glam::{DMat3, DVec3};
 
-use super::cut::{PieceOfElement, Place};
+use super::cut::{PieceOfElement, TetrahedronPlace};
 use super::law::{Deformed, Law, Rest};
-use super::tetrahedra::{GROUP, Group, Groups};
+use super::tetrahedra::{GROUP, Group, TetrahedronGroups};
 use crate::base::{Error, Result, memory};
 use crate::codec::saved;
 use crate::simd::Record;
@@ -18,19 +18,15 @@ pub(super) const PART: usize = 4096;
 pub(super) struct FemPart {
     /// In order, but for a part that came later.
     pub nodes: Vec<u32>,
-    pub groups: Groups,
+    pub groups: TetrahedronGroups,
     /// Whether a cut has added it.
     pub is_later: bool,
 }
 
-saved!(FemPart {
-    nodes,
-    groups,
-    is_later
-});
+saved! { FemPart { nodes, groups, is_later } }
 
 /// What is shown the nodes of a tetrahedron, the way it is at rest, and its group and lane.
-pub(super) type See<'a> = dyn FnMut([u32; 4], &Rest, [usize; 2]) + 'a;
+pub(super) type SeeNodes<'a> = dyn FnMut([u32; 4], &Rest, [usize; 2]) + 'a;
 
 /// Cuts tetrahedra into parts.
 pub(super) fn split(tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3) -> Result<Vec<FemPart>> {
@@ -43,13 +39,13 @@ pub(super) fn split(tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3) -> Res
 }
 
 /// Where each tetrahedron is in the parts.
-pub(super) fn places(tetrahedra: &[[u32; 4]]) -> Result<Vec<Place>> {
-    let mut places = memory::filled(Place::NONE, tetrahedra.len())?;
+pub(super) fn places(tetrahedra: &[[u32; 4]]) -> Result<Vec<TetrahedronPlace>> {
+    let mut places = memory::filled(TetrahedronPlace::NONE, tetrahedra.len())?;
     for (part, of_part) in (0..).zip(in_order(tetrahedra)?.chunks(PART)) {
         let group_count = of_part.len().div_ceil(GROUP);
         for (place, &index) in of_part.iter().enumerate() {
             let [group, lane] = in_group(place, group_count);
-            places[index as usize] = Place {
+            places[index as usize] = TetrahedronPlace {
                 part,
                 group: group as u16,
                 lane: lane as u16,
@@ -104,7 +100,7 @@ impl FemPart {
             group.volumes[lane] = volume;
         }
         Ok(Self {
-            groups: Groups::new(groups, nodes.len()),
+            groups: TetrahedronGroups::new(groups, nodes.len()),
             nodes,
             is_later: false,
         })
@@ -118,7 +114,7 @@ impl FemPart {
     }
 
     /// Shows the tetrahedra there are, and in which group and lane.
-    pub fn visit(&self, see: &mut See) {
+    pub fn visit(&self, see: &mut SeeNodes) {
         for (index, group) in self.groups.as_slice().iter().enumerate() {
             for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
                 let rest = self.rest_of(index, lane);
@@ -220,7 +216,7 @@ pub(super) struct Copy {
     pub place: u16,
 }
 
-saved!(Copy { at, place });
+saved! { Copy { at, place } }
 
 /// The copies of the nodes of each tile.
 #[derive(Debug)]
@@ -231,7 +227,7 @@ pub(super) struct Copies {
     later: Vec<Vec<Copy>>,
 }
 
-saved!(Copies { copies, starts, later });
+saved! { Copies { copies, starts, later } }
 
 impl Copies {
     pub fn new(parts: &[FemPart], node_count: usize) -> Result<Self> {

@@ -5,10 +5,10 @@
 //! two substeps. An implicit one has `a q - g S` as a load, and g times what is elastic on top of the latter, so that forces are those at
 //! the end of the step. Pressures of rings have arms of their own.
 
-use super::cut::Place;
+use super::cut::TetrahedronPlace;
 use super::law::{Law, Load};
 use super::parts::FemPart;
-use super::set::{Bounds, Set};
+use super::set::{PlasticSet, YieldBounds};
 use super::tetrahedra::{GROUP, Group, Stresses};
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{Saved, saved};
@@ -21,32 +21,25 @@ pub(super) struct Memory {
     /// g of the equation that is being solved; 0 where loads are the arms' stresses as they are.
     pub gain: f32,
     /// Where they yield.
-    pub bounds: Option<Bounds>,
+    pub bounds: Option<YieldBounds>,
     pub parts: Vec<OfPart>,
     /// Of parts that are to come.
     spare: Vec<OfPart>,
     pub rings: Past<f32>,
 }
 
-saved!(Memory {
-    viscosity,
-    gain,
-    bounds,
-    parts,
-    spare,
-    rings
-});
+saved! { Memory { viscosity, gain, bounds, parts, spare, rings } }
 
 /// What is remembered of the tetrahedra of a part.
 #[derive(Debug)]
 pub(super) struct OfPart {
     past: Past<Stresses>,
-    set: Option<Set>,
+    set: Option<PlasticSet>,
     /// Room for elastic stresses.
     pub newest: Vec<Stresses>,
 }
 
-saved!(OfPart { past, set, newest });
+saved! { OfPart { past, set, newest } }
 
 /// Stresses of the step in progress, and of the current state.
 #[derive(Debug)]
@@ -58,7 +51,7 @@ pub(super) struct Past<T> {
     kept_elastic: Vec<T>,
 }
 
-saved!([T: Saved] Past<T> { arms, elastic, loads, kept_arms, kept_elastic });
+saved! { [T: Saved] Past<T> { arms, elastic, loads, kept_arms, kept_elastic } }
 
 /// What has the numbers of some tetrahedra, or one.
 pub(super) trait Numbers: Copy {
@@ -173,7 +166,7 @@ impl OfPart {
 
     /// The newest elastic stresses are those now.
     /// They yield where there are bounds.
-    pub fn age(&mut self, kernel: ChosenKernel, course: RelaxationStep, bounds: Option<Bounds>) {
+    pub fn age(&mut self, kernel: ChosenKernel, course: RelaxationStep, bounds: Option<YieldBounds>) {
         self.past.age(course, &self.newest);
         if let (Some(set), Some(bounds)) = (&mut self.set, bounds) {
             set.flow(kernel, bounds, &self.newest);
@@ -182,7 +175,7 @@ impl OfPart {
     }
 
     /// Whether a tetrahedron would yield where this is elastic.
-    pub fn yields(&self, bounds: Bounds, place: [usize; 2], elastic: Load) -> bool {
+    pub fn yields(&self, bounds: YieldBounds, place: [usize; 2], elastic: Load) -> bool {
         self.set
             .as_ref()
             .is_some_and(|set| set.yields(bounds, place, elastic.stress))
@@ -191,7 +184,9 @@ impl OfPart {
     /// All that is remembered; nothing where it is not.
     fn fields_mut(&mut self) -> [&mut [Stresses]; 9] {
         let Self { past, set, newest } = self;
-        let [stresses, kept, loads] = set.as_mut().map_or([&mut [][..], &mut [], &mut []], Set::fields_mut);
+        let [stresses, kept, loads] = set
+            .as_mut()
+            .map_or([&mut [][..], &mut [], &mut []], PlasticSet::fields_mut);
         let Past {
             arms,
             elastic,
@@ -238,14 +233,14 @@ impl Memory {
             let count = part.groups.as_slice().len();
             of_parts.push(OfPart {
                 past: Past::new(if viscosity.is_none() { 0 } else { count })?,
-                set: if yields { Some(Set::new(count)?) } else { None },
+                set: if yields { Some(PlasticSet::new(count)?) } else { None },
                 newest: memory::filled(Stresses::ZERO, count)?,
             });
         }
         Ok(Some(memory::boxed(Self {
             viscosity,
             gain: 0.0,
-            bounds: yields.then(|| Bounds::new(law, yielding)),
+            bounds: yields.then(|| YieldBounds::new(law, yielding)),
             parts: of_parts,
             spare: Vec::new(),
             rings: Past::new(if viscosity.is_none() { 0 } else { ring_count })?,
@@ -259,7 +254,7 @@ impl Memory {
             let yields = self.bounds.is_some();
             let part = OfPart {
                 past: Past::new(if self.viscosity.is_none() { 0 } else { groups })?,
-                set: if yields { Some(Set::new(groups)?) } else { None },
+                set: if yields { Some(PlasticSet::new(groups)?) } else { None },
                 newest: memory::filled(Stresses::ZERO, groups)?,
             };
             memory::push(&mut self.spare, part)?;
@@ -273,7 +268,7 @@ impl Memory {
     }
 
     /// Gives a tetrahedron what another remembers.
-    pub fn copy(&mut self, from: Place, to: Place) {
+    pub fn copy(&mut self, from: TetrahedronPlace, to: TetrahedronPlace) {
         let read = self.parts[from.part as usize].fields_mut().map(|stresses| {
             let Stresses(numbers) = stresses.get(usize::from(from.group))?;
             Some(numbers.map(|lanes| lanes[usize::from(from.lane)]))
@@ -340,7 +335,7 @@ impl Memory {
         self.gain = 0.0;
         for part in &mut self.parts {
             part.past.recall();
-            part.set.iter_mut().for_each(Set::recall);
+            part.set.iter_mut().for_each(PlasticSet::recall);
             part.combine();
         }
         self.rings.recall();
@@ -350,7 +345,7 @@ impl Memory {
     pub fn keep(&mut self) {
         for part in &mut self.parts {
             part.past.keep();
-            part.set.iter_mut().for_each(Set::keep);
+            part.set.iter_mut().for_each(PlasticSet::keep);
         }
         self.rings.keep();
     }
@@ -417,7 +412,7 @@ impl Memory {
     /// What may change of it.
     pub fn hash(&self, hasher: &mut StateHasher) {
         for OfPart { past, set, .. } in &self.parts {
-            let left = set.iter().flat_map(Set::kept);
+            let left = set.iter().flat_map(PlasticSet::kept);
             for stresses in past.kept_arms.iter().chain(&past.kept_elastic).chain(left) {
                 hasher.write_floats(stresses.numbers());
             }

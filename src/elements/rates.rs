@@ -5,7 +5,7 @@
 //! `(tr H)² <= sum |g_a|² |u_a|² / p_a` and `|H|² <= gamma sum |g_a|² |u_a|² / p_a`, gamma the largest eigenvalue of `sum p_a n_a n_a^T`, n_a the
 //! direction of g_a: a third in an even tetrahedron, 1 in one that is flat. So a node carries `V c |g_a| sum |g_b|` of each element,
 //! `c = lambda + 2 mu gamma`. Where an element is deformed by R U, its form is that of the ways `U R^T u_a`, and with the cofactors of U for what
-//! keeps volume: `Groups::forces` has what c becomes of that, and of stress. What a node and its springs carry over its mass bounds the squares
+//! keeps volume: `TetrahedronGroups::forces` has what c becomes of that, and of stress. What a node and its springs carry over its mass bounds the squares
 //! of frequencies. No pinned corner goes any way: it is left out.
 //!
 //! Springs grow no stiffer with that, so a part P of their bound is the same for all elements: with E of a node's elements and S of its springs,

@@ -13,7 +13,7 @@ pub(super) struct Rings {
     pub volumes: Vec<f32>,
 }
 
-saved!(Rings { volumes });
+saved! { Rings { volumes } }
 
 /// The rings of all tetrahedra.
 pub(super) fn of(parts: &[FemPart], node_count: usize) -> Result<Rings> {
@@ -35,7 +35,7 @@ pub(super) struct Pressures {
     energies: Vec<f64>,
 }
 
-saved!(Pressures { of_nodes, energies });
+saved! { Pressures { of_nodes, energies } }
 
 impl Pressures {
     pub fn new(node_count: usize) -> Result<Self> {

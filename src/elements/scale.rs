@@ -13,9 +13,9 @@ use crate::base::{Error, Result};
 use crate::soa::{Region, Scale};
 
 /// Which nodes of a part are in a region: a bit each, of which tetrahedra have four at most.
-struct Inside([u64; 4 * PART / 64]);
+struct InsideBits([u64; 4 * PART / 64]);
 
-impl Inside {
+impl InsideBits {
     /// `None`: no node is.
     fn of(part: &FemPart, region: &Region) -> Option<Self> {
         let mut bits = [0; 4 * PART / 64];
@@ -71,7 +71,7 @@ impl Elements {
     /// Refuses to scale what would be no tetrahedron any more.
     pub fn check_scale(&self, region: &Region, scale: Scale) -> Result<()> {
         for part in &self.parts {
-            let Some(inside) = Inside::of(part, region) else {
+            let Some(inside) = InsideBits::of(part, region) else {
                 continue;
             };
             for group in part.groups.as_slice() {
@@ -97,7 +97,7 @@ impl Elements {
     pub fn scale(&mut self, region: &Region, scale: Scale) -> usize {
         let mut count = 0;
         for part in &mut self.parts {
-            let Some(inside) = Inside::of(part, region) else {
+            let Some(inside) = InsideBits::of(part, region) else {
                 continue;
             };
             part.groups.reshape(|group, lane| {
@@ -133,7 +133,7 @@ impl Elements {
             }
         }
         for part in parts {
-            let Some(inside) = Inside::of(part, region) else {
+            let Some(inside) = InsideBits::of(part, region) else {
                 continue;
             };
             let groups = part.groups.as_slice();

@@ -15,25 +15,25 @@ use crate::simd::{ChosenKernel, Loops};
 
 /// What is left of stresses in the tetrahedra of a part.
 #[derive(Debug)]
-pub(super) struct Set {
+pub(super) struct PlasticSet {
     stresses: Vec<Stresses>,
     kept: Vec<Stresses>,
     /// With those of arms.
     pub loads: Vec<Stresses>,
 }
 
-saved!(Set { stresses, kept, loads });
+saved! { PlasticSet { stresses, kept, loads } }
 
 /// The lengths of stresses, Pa: that at which they yield, and the longest that may be left.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
+pub(super) struct YieldBounds {
     yields: f32,
     longest: f32,
 }
 
-saved!(Bounds { yields, longest });
+saved! { YieldBounds { yields, longest } }
 
-impl Bounds {
+impl YieldBounds {
     pub fn new(law: Law, yielding: Yielding) -> Self {
         let (mu, lambda) = (f64::from(law.mu), f64::from(law.lambda) + f64::from(law.kappa));
         let young_modulus = mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu);
@@ -46,7 +46,7 @@ impl Bounds {
     }
 }
 
-impl Set {
+impl PlasticSet {
     pub fn new(count: usize) -> Result<Self> {
         let zeros = || memory::filled(Stresses::ZERO, count);
         Ok(Self {
@@ -62,13 +62,13 @@ impl Set {
     }
 
     /// What is elastic has become this without anything left.
-    pub fn flow(&mut self, kernel: ChosenKernel, bounds: Bounds, elastic: &[Stresses]) {
+    pub fn flow(&mut self, kernel: ChosenKernel, bounds: YieldBounds, elastic: &[Stresses]) {
         let left = &mut self.stresses;
         kernel.run(Flow { bounds, left, elastic });
     }
 
     /// Whether a tetrahedron would yield where this is elastic, by more than rounding makes of it.
-    pub fn yields(&self, bounds: Bounds, [group, lane]: [usize; 2], elastic: DMat3) -> bool {
+    pub fn yields(&self, bounds: YieldBounds, [group, lane]: [usize; 2], elastic: DMat3) -> bool {
         const ROUNDING: f64 = 1e-5;
         let mut left = [[0.0; GROUP]; 6];
         shapes(&self.stresses[group].0, &mut left);
@@ -115,7 +115,7 @@ impl Set {
 
 /// Takes off for good what is beyond the yield stress.
 struct Flow<'a> {
-    bounds: Bounds,
+    bounds: YieldBounds,
     left: &'a mut [Stresses],
     elastic: &'a [Stresses],
 }
@@ -125,7 +125,7 @@ impl Loops for Flow<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Bounds { yields, longest } = self.bounds;
+        let YieldBounds { yields, longest } = self.bounds;
         for (Stresses(left), Stresses(elastic)) in self.left.iter_mut().zip(self.elastic) {
             let (mut before, mut whole) = ([[0.0; GROUP]; 6], [[0.0; GROUP]; 6]);
             shapes(left, &mut before);

@@ -7,17 +7,16 @@
 #![allow(unsafe_code)]
 
 mod hyperelastic;
+mod st_venant_kirchhoff;
 
 use std::ops::Range;
 
+use self::st_venant_kirchhoff::{FindChanges, FindEnergy, FindForces, FindGrowths, FindStresses};
 use crate::codec::saved;
+use crate::elements::Law;
 use crate::elements::laws::with_hyperelastic;
-use crate::elements::{LEAST_SHEAR, Law};
-use crate::simd::algebra::{
-    Matrix, Six, add_times, cross, difference, dot, largest, scaled_matrix, scaled_six, sum, sum_six, times_lower,
-    times_upper,
-};
-use crate::simd::{ChosenKernel, Lanes, Record, WithLanes};
+use crate::simd::algebra::{Matrix3, Six, cross, difference, dot, sum, times_lower, times_upper};
+use crate::simd::{ChosenKernel, Lanes, Record};
 
 /// Tetrahedra side by side.
 pub(crate) const GROUP: usize = 16;
@@ -36,12 +35,7 @@ pub(crate) struct Group {
     pub rates: [f32; GROUP],
 }
 
-saved!(Group {
-    corners,
-    inverse,
-    volumes,
-    rates
-});
+saved! { Group { corners, inverse, volumes, rates } }
 
 impl Group {
     pub const EMPTY: Self = Self {
@@ -57,7 +51,7 @@ impl Group {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stresses(pub [[f32; GROUP]; 7]);
 
-saved!(Stresses { 0 });
+saved! { Stresses { 0 } }
 
 impl Stresses {
     pub const ZERO: Self = Self([[0.0; GROUP]; 7]);
@@ -65,14 +59,14 @@ impl Stresses {
 
 /// Tetrahedra of nodes below a number.
 #[derive(Debug)]
-pub(crate) struct Groups {
+pub(crate) struct TetrahedronGroups {
     groups: Vec<Group>,
     node_count: usize,
 }
 
-saved!(Groups { groups, node_count } where Self::lead_to_nodes);
+saved! { TetrahedronGroups { groups, node_count } where Self::lead_to_nodes }
 
-impl Groups {
+impl TetrahedronGroups {
     /// # Panics
     /// Where a corner is not below `node_count`.
     pub fn new(groups: Vec<Group>, node_count: usize) -> Self {
@@ -176,15 +170,15 @@ impl Groups {
         with_hyperelastic!(
             law,
             |form| if law.rings {
-                kernel.run_with_lanes(hyperelastic::Forces::<_, true> { law, form, of })
+                kernel.run_with_lanes(hyperelastic::HyperelasticForces::<_, true> { law, form, of })
             } else {
-                kernel.run_with_lanes(hyperelastic::Forces::<_, false> { law, form, of })
+                kernel.run_with_lanes(hyperelastic::HyperelasticForces::<_, false> { law, form, of })
             },
             match (law.rings, loads) {
-                (true, []) => kernel.run_with_lanes(Forces::<true, false> { law, loads, of }),
-                (false, []) => kernel.run_with_lanes(Forces::<false, false> { law, loads, of }),
-                (true, _) => kernel.run_with_lanes(Forces::<true, true> { law, loads, of }),
-                (false, _) => kernel.run_with_lanes(Forces::<false, true> { law, loads, of }),
+                (true, []) => kernel.run_with_lanes(FindForces::<true, false> { law, loads, of }),
+                (false, []) => kernel.run_with_lanes(FindForces::<false, false> { law, loads, of }),
+                (true, _) => kernel.run_with_lanes(FindForces::<true, true> { law, loads, of }),
+                (false, _) => kernel.run_with_lanes(FindForces::<false, true> { law, loads, of }),
             }
         )
     }
@@ -205,15 +199,15 @@ impl Groups {
         with_hyperelastic!(
             law,
             |form| if law.rings {
-                kernel.run_with_lanes(hyperelastic::Changes::<_, true> { law, form, ways, of });
+                kernel.run_with_lanes(hyperelastic::HyperelasticChanges::<_, true> { law, form, ways, of });
             } else {
-                kernel.run_with_lanes(hyperelastic::Changes::<_, false> { law, form, ways, of });
+                kernel.run_with_lanes(hyperelastic::HyperelasticChanges::<_, false> { law, form, ways, of });
             },
             match (law.rings, loads) {
-                (true, []) => kernel.run_with_lanes(Changes::<true, false> { law, loads, ways, of }),
-                (false, []) => kernel.run_with_lanes(Changes::<false, false> { law, loads, ways, of }),
-                (true, _) => kernel.run_with_lanes(Changes::<true, true> { law, loads, ways, of }),
-                (false, _) => kernel.run_with_lanes(Changes::<false, true> { law, loads, ways, of }),
+                (true, []) => kernel.run_with_lanes(FindChanges::<true, false> { law, loads, ways, of }),
+                (false, []) => kernel.run_with_lanes(FindChanges::<false, false> { law, loads, ways, of }),
+                (true, _) => kernel.run_with_lanes(FindChanges::<true, true> { law, loads, ways, of }),
+                (false, _) => kernel.run_with_lanes(FindChanges::<false, true> { law, loads, ways, of }),
             }
         );
     }
@@ -232,7 +226,7 @@ impl Groups {
     /// order how much larger they become.
     pub fn growths(&self, kernel: ChosenKernel, positions: &[Record], ways: Option<&[Record]>, sums: &mut [Record]) {
         assert!(ways.is_none_or(|ways| ways.len() == self.node_count));
-        kernel.run_with_lanes(Growths {
+        kernel.run_with_lanes(FindGrowths {
             ways: ways.map(<[Record]>::as_ptr),
             of: self.checked(positions, sums),
         });
@@ -240,7 +234,7 @@ impl Groups {
 
     /// The energy of the tetrahedra, without that of rings, J.
     pub fn energy(&self, kernel: ChosenKernel, law: Law, positions: &[Record]) -> f64 {
-        kernel.run_with_lanes(Energy {
+        kernel.run_with_lanes(FindEnergy {
             law,
             of: self.checked(positions, &mut []),
         })
@@ -263,51 +257,12 @@ struct Tetrahedra<'a> {
     sums: *mut Record,
 }
 
-/// With the pressures that their nodes have beside their places, or none, and with as many loads as groups, or none.
-struct Forces<'a, const RINGS: bool, const LOADED: bool> {
-    law: Law,
-    loads: &'a [Stresses],
-    of: Tetrahedra<'a>,
-}
-
-struct Changes<'a, const RINGS: bool, const LOADED: bool> {
-    law: Law,
-    loads: &'a [Stresses],
-    ways: *const Record,
-    of: Tetrahedra<'a>,
-}
-
-/// Of as many groups as there are stresses.
-struct FindStresses<'a> {
-    law: Law,
-    stresses: &'a mut [Stresses],
-    of: Tetrahedra<'a>,
-}
-
-struct Energy<'a> {
-    law: Law,
-    of: Tetrahedra<'a>,
-}
-
-struct Growths<'a> {
-    ways: Option<*const Record>,
-    of: Tetrahedra<'a>,
-}
-
-/// A law's numbers in every lane.
-#[derive(Clone, Copy)]
-struct Constants<L> {
-    lambda: L,
-    mu: L,
-    kappa: L,
-}
-
 /// A tetrahedron as it is deformed.
-struct Deformed<L> {
+struct DeformedLanes<L> {
     /// F.
-    gradient: Matrix<L>,
+    gradient: Matrix3<L>,
     /// The cofactors of F.
-    cofactors: Matrix<L>,
+    cofactors: Matrix3<L>,
     /// 2 E.
     twice_strain: Six<L>,
     /// 2 tr E.
@@ -324,7 +279,7 @@ impl<'a> Tetrahedra<'a> {
     /// # Safety
     /// As for the kernel; `first` is a turn's first lane.
     #[inline(always)]
-    unsafe fn edges<L: Lanes>(from: *const Record, group: &Group, first: usize) -> (Matrix<L>, L) {
+    unsafe fn edges<L: Lanes>(from: *const Record, group: &Group, first: usize) -> (Matrix3<L>, L) {
         // SAFETY: corners lead to records.
         unsafe {
             let [a, b, c, d] = &group.corners;
@@ -355,7 +310,7 @@ impl<'a> Tetrahedra<'a> {
     }
 
     #[inline(always)]
-    unsafe fn deformed<L: Lanes>(&self, group: &Group, first: usize, inverse: Six<L>) -> Deformed<L> {
+    unsafe fn deformed<L: Lanes>(&self, group: &Group, first: usize, inverse: Six<L>) -> DeformedLanes<L> {
         // SAFETY: the same contract.
         unsafe {
             let (edges, pressure) = Self::edges::<L>(self.positions, group, first);
@@ -371,7 +326,7 @@ impl<'a> Tetrahedra<'a> {
                 dot(c, c).subtract(one),
             ];
             let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
-            Deformed {
+            DeformedLanes {
                 gradient,
                 cofactors,
                 twice_strain,
@@ -384,7 +339,7 @@ impl<'a> Tetrahedra<'a> {
 
     /// Adds the forces of stresses times minus the volume at rest.
     #[inline(always)]
-    unsafe fn spread<L: Lanes>(&self, group: &Group, first: usize, stress: Matrix<L>, inverse: Six<L>) {
+    unsafe fn spread<L: Lanes>(&self, group: &Group, first: usize, stress: Matrix3<L>, inverse: Six<L>) {
         // SAFETY: the same contract.
         unsafe {
             let [b, c, d] = times_lower(stress, inverse);
@@ -423,38 +378,6 @@ fn turns<L: Lanes>() -> impl Iterator<Item = usize> {
     Range { start: 0, end: GROUP }.step_by(L::COUNT)
 }
 
-impl<L: Lanes> Constants<L> {
-    #[inline(always)]
-    unsafe fn new(law: Law) -> Self {
-        // SAFETY: the caller promises the instructions.
-        unsafe {
-            Self {
-                lambda: L::splat(law.lambda),
-                mu: L::splat(law.mu),
-                kappa: L::splat(law.kappa),
-            }
-        }
-    }
-
-    /// The stress S of twice a strain.
-    #[inline(always)]
-    unsafe fn stress(self, twice_strain: Six<L>, twice_trace: L) -> Six<L> {
-        // SAFETY: the caller promises the instructions.
-        unsafe {
-            let part = self.lambda.multiply(twice_trace).multiply(L::splat(0.5));
-            let [xx, xy, xz, yy, yz, zz] = twice_strain;
-            [
-                self.mu.multiply_add(xx, part),
-                self.mu.multiply(xy),
-                self.mu.multiply(xz),
-                self.mu.multiply_add(yy, part),
-                self.mu.multiply(yz),
-                self.mu.multiply_add(zz, part),
-            ]
-        }
-    }
-}
-
 impl Stresses {
     /// # Safety
     /// As for the kernel; `first` is a turn's first lane.
@@ -470,267 +393,5 @@ impl Stresses {
     unsafe fn pressures<L: Lanes>(&self, first: usize) -> L {
         // SAFETY: the lanes are of a group.
         unsafe { L::load(self.0[6].as_ptr().add(first)) }
-    }
-}
-
-impl<const RINGS: bool, const LOADED: bool> WithLanes for Forces<'_, RINGS, LOADED> {
-    type Output = f32;
-
-    #[inline(always)]
-    unsafe fn run<L: Lanes>(self) -> f32 {
-        let Self { law, loads, of } = self;
-        // SAFETY: the same contract; corners lead to positions and sums.
-        unsafe {
-            let constants = Constants::<L>::new(law);
-            let (one, half) = (L::splat(1.0), L::splat(0.5));
-            // Of what rates are made for, tension is most where shear counts most, all else where it counts least.
-            let least = L::splat(1.0 / law.stiffest(LEAST_SHEAR));
-            let most = L::splat(1.0 / law.stiffest(1.0));
-            let along = L::splat(law.lambda.max(0.0) + 2.0 * law.mu * LEAST_SHEAR);
-            let mut highest = L::splat(0.0);
-            for (index, group) in of.groups.iter().enumerate() {
-                for first in turns::<L>() {
-                    let inverse = Tetrahedra::inverse::<L>(group, first);
-                    let volumes = Tetrahedra::volumes::<L>(group, first);
-                    let deformed = of.deformed(group, first, inverse);
-                    let Deformed {
-                        gradient,
-                        cofactors,
-                        twice_strain,
-                        twice_trace,
-                        growth,
-                        pressure,
-                    } = deformed;
-                    let mut stress = constants.stress(twice_strain, twice_trace);
-                    let mut pressure = if RINGS {
-                        pressure
-                    } else {
-                        constants.kappa.multiply(growth)
-                    };
-                    let mut load = L::splat(0.0);
-                    if LOADED {
-                        let entries = loads[index].entries::<L>(first);
-                        stress = sum_six(stress, entries);
-                        load = largest(entries);
-                        if !RINGS {
-                            pressure = pressure.add(loads[index].pressures::<L>(first));
-                        }
-                    }
-                    let minus = L::splat(0.0).subtract(volumes);
-                    let stress = scaled_six(stress, minus);
-                    // The largest stretch squared is at most the largest sum of a row's sizes (Gershgorin).
-                    let [xx, xy, xz, yy, yz, zz] = twice_strain;
-                    let (xy, xz, yz) = (xy.size(), xz.size(), yz.size());
-                    let stretch = xx
-                        .add(xy)
-                        .add(xz)
-                        .greater(yy.add(xy).add(yz))
-                        .greater(zz.add(xz).add(yz));
-                    let stretch = stretch.greater(L::splat(0.0)).add(one);
-                    let tension = constants.mu.multiply(stretch.subtract(one));
-                    let tension = constants.lambda.multiply(twice_trace).multiply_add(half, tension);
-                    let tension = tension.greater(L::splat(0.0)).add(load);
-                    // Pressure turns with the root of that, which is below its tangents: at 1, 9 and 81.
-                    let root = stretch.multiply_add(half, half);
-                    let root = root.lesser(stretch.multiply_add(L::splat(1.0 / 6.0), L::splat(1.5)));
-                    let root = root.lesser(stretch.multiply_add(L::splat(1.0 / 18.0), L::splat(4.5)));
-                    let pressed = pressure.size().multiply(root);
-                    // Volume grows with areas: the square of the largest.
-                    let [ab, bc, ca] = cofactors;
-                    let areas = [
-                        dot(ab, ab),
-                        dot(ab, bc),
-                        dot(ab, ca),
-                        dot(bc, bc),
-                        dot(bc, ca),
-                        dot(ca, ca),
-                    ];
-                    let area = largest(areas).greater(stretch);
-                    let stiffness = along.multiply_add(stretch, pressed);
-                    let stiffness = constants.kappa.multiply_add(area, stiffness);
-                    let stiffness = stiffness.multiply(least);
-                    let stiffness = tension.multiply_add(most, stiffness);
-                    let rates = L::load(group.rates.as_ptr().add(first));
-                    highest = highest.greater(stiffness.multiply(rates));
-                    let load = pressure.multiply(minus);
-                    let first_stress = scaled_matrix(cofactors, load);
-                    of.spread(group, first, add_times(first_stress, gradient, stress), inverse);
-                }
-            }
-            let mut all = [0.0_f32; GROUP];
-            highest.store(all.as_mut_ptr());
-            all.into_iter().fold(0.0, f32::max)
-        }
-    }
-}
-
-impl<const RINGS: bool, const LOADED: bool> WithLanes for Changes<'_, RINGS, LOADED> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<L: Lanes>(self) {
-        let Self { law, loads, ways, of } = self;
-        // SAFETY: the same contract; corners lead to positions, ways and sums.
-        unsafe {
-            let constants = Constants::<L>::new(law);
-            let zero = L::splat(0.0);
-            for (index, group) in of.groups.iter().enumerate() {
-                for first in turns::<L>() {
-                    let inverse = Tetrahedra::inverse::<L>(group, first);
-                    let volumes = Tetrahedra::volumes::<L>(group, first);
-                    let deformed = of.deformed(group, first, inverse);
-                    let [a, b, c] = deformed.gradient;
-                    let (edges, pressure) = Tetrahedra::edges::<L>(ways, group, first);
-                    let change = times_upper(edges, inverse);
-                    let [da, db, dc] = change;
-                    let twice_strain = [
-                        dot(a, da).add(dot(a, da)),
-                        dot(a, db).add(dot(b, da)),
-                        dot(a, dc).add(dot(c, da)),
-                        dot(b, db).add(dot(b, db)),
-                        dot(b, dc).add(dot(c, db)),
-                        dot(c, dc).add(dot(c, dc)),
-                    ];
-                    let twice_trace = twice_strain[0].add(twice_strain[3]).add(twice_strain[5]);
-                    let stress_change = constants.stress(twice_strain, twice_trace);
-                    // Pressure is lifted as far as it may push sideways: Gershgorin's bound on the lowest eigenvalue.
-                    let mut stress = constants.stress(deformed.twice_strain, deformed.twice_trace);
-                    if LOADED {
-                        stress = sum_six(stress, loads[index].entries::<L>(first));
-                    }
-                    let (xy, xz, yz) = (stress[1].size(), stress[2].size(), stress[4].size());
-                    let lift = [
-                        xy.add(xz).subtract(stress[0]),
-                        xy.add(yz).subtract(stress[3]),
-                        xz.add(yz).subtract(stress[5]),
-                    ];
-                    let lift = lift[0].greater(lift[1]).greater(lift[2]).greater(zero);
-                    for place in [0, 3, 5] {
-                        stress[place] = stress[place].add(lift);
-                    }
-                    let [ca, cb, cc] = deformed.cofactors;
-                    let load = if RINGS {
-                        pressure
-                    } else {
-                        let swelling = dot(ca, da).add(dot(cb, db)).add(dot(cc, dc));
-                        constants.kappa.multiply(swelling)
-                    };
-                    let changed = scaled_matrix(deformed.cofactors, load);
-                    let changed = add_times(changed, deformed.gradient, stress_change);
-                    let changed = add_times(changed, change, stress);
-                    let minus = zero.subtract(volumes);
-                    let changed = scaled_matrix(changed, minus);
-                    of.spread(group, first, changed, inverse);
-                }
-            }
-        }
-    }
-}
-
-impl WithLanes for Growths<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<L: Lanes>(self) {
-        let Self { ways, of } = self;
-        // SAFETY: the same contract; corners lead to positions, ways and sums.
-        unsafe {
-            let (zero, one) = (L::splat(0.0), L::splat(1.0));
-            let quarter = L::splat(0.25);
-            for group in of.groups {
-                for first in turns::<L>() {
-                    let inverse = Tetrahedra::inverse::<L>(group, first);
-                    let (edges, _) = Tetrahedra::edges::<L>(of.positions, group, first);
-                    let [a, b, c] = times_upper(edges, inverse);
-                    let growth = match ways {
-                        None => dot(a, cross(b, c)).subtract(one),
-                        Some(ways) => {
-                            let (edges, _) = Tetrahedra::edges::<L>(ways, group, first);
-                            let [da, db, dc] = times_upper(edges, inverse);
-                            dot(da, cross(b, c)).add(dot(db, cross(c, a))).add(dot(dc, cross(a, b)))
-                        }
-                    };
-                    let volumes = Tetrahedra::volumes::<L>(group, first);
-                    let growth = growth.multiply(volumes).multiply(quarter);
-                    for corners in &group.corners {
-                        L::add_to_records(of.sums, corners.as_ptr().add(first), [growth, zero, zero]);
-                    }
-                }
-            }
-        }
-    }
-}
-
-impl WithLanes for FindStresses<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<L: Lanes>(self) {
-        let Self { law, stresses, of } = self;
-        // SAFETY: the same contract; corners lead to positions, and lanes are of a group.
-        unsafe {
-            let mut constants = Constants::<L>::new(law);
-            if law.rings {
-                constants.kappa = L::splat(0.0);
-            }
-            for (group, stresses) in of.groups.iter().zip(stresses) {
-                for first in turns::<L>() {
-                    let inverse = Tetrahedra::inverse::<L>(group, first);
-                    let deformed = of.deformed(group, first, inverse);
-                    let [a, b, c, d, e, f] = constants.stress(deformed.twice_strain, deformed.twice_trace);
-                    let [to_a, to_b, to_c, to_d, to_e, to_f, pressures] = &mut stresses.0;
-                    a.store(to_a.as_mut_ptr().add(first));
-                    b.store(to_b.as_mut_ptr().add(first));
-                    c.store(to_c.as_mut_ptr().add(first));
-                    d.store(to_d.as_mut_ptr().add(first));
-                    e.store(to_e.as_mut_ptr().add(first));
-                    f.store(to_f.as_mut_ptr().add(first));
-                    let pressure = constants.kappa.multiply(deformed.growth);
-                    pressure.store(pressures.as_mut_ptr().add(first));
-                }
-            }
-        }
-    }
-}
-
-impl WithLanes for Energy<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    unsafe fn run<L: Lanes>(self) -> f64 {
-        let Self { law, of } = self;
-        let mut energy = 0.0;
-        // SAFETY: the same contract; corners lead to positions.
-        unsafe {
-            let mut constants = Constants::<L>::new(law);
-            if law.rings {
-                constants.kappa = L::splat(0.0);
-            }
-            for group in of.groups {
-                for first in turns::<L>() {
-                    let inverse = Tetrahedra::inverse::<L>(group, first);
-                    let deformed = of.deformed(group, first, inverse);
-                    let [xx, xy, xz, yy, yz, zz] = deformed.twice_strain;
-                    let across = dot([xy, xz, yz], [xy, xz, yz]);
-                    let squares = dot([xx, yy, zz], [xx, yy, zz]).add(across).add(across);
-                    let trace = deformed.twice_trace;
-                    let growth = deformed.growth;
-                    // Of twice the strains: a quarter.
-                    let density = constants
-                        .lambda
-                        .multiply(trace)
-                        .multiply(trace)
-                        .multiply(L::splat(0.125));
-                    let density = constants.mu.multiply(squares).multiply_add(L::splat(0.25), density);
-                    let swollen = constants.kappa.multiply(growth).multiply(growth);
-                    let density = swollen.multiply_add(L::splat(0.5), density);
-                    let energies = density.multiply(Tetrahedra::volumes::<L>(group, first));
-                    let mut all = [0.0_f32; GROUP];
-                    energies.store(all.as_mut_ptr());
-                    energy += all.into_iter().map(f64::from).sum::<f64>();
-                }
-            }
-        }
-        energy
     }
 }

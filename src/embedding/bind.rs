@@ -39,11 +39,12 @@ impl Binding {
     /// Each vertex to the tetrahedron that it is in, the one that is nearest, or among several the one that it is deepest in; and which that is.
     pub fn to_tetrahedra(vertices: &[Vec3], positions: &[Vec3], tetrahedra: &[[u32; 4]]) -> Result<(Self, Vec<u32>)> {
         let corners = |place: u32| tetrahedra[place as usize].map(|node| positions[node as usize]);
-        let mut solids: Vec<Solid> = memory::reserved(tetrahedra.len())?;
+        let mut solids: Vec<PlacedTetrahedron> = memory::reserved(tetrahedra.len())?;
         solids.extend(
-            (0..tetrahedra.len() as u32).map(|place| Solid::of(corners(place).map(|corner| corner.as_dvec3()))),
+            (0..tetrahedra.len() as u32)
+                .map(|place| PlacedTetrahedron::of(corners(place).map(|corner| corner.as_dvec3()))),
         );
-        if !solids.iter().any(Solid::has_volume) {
+        if !solids.iter().any(PlacedTetrahedron::has_volume) {
             return Err(Error::invalid("tetrahedra: none of them has a volume"));
         }
         // The box of these three corners is that of the tetrahedron.
@@ -97,7 +98,7 @@ impl Binding {
         for (vertex, home) in vertices.iter().zip(&mut homes) {
             *home = solid.tetrahedra()[*home as usize].cell;
             let nodes = solid.cells()[*home as usize].nodes;
-            let cell = Solid::of(nodes.map(|node| positions[node as usize].as_dvec3()));
+            let cell = PlacedTetrahedron::of(nodes.map(|node| positions[node as usize].as_dvec3()));
             bound.push(InTetrahedron {
                 nodes,
                 weights: cell.weights(vertex.as_dvec3()).as_vec3().to_array(),
@@ -193,13 +194,13 @@ pub(super) fn weighted(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
 }
 
 /// A tetrahedron where it is.
-pub(super) struct Solid {
+pub(super) struct PlacedTetrahedron {
     corners: [DVec3; 4],
     /// From the way from the first corner to the weights of the others.
     inverse: DMat3,
 }
 
-impl Solid {
+impl PlacedTetrahedron {
     pub fn of(corners: [DVec3; 4]) -> Self {
         let [a, b, c, d] = corners;
         Self {

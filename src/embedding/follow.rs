@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
-use super::bind::{Binding, Solid, weighted};
+use super::bind::{Binding, PlacedTetrahedron, weighted};
 use crate::base::{Error, Result, memory};
 use crate::cutting::{CutMaterial, Divided, weighed};
 use crate::geometry::nearest::nearest_on_triangle;
@@ -199,7 +199,7 @@ impl Fit for Piece<3> {
 
 impl Fit for Piece<4> {
     fn fit(&self, place: DVec3) -> (f64, f64) {
-        let solid = Solid::of(self.corners);
+        let solid = PlacedTetrahedron::of(self.corners);
         // Outside of the body all depths are below 0, and may be the same on both sides.
         let depth = solid.depth(place);
         let distance = if depth < 0.0 {

@@ -6,7 +6,7 @@ use super::{Cavity, Enclosed, pressure_of};
 use crate::def::EnclosedReport;
 
 /// Where each node is, or how far it goes.
-type At<'a> = &'a dyn Fn(usize) -> DVec3;
+pub(crate) type At<'a> = &'a dyn Fn(usize) -> DVec3;
 
 /// Nodes, and what triangles have of the gradient of a volume by their places, m².
 pub(crate) type Gradients<'a> = &'a mut dyn Iterator<Item = (usize, DVec3)>;

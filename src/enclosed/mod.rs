@@ -16,8 +16,8 @@ use crate::codec::saved;
 use crate::def::BodyDefinition;
 use crate::soa::{NodeOrder, Rates, TileForces, Vectors};
 use crate::threads::{Items, Ragged, Team};
-pub(crate) use exact::Gradients;
-use surface::{Block, Surface};
+pub(crate) use exact::{At, Gradients};
+use surface::{CavitySurface, SurfaceBlock};
 
 /// What is inside of one closed surface.
 #[derive(Clone, Copy, Debug)]
@@ -32,12 +32,7 @@ struct Cavity {
     pressure: f64,
 }
 
-saved!(Cavity {
-    rest_volume,
-    triangles,
-    is_open,
-    pressure
-});
+saved! { Cavity { rest_volume, triangles, is_open, pressure } }
 
 /// The cavities of a body.
 #[derive(Debug)]
@@ -46,7 +41,7 @@ pub(crate) struct Enclosed {
     stiffness: f32,
     pressure: f32,
     cavities: Vec<Cavity>,
-    surface: Surface,
+    surface: CavitySurface,
     /// The vectors of triangles where forces were last worked out, m².
     vectors: Vec<Vec3>,
     sums: Vec<BlockSums>,
@@ -61,49 +56,38 @@ pub(crate) struct Enclosed {
     rates_known: bool,
 }
 
-saved!(Enclosed {
-    stiffness,
-    pressure,
-    cavities,
-    surface,
-    vectors,
-    sums,
-    factors,
-    weights,
-    of_springs,
-    highest,
-    settled,
-    rates_known
-});
+saved! { Enclosed {
+    stiffness, pressure, cavities, surface, vectors, sums, factors, weights, of_springs, highest, settled, rates_known,
+} }
 
 /// What there is to know of the triangles of a block.
 #[derive(Clone, Copy, Debug, Default)]
 struct BlockSums {
     /// Six times their volume, m³.
     volume: f64,
-    bounds: rates::Bounds,
+    bounds: rates::CavityBounds,
 }
 
-saved!(BlockSums { volume, bounds });
+saved! { BlockSums { volume, bounds } }
 
 /// How pressures change where nodes go some ways.
 #[derive(Debug)]
-pub(crate) struct Changes {
+pub(crate) struct PressureChanges {
     sums: Vec<f64>,
     factors: Vec<f64>,
 }
 
-saved!(Changes { sums, factors });
+saved! { PressureChanges { sums, factors } }
 
 /// What the nodes of a tile are given.
 #[derive(Clone, Copy)]
-pub(crate) struct Shares<'a> {
-    surface: &'a Surface,
+pub(crate) struct PressureShares<'a> {
+    surface: &'a CavitySurface,
     vectors: &'a [Vec3],
     factors: &'a [f64],
 }
 
-impl Shares<'_> {
+impl PressureShares<'_> {
     /// Adds what pressures give to the nodes of a tile.
     pub fn add(&self, tile: usize, forces: &mut TileForces) {
         self.surface.visit_tile(tile, &mut |place, cavity, triangles| {
@@ -145,8 +129,8 @@ impl Enclosed {
     }
 
     /// Room for what pressures change by.
-    pub fn room_for_changes(&self) -> Result<Changes> {
-        Ok(Changes {
+    pub fn room_for_changes(&self) -> Result<PressureChanges> {
+        Ok(PressureChanges {
             sums: memory::filled(0.0, self.sums.len())?,
             factors: memory::filled(0.0, self.cavities.len())?,
         })
@@ -171,7 +155,7 @@ impl Enclosed {
             Items::new(&mut self.sums),
         );
         team.pass(surface.blocks.len(), written, |block, (vectors, sums)| {
-            let Block { cavity, start, end } = surface.blocks[block];
+            let SurfaceBlock { cavity, start, end } = surface.blocks[block];
             let cavity = &cavities[cavity];
             if cavity.is_open {
                 return;
@@ -195,7 +179,7 @@ impl Enclosed {
 
     /// Makes pressures of the sums of blocks.
     fn press(&mut self) {
-        let mut bounds = rates::Sum::new(self.surface.nodes_are_shared);
+        let mut bounds = rates::RateBound::new(self.surface.nodes_are_shared);
         let mut blocks = self.surface.blocks.iter().zip(&self.sums).peekable();
         for (index, cavity) in self.cavities.iter_mut().enumerate() {
             let mut sums = BlockSums::default();
@@ -220,14 +204,14 @@ impl Enclosed {
 
     /// Works out how forces change, to first order, where nodes go these ways from where forces were last worked out. What pressure
     /// itself does as a surface turns is left out: it pushes one way as much as another.
-    pub fn find_changes(&self, ways: &Vectors, changes: &mut Changes, team: &Team) {
+    pub fn find_changes(&self, ways: &Vectors, changes: &mut PressureChanges, team: &Team) {
         if self.stiffness == 0.0 {
             return;
         }
         let ways = ways.view();
         let (surface, cavities) = (&self.surface, &self.cavities);
         team.pass(surface.blocks.len(), Items::new(&mut changes.sums), |block, sum| {
-            let Block { cavity, start, end } = surface.blocks[block];
+            let SurfaceBlock { cavity, start, end } = surface.blocks[block];
             *sum = 0.0;
             if cavities[cavity].is_open {
                 return;
@@ -253,8 +237,8 @@ impl Enclosed {
     }
 
     /// What these changes give to nodes; `None`: the forces that were worked out last.
-    pub fn shares<'a>(&'a self, changes: Option<&'a Changes>) -> Shares<'a> {
-        Shares {
+    pub fn shares<'a>(&'a self, changes: Option<&'a PressureChanges>) -> PressureShares<'a> {
+        PressureShares {
             surface: &self.surface,
             vectors: &self.vectors,
             factors: changes.map_or(&self.factors, |changes| &changes.factors),

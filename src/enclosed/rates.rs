@@ -22,20 +22,20 @@ pub(super) struct Weights {
     of_length: f32,
 }
 
-saved!(Weights { of_square, of_length });
+saved! { Weights { of_square, of_length } }
 
 /// What the triangles of a block, or of a cavity, add up to.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Bounds {
+pub(super) struct CavityBounds {
     /// The sum of `|g|²/m`, m⁴/kg.
     of_squares: f64,
     /// The largest square of `v l / 3 m`.
     of_lengths: f64,
 }
 
-saved!(Bounds { of_squares, of_lengths });
+saved! { CavityBounds { of_squares, of_lengths } }
 
-impl Bounds {
+impl CavityBounds {
     /// Adds a triangle with this vector, and these edges and the one between their ends.
     #[inline(always)]
     pub fn add(&mut self, weights: &Weights, vector: DVec3, [ab, ac]: [DVec3; 2]) {
@@ -52,12 +52,12 @@ impl Bounds {
 }
 
 /// The bound of all cavities: the largest, as no node moves with two of them, or where nodes are shared the sum.
-pub(super) struct Sum {
+pub(super) struct RateBound {
     nodes_are_shared: bool,
     total: f64,
 }
 
-impl Sum {
+impl RateBound {
     pub fn new(nodes_are_shared: bool) -> Self {
         Self {
             nodes_are_shared,
@@ -66,7 +66,7 @@ impl Sum {
     }
 
     /// Adds a cavity of this stiffness over its volume at rest, Pa/m³, and this pressure, Pa.
-    pub fn add(&mut self, stiffness: f64, pressure: f64, bounds: &Bounds) {
+    pub fn add(&mut self, stiffness: f64, pressure: f64, bounds: &CavityBounds) {
         let stiffest = stiffness * bounds.of_squares + pressure.abs() * bounds.of_lengths.sqrt();
         self.total = if self.nodes_are_shared {
             self.total + stiffest

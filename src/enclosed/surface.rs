@@ -16,13 +16,13 @@ const FLAT: f64 = 1e-6;
 
 /// Triangles of one cavity.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Block {
+pub(super) struct SurfaceBlock {
     pub cavity: usize,
     pub start: usize,
     pub end: usize,
 }
 
-saved!(Block { cavity, start, end });
+saved! { SurfaceBlock { cavity, start, end } }
 
 /// A node of a cavity.
 #[derive(Clone, Copy, Debug)]
@@ -33,14 +33,14 @@ struct Member {
     end: u32,
 }
 
-saved!(Member { node, cavity, end });
+saved! { Member { node, cavity, end } }
 
 /// The triangles of all cavities, cavity by cavity, and those about each node.
 #[derive(Debug)]
-pub(super) struct Surface {
+pub(super) struct CavitySurface {
     /// In the body's own numbers, turned so that volumes are positive.
     pub triangles: Vec<[u32; 3]>,
-    pub blocks: Vec<Block>,
+    pub blocks: Vec<SurfaceBlock>,
     /// Where each block begins.
     pub starts: Vec<usize>,
     members: Vec<Member>,
@@ -52,15 +52,7 @@ pub(super) struct Surface {
     pub nodes_are_shared: bool,
 }
 
-saved!(Surface {
-    triangles,
-    blocks,
-    starts,
-    members,
-    tiles,
-    about,
-    nodes_are_shared
-});
+saved! { CavitySurface { triangles, blocks, starts, members, tiles, about, nodes_are_shared } }
 
 /// Finds the cavities of triangles in the caller's numbers.
 ///
@@ -70,7 +62,7 @@ pub(super) fn close(
     definition: &BodyDefinition,
     triangles: &[[u32; 3]],
     order: &NodeOrder,
-) -> Result<(Surface, Vec<Cavity>)> {
+) -> Result<(CavitySurface, Vec<Cavity>)> {
     let (name, value) = asked(definition);
     if triangles.is_empty() {
         return Err(Error::invalid(format!(
@@ -112,7 +104,7 @@ pub(super) fn close(
         }
         has_inner |= volume < 0.0;
     }
-    let mut made = Surface {
+    let mut made = CavitySurface {
         triangles: memory::reserved(triangles.len())?,
         blocks: Vec::new(),
         starts: Vec::new(),
@@ -134,7 +126,7 @@ pub(super) fn close(
         }));
         let end = made.triangles.len();
         for start in (start..end).step_by(BLOCK) {
-            let block = Block {
+            let block = SurfaceBlock {
                 cavity: cavities.len(),
                 start,
                 end: end.min(start + BLOCK),
@@ -203,7 +195,7 @@ fn lowest(walls: &mut [u32], mut triangle: u32) -> u32 {
     triangle
 }
 
-impl Surface {
+impl CavitySurface {
     fn find_members(&mut self, cavities: &[Cavity], node_count: usize) -> Result<()> {
         let mut corners: Vec<[u32; 3]> = memory::reserved(3 * self.triangles.len())?;
         for (cavity, of) in (0..).zip(cavities) {

@@ -3,11 +3,8 @@
 use glam::{DMat3, DVec3};
 
 use crate::codec::saved;
-use crate::enclosed::Enclosed;
-use crate::terms::{Blocks, Term, Terms};
-
-/// Where each node is, or how far it goes.
-type At<'a> = &'a dyn Fn(usize) -> DVec3;
+use crate::enclosed::{At, Enclosed};
+use crate::terms::{TangentBlocks, Term, Terms};
 
 /// What acts beside springs and elements. A solver may borrow it for as long as it solves.
 #[derive(Debug, Default)]
@@ -17,7 +14,7 @@ pub(crate) struct Beside {
     pub(super) cavities: Option<Box<Enclosed>>,
 }
 
-saved!(Beside { terms, cavities });
+saved! { Beside { terms, cavities } }
 
 impl Beside {
     /// Whether there is any.
@@ -72,7 +69,7 @@ impl Beside {
     }
 
     /// Shows each term's nodes and blocks: all second derivatives, or what is positive semidefinite of them.
-    pub fn show_blocks(&self, at: At, is_exact: bool, see: &mut dyn FnMut(&[u32], &Blocks)) {
+    pub fn show_blocks(&self, at: At, is_exact: bool, see: &mut dyn FnMut(&[u32], &TangentBlocks)) {
         self.laws().for_each(|law| law.show_blocks(at, is_exact, see));
     }
 

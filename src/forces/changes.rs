@@ -8,7 +8,7 @@ use crate::codec::saved;
 use crate::elements::{self, Sums};
 use crate::enclosed;
 use crate::soa::{Records, Vectors};
-use crate::terms::Blocks;
+use crate::terms::TangentBlocks;
 use crate::threads::Team;
 
 /// What forces change by along ways, as far as it is not made tile by tile.
@@ -17,14 +17,10 @@ pub(crate) struct Changes {
     /// The ways, for springs that gather them, and elements.
     pub records: Option<Records>,
     pub(super) elements: Option<Sums>,
-    cavities: Option<enclosed::Changes>,
+    cavities: Option<enclosed::PressureChanges>,
 }
 
-saved!(Changes {
-    records,
-    elements,
-    cavities
-});
+saved! { Changes { records, elements, cavities } }
 
 impl Forces {
     /// Room for what forces change by.
@@ -67,13 +63,13 @@ impl Forces {
 
     /// Shows each element's corners, the gradients of their functions, and how it is deformed with nodes at `positions`; what rings do is
     /// shown as if each kept this part of it by itself.
-    pub fn show_deformed(&self, positions: &Vectors, part_of_rings: f32, see: &mut elements::See) {
+    pub fn show_deformed(&self, positions: &Vectors, part_of_rings: f32, see: &mut elements::SeeDeformed) {
         let elements = self.elements.iter();
         elements.for_each(|elements| elements.visit_deformed(positions, part_of_rings, see));
     }
 
     /// Shows each term's nodes with nodes at `positions`, and of its blocks what is positive semidefinite.
-    pub fn show_term_blocks(&self, positions: &Vectors, see: &mut dyn FnMut(&[u32], &Blocks)) {
+    pub fn show_term_blocks(&self, positions: &Vectors, see: &mut dyn FnMut(&[u32], &TangentBlocks)) {
         let at = |node: usize| positions.get(node).as_dvec3();
         self.beside.show_blocks(&at, false, see);
     }

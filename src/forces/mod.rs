@@ -37,13 +37,7 @@ pub(crate) struct Forces {
     pub records: Option<Records>,
 }
 
-saved!(Forces {
-    springs,
-    elements,
-    beside,
-    kernel,
-    records
-});
+saved! { Forces { springs, elements, beside, kernel, records } }
 
 /// The sum of all that acts on nodes, tile by tile: of forces, or of how these change.
 #[derive(Clone, Copy)]
@@ -51,7 +45,7 @@ pub(crate) struct Sum<'a> {
     pub springs: &'a dyn Springs,
     elements: Option<elements::Shares<'a>>,
     terms: Option<&'a Terms>,
-    cavities: Option<enclosed::Shares<'a>>,
+    cavities: Option<enclosed::PressureShares<'a>>,
 }
 
 impl Sum<'_> {

@@ -1,12 +1,10 @@
 //! What becomes of forces as nodes, springs and cells come, change and go.
 
-use glam::DVec3;
-
 use super::{Changes, Forces};
 use crate::base::Result;
 use crate::elements::PieceOfElement;
-use crate::soa::{Masses, Region, Scale, Vectors};
-use crate::springs::Change;
+use crate::soa::{Masses, Region, Scale};
+use crate::springs::SpringChange;
 use crate::terms::Parting;
 
 /// What a cut makes of elements and terms.
@@ -94,18 +92,6 @@ impl Forces {
         }
     }
 
-    /// The force of elements, given as cells, on a node of them, N.
-    pub fn force_at(&self, node: u32, cells: impl Iterator<Item = u32>, positions: &Vectors) -> DVec3 {
-        self.elements()
-            .map_or(DVec3::ZERO, |elements| elements.force_at(node, cells, positions))
-    }
-
-    /// What a node carries of an element at rest, given as a cell, N/m, and the highest bound on the squares of frequencies of its corners.
-    pub fn carried_by(&self, cell: u32, node: u32, inverse_masses: &[f32]) -> (f64, f64) {
-        self.elements()
-            .map_or((0.0, 0.0), |elements| elements.carried_by(cell, node, inverse_masses))
-    }
-
     /// Opens the cavities with any of these triangles, after masses have changed: whether any was closed.
     pub fn open_cavities(&mut self, triangles: impl Iterator<Item = [u32; 3]>) -> bool {
         let Some(cavities) = &mut self.beside.cavities else {
@@ -125,7 +111,7 @@ impl Forces {
     }
 
     /// Gives springs that there are, each once, other parameters. Changes nothing where it fails.
-    pub fn set_springs(&mut self, changes: &[Change]) -> Result<()> {
+    pub fn set_springs(&mut self, changes: &[SpringChange]) -> Result<()> {
         self.springs.set(changes)?;
         for law in self.beside.laws_mut() {
             changes.iter().for_each(|change| law.set_spring(change));

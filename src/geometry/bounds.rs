@@ -12,7 +12,7 @@ pub(crate) struct Bounds {
     pub max: Vec3,
 }
 
-saved!(Bounds { min, max });
+saved! { Bounds { min, max } }
 
 impl Bounds {
     pub const EMPTY: Self = Self {

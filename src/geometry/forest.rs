@@ -1,7 +1,7 @@
 //! Trees over the triangles of a surface that may be cut: that of the surface as it was made, and trees of those that cuts have added.
 
 use super::Bounds;
-use super::tree::{Placed, Tree};
+use super::tree::{PlacedTriangle, Tree};
 use crate::base::Result;
 use crate::codec::saved;
 use glam::Vec3;
@@ -14,7 +14,7 @@ pub(crate) struct Forest {
     later: Vec<Later>,
 }
 
-saved!(Forest { first, later });
+saved! { Forest { first, later } }
 
 /// A tree of triangles that came later.
 #[derive(Debug)]
@@ -24,7 +24,7 @@ pub(crate) struct Later {
     tree: Tree,
 }
 
-saved!(Later { from, tree });
+saved! { Later { from, tree } }
 
 impl Forest {
     /// Over so many triangles.
@@ -82,7 +82,7 @@ impl Forest {
     }
 
     /// The triangles where they are, in some order.
-    pub fn placed(&self) -> impl Iterator<Item = &Placed> {
+    pub fn placed(&self) -> impl Iterator<Item = &PlacedTriangle> {
         let later = self.later.iter().map(|later| &later.tree);
         let trees = std::iter::once(&self.first).chain(later);
         trees.flat_map(|tree| (0..tree.triangle_count()).map(|place| tree.placed(place)))

@@ -18,30 +18,26 @@ const ROUNDING: f32 = 1e-6;
 /// Triangles in the order of the leaves of a balanced binary tree. Its shape is found once; its boxes follow the triangles.
 #[derive(Debug)]
 pub(crate) struct Tree {
-    nodes: Vec<Node>,
+    nodes: Vec<TreeNode>,
     /// The triangle at each place.
     order: Vec<u32>,
-    triangles: Vec<Placed>,
+    triangles: Vec<PlacedTriangle>,
 }
 
-saved!(Tree {
-    nodes,
-    order,
-    triangles
-});
+saved! { Tree { nodes, order, triangles } }
 
 /// A triangle where it is.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedTriangle {
     pub corners: [Vec3; 3],
     /// Of unit length; 0 where it has no area.
     pub normal: Vec3,
 }
 
-saved!(Placed { corners, normal });
+saved! { PlacedTriangle { corners, normal } }
 
 #[derive(Clone, Copy, Debug)]
-struct Node {
+struct TreeNode {
     min: Vec3A,
     max: Vec3A,
     /// The first of its two children, or the place of its first triangle.
@@ -50,7 +46,7 @@ struct Node {
     count: u32,
 }
 
-saved!(Node { min, max, first, count });
+saved! { TreeNode { min, max, first, count } }
 
 impl Tree {
     /// Over `count` triangles, halved at the median along the longest side of their centres' box.
@@ -64,7 +60,7 @@ impl Tree {
         }));
         // Every leaf but a lone one has two triangles at least.
         let mut nodes = memory::reserved(count.max(1))?;
-        nodes.push(Node::over(0, count));
+        nodes.push(TreeNode::over(0, count));
         let mut waiting = [(0_usize, 0_usize, 0_usize); LEVELS];
         waiting[0] = (0, 0, count);
         let mut waits = 1;
@@ -72,7 +68,7 @@ impl Tree {
             waits -= 1;
             let (node, start, end) = waiting[waits];
             if end - start <= LEAF {
-                nodes[node] = Node::over(start, end - start);
+                nodes[node] = TreeNode::over(start, end - start);
                 continue;
             }
             let part = &mut order[start..end];
@@ -85,9 +81,9 @@ impl Tree {
                 first.total_cmp(&second).then(a.cmp(&b))
             });
             let children = nodes.len();
-            nodes[node] = Node::over(children, 0);
-            nodes.push(Node::over(start, middle));
-            nodes.push(Node::over(start + middle, end - start - middle));
+            nodes[node] = TreeNode::over(children, 0);
+            nodes.push(TreeNode::over(start, middle));
+            nodes.push(TreeNode::over(start + middle, end - start - middle));
             // The half that is taken next does not wait long: no more wait than there are levels.
             waiting[waits] = (children + 1, start + middle, end);
             waiting[waits + 1] = (children, start, start + middle);
@@ -95,7 +91,7 @@ impl Tree {
         }
         let mut tree = Self {
             nodes,
-            triangles: memory::filled(Placed::new([Vec3::ZERO; 3]), count)?,
+            triangles: memory::filled(PlacedTriangle::new([Vec3::ZERO; 3]), count)?,
             order,
         };
         tree.refit(corners);
@@ -105,7 +101,7 @@ impl Tree {
     /// Takes the triangles where they are now.
     pub fn refit(&mut self, corners: impl Fn(u32) -> [Vec3; 3]) {
         for (place, &triangle) in self.order.iter().enumerate() {
-            self.triangles[place] = Placed::new(corners(triangle));
+            self.triangles[place] = PlacedTriangle::new(corners(triangle));
         }
         self.fit();
     }
@@ -113,7 +109,7 @@ impl Tree {
     /// The same, of triangles known by their places.
     pub fn refit_places(&mut self, corners: impl Fn(usize) -> [Vec3; 3]) {
         for (place, taken) in self.triangles.iter_mut().enumerate() {
-            *taken = Placed::new(corners(place));
+            *taken = PlacedTriangle::new(corners(place));
         }
         self.fit();
     }
@@ -131,7 +127,7 @@ impl Tree {
                 let bounds = Bounds::of(triangles.iter().flat_map(|triangle| triangle.corners));
                 (bounds.min.into(), bounds.max.into())
             };
-            self.nodes[index] = Node { min, max, ..node };
+            self.nodes[index] = TreeNode { min, max, ..node };
         }
     }
 
@@ -154,7 +150,7 @@ impl Tree {
 
     /// The triangle at a place, where it is.
     #[inline]
-    pub fn placed(&self, place: usize) -> &Placed {
+    pub fn placed(&self, place: usize) -> &PlacedTriangle {
         &self.triangles[place]
     }
 
@@ -163,7 +159,7 @@ impl Tree {
     #[inline]
     pub fn near(&self, bounds: &Bounds, limit_squared: f32, mut visit: impl FnMut(usize) -> f32) {
         let (low, high) = (Vec3A::from(bounds.min), Vec3A::from(bounds.max));
-        let gap = |node: &Node| {
+        let gap = |node: &TreeNode| {
             let apart = (node.min - high).max(low - node.max).max(Vec3A::ZERO);
             apart.length_squared()
         };
@@ -191,7 +187,7 @@ impl Tree {
                 }
                 for place in node.first..node.first + node.count {
                     let [a, b, c] = self.triangles[place as usize].corners.map(Vec3A::from);
-                    let of_triangle = Node {
+                    let of_triangle = TreeNode {
                         min: a.min(b).min(c),
                         max: a.max(b).max(c),
                         ..*node
@@ -221,7 +217,7 @@ impl Tree {
                 (1.0 / along).clamp(f32::MIN, f32::MAX)
             }
         }));
-        let enters = |node: &Node, limit: f32| {
+        let enters = |node: &TreeNode, limit: f32| {
             let (first, last) = ((node.min - start) * inverse, (node.max - start) * inverse);
             let enter = first.min(last).max_element() * (1.0 - ROUNDING);
             let leave = first.max(last).min_element() * (1.0 + ROUNDING);
@@ -266,7 +262,7 @@ impl Tree {
     }
 }
 
-impl Placed {
+impl PlacedTriangle {
     pub fn new(corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(|corner| corner.as_dvec3());
         let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
@@ -300,7 +296,7 @@ impl Placed {
     }
 }
 
-impl Node {
+impl TreeNode {
     /// Not fitted yet.
     fn over(first: usize, count: usize) -> Self {
         Self {

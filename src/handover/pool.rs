@@ -33,20 +33,20 @@ struct Buffer<T> {
 }
 
 #[derive(Debug)]
-struct Shared<T> {
+struct PoolShared<T> {
     latest: AtomicU64,
     buffers: Vec<Buffer<T>>,
 }
 
 // SAFETY: a buffer is read by those who claimed it, and written by the one writer while its word says that nobody can.
-unsafe impl<T: Send + Sync> Sync for Shared<T> {}
+unsafe impl<T: Send + Sync> Sync for PoolShared<T> {}
 // SAFETY: it owns what it holds.
-unsafe impl<T: Send> Send for Shared<T> {}
+unsafe impl<T: Send> Send for PoolShared<T> {}
 
 /// The writing side; its end is told.
 #[derive(Debug)]
-pub(crate) struct Writer<T> {
-    shared: Arc<Shared<T>>,
+pub(crate) struct PoolWriter<T> {
+    shared: Arc<PoolShared<T>>,
     /// The version and the buffer that are the latest.
     version: u64,
     latest: usize,
@@ -56,13 +56,13 @@ pub(crate) struct Writer<T> {
 
 /// A reading side, which always holds a buffer.
 #[derive(Debug)]
-pub(crate) struct Reader<T> {
-    shared: Arc<Shared<T>>,
+pub(crate) struct PoolReader<T> {
+    shared: Arc<PoolShared<T>>,
     version: u64,
     own: usize,
 }
 
-impl<T: Send + Sync> Writer<T> {
+impl<T: Send + Sync> PoolWriter<T> {
     /// A pool for so many readers at most, which has none yet. The first of these values is version 1.
     pub fn new(most_readers: usize, contents: [T; 2]) -> Result<Self, TryReserveError> {
         let count = most_readers + 2;
@@ -75,7 +75,7 @@ impl<T: Send + Sync> Writer<T> {
             content: UnsafeCell::new(contents.next()),
         }));
         Ok(Self {
-            shared: Arc::new(Shared {
+            shared: Arc::new(PoolShared {
                 latest: AtomicU64::new(1 << VERSION),
                 buffers,
             }),
@@ -96,7 +96,7 @@ impl<T: Send + Sync> Writer<T> {
     }
 
     /// A reader more, which holds the latest, with one more buffer if it needs one; `None` where there are as many as can be.
-    pub fn add_reader<E>(&mut self, make: impl FnOnce() -> Result<T, E>) -> Result<Option<Reader<T>>, E> {
+    pub fn add_reader<E>(&mut self, make: impl FnOnce() -> Result<T, E>) -> Result<Option<PoolReader<T>>, E> {
         let needed = self.reader_count() + 3;
         if needed > self.shared.buffers.len() {
             return Ok(None);
@@ -111,7 +111,7 @@ impl<T: Send + Sync> Writer<T> {
         }
         // It cannot change: this is the writer.
         self.shared.buffers[self.latest].word.fetch_add(1, Relaxed);
-        Ok(Some(Reader {
+        Ok(Some(PoolReader {
             shared: Arc::clone(&self.shared),
             version: self.version,
             own: self.latest,
@@ -146,13 +146,13 @@ impl<T: Send + Sync> Writer<T> {
     }
 }
 
-impl<T> Drop for Writer<T> {
+impl<T> Drop for PoolWriter<T> {
     fn drop(&mut self) {
         self.shared.latest.fetch_or(OVER, ANNOUNCE);
     }
 }
 
-impl<T> Reader<T> {
+impl<T> PoolReader<T> {
     /// Lets go of what it holds for the latest, if there is a later one: whether there is.
     pub fn take(&mut self) -> bool {
         let shared = &*self.shared;
@@ -187,13 +187,13 @@ impl<T> Reader<T> {
     }
 }
 
-impl<T> Drop for Reader<T> {
+impl<T> Drop for PoolReader<T> {
     fn drop(&mut self) {
         self.shared.buffers[self.own].word.fetch_sub(1, LET_GO);
     }
 }
 
-impl<T> Shared<T> {
+impl<T> PoolShared<T> {
     /// Claims the latest: its version, and where it is.
     fn claim(&self) -> (u64, usize) {
         loop {

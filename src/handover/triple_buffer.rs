@@ -15,44 +15,44 @@ const NEW: u8 = 4;
 const WHICH: u8 = 3;
 
 #[derive(Debug)]
-struct Shared<T> {
+struct BufferShared<T> {
     buffers: [UnsafeCell<T>; 3],
     between: AtomicU8,
 }
 
 // SAFETY: which thread uses a buffer is settled by exchanges of `between`: never two the same.
-unsafe impl<T: Send> Sync for Shared<T> {}
+unsafe impl<T: Send> Sync for BufferShared<T> {}
 // SAFETY: it owns what it holds.
-unsafe impl<T: Send> Send for Shared<T> {}
+unsafe impl<T: Send> Send for BufferShared<T> {}
 
 /// The writing side.
 #[derive(Debug)]
-pub(crate) struct Writer<T> {
-    shared: Arc<Shared<T>>,
+pub(crate) struct BufferWriter<T> {
+    shared: Arc<BufferShared<T>>,
     own: u8,
 }
 
 /// The reading side.
 #[derive(Debug)]
-pub(crate) struct Reader<T> {
-    shared: Arc<Shared<T>>,
+pub(crate) struct BufferReader<T> {
+    shared: Arc<BufferShared<T>>,
     own: u8,
 }
 
 /// Both sides of a hand-over of values that begin as these.
-pub(crate) fn triple_buffer<T: Send>(contents: [T; 3]) -> (Writer<T>, Reader<T>) {
-    let shared = Arc::new(Shared {
+pub(crate) fn triple_buffer<T: Send>(contents: [T; 3]) -> (BufferWriter<T>, BufferReader<T>) {
+    let shared = Arc::new(BufferShared {
         buffers: contents.map(UnsafeCell::new),
         between: AtomicU8::new(1),
     });
-    let writer = Writer {
+    let writer = BufferWriter {
         shared: Arc::clone(&shared),
         own: 0,
     };
-    (writer, Reader { shared, own: 2 })
+    (writer, BufferReader { shared, own: 2 })
 }
 
-impl<T> Writer<T> {
+impl<T> BufferWriter<T> {
     /// Writes over what one of the last three calls wrote, and hands it over.
     pub fn write<R>(&mut self, write: impl FnOnce(&mut T) -> R) -> R {
         let result = self.shared.buffers[usize::from(self.own)].with_mut(|buffer| {
@@ -64,7 +64,7 @@ impl<T> Writer<T> {
     }
 }
 
-impl<T> Reader<T> {
+impl<T> BufferReader<T> {
     /// Takes what was written last: whether there was something that had not been read.
     pub fn take(&mut self) -> bool {
         // Only the reader takes NEW away, so what is seen here is still there when it exchanges.

@@ -2,7 +2,7 @@
 
 use crate::base::{Error, Result, ToolId, above_zero, not_negative};
 
-use super::six::Six;
+use super::six::Vector6;
 
 /// Turning is at least so many times as stiff, at the lever, as going along: less is lost in rounding where both are solved for at once.
 const SOFTEST: f64 = 1e-6;
@@ -121,6 +121,6 @@ pub(crate) struct Coupling {
 }
 
 /// A pair, of what goes along and what turns, as six numbers.
-pub(crate) fn spread([along, about]: [f64; 2]) -> Six {
+pub(crate) fn spread([along, about]: [f64; 2]) -> Vector6 {
     [along, along, along, about, about, about]
 }

@@ -3,14 +3,14 @@
 use glam::{DQuat, DVec3, Vec3};
 
 use super::definition::{Coupling, spread};
-use super::model::{HapticContact, Model};
+use super::model::{HapticContact, WrenchModel};
 use super::observer::Observer;
-use super::six::{self, Six};
+use super::six::{self, Vector6};
 use crate::base::{Error, Result};
 use crate::contact::Pose;
 use crate::def::finite_vector;
 use crate::geometry::rotation;
-use crate::handover::triple_buffer::{Reader, Writer};
+use crate::handover::triple_buffer::{BufferReader, BufferWriter};
 
 /// Beside what the motion of the device explains, a tick changes the force by no more than this, N, or this part of it.
 const LEAST_CHANGE: f64 = 0.02;
@@ -70,42 +70,42 @@ pub struct HapticTick {
 #[derive(Debug)]
 pub struct HapticHandle {
     coupling: Coupling,
-    models: Reader<Model>,
-    poses: Writer<Sent>,
+    models: BufferReader<WrenchModel>,
+    poses: BufferWriter<Sent>,
     /// Where the device was in the last tick, and how fast.
-    device: Option<(DVec3, DQuat, Six)>,
+    device: Option<(DVec3, DQuat, Vector6)>,
     clock: f64,
     /// When the last model came.
     arrived: f64,
     /// What is felt beside what the model says, and how long that may take to fade, s.
-    rest: Six,
+    rest: Vector6,
     fades_in: f64,
     /// The time between the last two models, s.
     between: f64,
     /// What is felt, before limits.
-    felt: Six,
+    felt: Vector6,
     /// What the device was given last.
-    given: Six,
+    given: Vector6,
     /// What the proxy met last.
-    held: Six,
+    held: Vector6,
     gain: f64,
     observer: Observer,
 }
 
 /// What the device does in a tick.
-struct Motion {
+struct DeviceMotion {
     position: DVec3,
     orientation: DQuat,
-    velocity: Six,
+    velocity: Vector6,
     /// Since the last tick.
-    way: Six,
+    way: Vector6,
     /// What the velocity has changed since then.
-    change: Six,
+    change: Vector6,
     dt: f64,
 }
 
 impl HapticHandle {
-    pub(crate) fn new(coupling: Coupling, models: Reader<Model>, poses: Writer<Sent>) -> Self {
+    pub(crate) fn new(coupling: Coupling, models: BufferReader<WrenchModel>, poses: BufferWriter<Sent>) -> Self {
         Self {
             coupling,
             models,
@@ -180,7 +180,7 @@ impl HapticHandle {
         self.models.is_alone()
     }
 
-    fn motion(&mut self, pose: Pose, [along, about]: [Option<Vec3>; 2], dt: f64) -> Motion {
+    fn motion(&mut self, pose: Pose, [along, about]: [Option<Vec3>; 2], dt: f64) -> DeviceMotion {
         let (position, orientation) = (pose.position.as_dvec3(), pose.orientation.as_dquat().normalize());
         let lever = self.coupling.lever;
         let way = self.device.map_or(six::ZERO, |(from, turned_from, _)| {
@@ -194,7 +194,7 @@ impl HapticHandle {
             about.map_or(six::about(&way) / dt, |about| about.as_dvec3() * lever),
         );
         let last = self.device.replace((position, orientation, velocity));
-        Motion {
+        DeviceMotion {
             position,
             orientation,
             velocity,
@@ -205,7 +205,7 @@ impl HapticHandle {
     }
 
     /// What tissue does to the proxy by the model.
-    fn pressed(&self, motion: &Motion, spring: &Six) -> Six {
+    fn pressed(&self, motion: &DeviceMotion, spring: &Vector6) -> Vector6 {
         self.models.read(|model| {
             let device = model.motion_to(motion.position, motion.orientation, self.coupling.lever);
             model.wrench_at(&device, spring)
@@ -230,7 +230,7 @@ impl HapticHandle {
     }
 
     /// What the dampers do, the coupling's where tissue resists, and the observer's.
-    fn damped(&self, motion: &Motion, pressed: &Six, spring: &Six) -> Six {
+    fn damped(&self, motion: &DeviceMotion, pressed: &Vector6, spring: &Vector6) -> Vector6 {
         let velocity = &motion.velocity;
         let lag = match *pressed == six::ZERO {
             true => six::ZERO,
@@ -248,7 +248,7 @@ impl HapticHandle {
     }
 
     /// What the device is given: what the model says, no more changed than may be, and within all limits.
-    fn feel(&mut self, motion: &Motion, said: &Six) {
+    fn feel(&mut self, motion: &DeviceMotion, said: &Vector6) {
         let wanted = six::sum(&six::scaled(said, self.gain), &self.rest);
         let change = six::limited(&six::difference(&wanted, &self.felt), self.allowed(motion));
         self.felt = six::sum(&self.felt, &change);
@@ -259,9 +259,9 @@ impl HapticHandle {
     }
 
     /// Keeps account of what the proxy and the hand have done.
-    fn account(&mut self, motion: &Motion, pressed: &Six, spring: &Six) {
+    fn account(&mut self, motion: &DeviceMotion, pressed: &Vector6, spring: &Vector6) {
         let held = six::sum(pressed, &self.rest);
-        let drawn: Six = std::array::from_fn(|k| (held[k] - self.held[k]) / spring[k]);
+        let drawn: Vector6 = std::array::from_fn(|k| (held[k] - self.held[k]) / spring[k]);
         let way = six::sum(&motion.way, &drawn);
         self.observer.proxy_moved([&self.held, &held], &way);
         self.held = held;
@@ -270,8 +270,8 @@ impl HapticHandle {
     }
 
     /// By how much what is felt may change in a tick: as the springs and dampers of the coupling would, and a little.
-    fn allowed(&self, motion: &Motion) -> [f64; 2] {
-        let parts: [fn(&Six) -> DVec3; 2] = [six::along, six::about];
+    fn allowed(&self, motion: &DeviceMotion) -> [f64; 2] {
+        let parts: [fn(&Vector6) -> DVec3; 2] = [six::along, six::about];
         std::array::from_fn(|k| {
             let [way, change, felt] = [&motion.way, &motion.change, &self.felt].map(|six| parts[k](six).length());
             let moved = self.coupling.stiffness[k] * way + self.coupling.damping[k] * change;
@@ -287,8 +287,8 @@ impl HapticHandle {
     }
 
     /// Sends the proxy to the world, and tells the device.
-    fn result(&mut self, motion: &Motion, spring: &Six) -> HapticTick {
-        let drawn: Six = std::array::from_fn(|k| self.held[k] / spring[k]);
+    fn result(&mut self, motion: &DeviceMotion, spring: &Vector6) -> HapticTick {
+        let drawn: Vector6 = std::array::from_fn(|k| self.held[k] / spring[k]);
         let lever = self.coupling.lever;
         let turned = six::about(&drawn) / lever;
         let proxy = Pose {

@@ -16,6 +16,6 @@ pub use model::HapticContact;
 
 pub(crate) use definition::{Coupling, spread};
 pub(crate) use handle::Sent;
-pub(crate) use model::{Cone, MOST_CONTACTS, Model};
+pub(crate) use model::{Cone, MOST_CONTACTS, WrenchModel};
 pub(crate) use secant::Secant;
-pub(crate) use six::{Six, ZERO, about, along, difference, inverse, joined, product, scaled, sum};
+pub(crate) use six::{Vector6, ZERO, about, along, difference, inverse, joined, product, scaled, sum};

@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3, Vec3};
 
-use super::six::{self, Matrix, Six};
+use super::six::{self, Matrix6, Vector6};
 use crate::base::BodyId;
 use crate::geometry::rotation;
 
@@ -40,18 +40,18 @@ pub(crate) struct Cone {
 
 /// What a tool feels when it is moved a little: a wrench that changes with the motion.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Model {
+pub(crate) struct WrenchModel {
     /// Steps that were published.
     pub version: u64,
     /// Where the tool was in the middle of the step, for which its mean wrench stands.
     pub position: DVec3,
     pub orientation: DQuat,
     /// What the tool felt there.
-    pub wrench: Six,
+    pub wrench: Vector6,
     /// How much less it feels for a motion.
-    pub stiffness: Matrix,
+    pub stiffness: Matrix6,
     /// The inverse of this stiffness and the coupling's together.
-    pub answer: Matrix,
+    pub answer: Matrix6,
     /// None: the tool holds something, or is held between contacts, and can be pulled too.
     pub cone: Option<Cone>,
     /// What the tool has done to the tissue since the handle was made, J.
@@ -63,9 +63,9 @@ pub(crate) struct Model {
     pub contact_count: usize,
 }
 
-impl Model {
+impl WrenchModel {
     /// Nothing is near a tool that is here, led by a spring of this stiffness.
-    pub fn free(position: DVec3, orientation: DQuat, spring: &Six) -> Self {
+    pub fn free(position: DVec3, orientation: DQuat, spring: &Vector6) -> Self {
         Self {
             version: 0,
             position,
@@ -83,7 +83,7 @@ impl Model {
     }
 
     /// The motion to here from where the model was made, with turns at the lever.
-    pub fn motion_to(&self, position: DVec3, orientation: DQuat, lever: f64) -> Six {
+    pub fn motion_to(&self, position: DVec3, orientation: DQuat, lever: f64) -> Vector6 {
         six::joined(
             position - self.position,
             rotation::turn_between(self.orientation, orientation) * lever,
@@ -92,7 +92,7 @@ impl Model {
 
     /// What tissue does to a proxy that a device holds on springs of this stiffness, where the device has made this motion: both are at rest
     /// with each other (Saupin, Duriez, Cotin 2008).
-    pub fn wrench_at(&self, device: &Six, spring: &Six) -> Six {
+    pub fn wrench_at(&self, device: &Vector6, spring: &Vector6) -> Vector6 {
         let pull = six::sum(&six::each(spring, device), &self.wrench);
         let proxy = six::product(&self.answer, &pull);
         let wrench = six::difference(&self.wrench, &six::product(&self.stiffness, &proxy));
@@ -100,7 +100,7 @@ impl Model {
     }
 
     /// What tissue and springs that press with this wrench give back as they let go, J.
-    pub fn gives(&self, wrench: &Six, spring: &Six) -> f64 {
+    pub fn gives(&self, wrench: &Vector6, spring: &Vector6) -> f64 {
         let square = six::dot(wrench, wrench);
         let stiffness = six::dot(wrench, &six::product(&self.stiffness, wrench)) / square;
         let stored: f64 = (0..6).map(|k| wrench[k] * wrench[k] / spring[k]).sum();
@@ -108,14 +108,14 @@ impl Model {
     }
 
     /// What of a device's velocity its proxy does not share: all where tissue is hard, nothing where there is none.
-    pub fn lag(&self, velocity: &Six) -> Six {
+    pub fn lag(&self, velocity: &Vector6) -> Vector6 {
         six::product(&self.answer, &six::product(&self.stiffness, velocity))
     }
 }
 
 impl Cone {
     /// The nearest wrench that contact can make.
-    fn nearest(&self, wrench: &Six) -> Six {
+    fn nearest(&self, wrench: &Vector6) -> Vector6 {
         let (force, torque) = (six::along(wrench), six::about(wrench));
         let pressure = force.dot(self.axis);
         if pressure <= 0.0 {

@@ -4,7 +4,7 @@
 //! falls below 0 it has made energy, by what sampling and hand-over are late, and a damper takes it back (Hannaford, Ryu 2002, at two ports).
 
 use super::definition::{Coupling, spread};
-use super::six::{self, Six};
+use super::six::{self, Vector6};
 
 /// What was lost may be had back up to what the spring stores when it is drawn out so far, m.
 const UNFELT: f64 = 2e-5;
@@ -37,17 +37,17 @@ pub(crate) struct Observer {
 
 impl Observer {
     /// The hand has moved by this way against what it felt.
-    pub fn hand_moved(&mut self, felt: &Six, way: &Six) {
+    pub fn hand_moved(&mut self, felt: &Vector6, way: &Vector6) {
         self.by_hand -= six::dot(felt, way);
     }
 
     /// The proxy has moved by this way against the mean of these.
-    pub fn proxy_moved(&mut self, held: [&Six; 2], way: &Six) {
+    pub fn proxy_moved(&mut self, held: [&Vector6; 2], way: &Vector6) {
         self.by_proxy -= 0.5 * (six::dot(held[0], way) + six::dot(held[1], way));
     }
 
     /// Balances what is known: the work on the tissue until the model was made, by the world's account and by the proxy's.
-    pub fn balance(&mut self, (work, sent_work): (f64, f64), held: &Six, coupling: &Coupling, dt: f64) {
+    pub fn balance(&mut self, (work, sent_work): (f64, f64), held: &Vector6, coupling: &Coupling, dt: f64) {
         let on_tissue = work + self.by_proxy - sent_work;
         let stiffness = spread(coupling.stiffness);
         let stored: f64 = held
@@ -85,7 +85,15 @@ impl Observer {
 
     /// The damper, N s/m, that takes back what was made of a device at this velocity. Where the device is pushed by this wrench, and by what can give
     /// back so much as it lets go, J, it is given that part of its work less that was never paid for. The world tells what was so late, s.
-    pub fn damping(&self, velocity: &Six, pushed: &Six, gives: f64, late: f64, coupling: &Coupling, dt: f64) -> f64 {
+    pub fn damping(
+        &self,
+        velocity: &Vector6,
+        pushed: &Vector6,
+        gives: f64,
+        late: f64,
+        coupling: &Coupling,
+        dt: f64,
+    ) -> f64 {
         let square = six::dot(velocity, velocity);
         let power = six::dot(pushed, velocity);
         if square == 0.0 || (self.lost >= 0.0 && power <= 0.0) {

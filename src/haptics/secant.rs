@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::six::{self, Matrix, Six};
+use super::six::{self, Matrix6, Vector6};
 use crate::geometry::rotation;
 
 /// The tool has to move by this part of its lever before anything is learnt: less is lost in what tissue does by itself.
@@ -16,19 +16,19 @@ const WINDOW: f64 = 0.01;
 
 /// Where a tool was, and what it felt there, in the mean of some steps.
 #[derive(Clone, Copy, Debug)]
-struct Sample {
+struct WrenchSample {
     position: DVec3,
     orientation: DQuat,
-    wrench: Six,
+    wrench: Vector6,
 }
 
 /// The stiffness that explains the last ways of a tool with the least change (Powell's symmetric form of Broyden's update, 1970).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Secant {
-    last: Option<Sample>,
+    last: Option<WrenchSample>,
     /// What has been felt since then, the mean of so many seconds.
-    next: Option<(Sample, f64)>,
-    stiffness: Matrix,
+    next: Option<(WrenchSample, f64)>,
+    stiffness: Matrix6,
 }
 
 impl Secant {
@@ -41,14 +41,21 @@ impl Secant {
     }
 
     /// The stiffness as it is known, N/m.
-    pub fn stiffness(&self) -> &Matrix {
+    pub fn stiffness(&self) -> &Matrix6 {
         &self.stiffness
     }
 
     /// Learns from what a tool felt here in a step of `dt` seconds, with turns at the lever, m, beside a coupling of this stiffness, N/m; where it
     /// touches nothing what was learnt is forgotten.
-    pub fn learn(&mut self, (position, orientation): (DVec3, DQuat), wrench: &Six, dt: f64, lever: f64, coupling: f64) {
-        let sample = Sample {
+    pub fn learn(
+        &mut self,
+        (position, orientation): (DVec3, DQuat),
+        wrench: &Vector6,
+        dt: f64,
+        lever: f64,
+        coupling: f64,
+    ) {
+        let sample = WrenchSample {
             position,
             orientation,
             wrench: *wrench,
@@ -71,7 +78,7 @@ impl Secant {
             self.next = None;
             return;
         };
-        let Sample {
+        let WrenchSample {
             position,
             orientation,
             wrench,
@@ -99,7 +106,7 @@ impl Secant {
     }
 }
 
-impl Sample {
+impl WrenchSample {
     /// With a part of another: the mean of both.
     fn and(&self, other: &Self, part: f64) -> Self {
         Self {
@@ -128,7 +135,7 @@ mod tests {
         }
         let lever = 0.01;
         let mut secant = Secant::new();
-        let base: Six = [1.0, 0.5, 0.0, 0.2, 0.0, 0.1];
+        let base: Vector6 = [1.0, 0.5, 0.0, 0.2, 0.0, 0.1];
         for round in 0..60 {
             for axis in 0..6 {
                 let mut motion = six::ZERO;

@@ -5,56 +5,56 @@
 
 use glam::DVec3;
 
-pub(crate) type Six = [f64; 6];
+pub(crate) type Vector6 = [f64; 6];
 
 /// A symmetric matrix of six rows.
-pub(crate) type Matrix = [Six; 6];
+pub(crate) type Matrix6 = [Vector6; 6];
 
-pub(crate) const ZERO: Six = [0.0; 6];
-pub(crate) const NOTHING: Matrix = [ZERO; 6];
+pub(crate) const ZERO: Vector6 = [0.0; 6];
+pub(crate) const NOTHING: Matrix6 = [ZERO; 6];
 
 /// What goes along and what turns as six numbers.
-pub(crate) fn joined(along: DVec3, about: DVec3) -> Six {
+pub(crate) fn joined(along: DVec3, about: DVec3) -> Vector6 {
     [along.x, along.y, along.z, about.x, about.y, about.z]
 }
 
 /// What goes along.
-pub(crate) fn along(six: &Six) -> DVec3 {
+pub(crate) fn along(six: &Vector6) -> DVec3 {
     DVec3::new(six[0], six[1], six[2])
 }
 
 /// What turns.
-pub(crate) fn about(six: &Six) -> DVec3 {
+pub(crate) fn about(six: &Vector6) -> DVec3 {
     DVec3::new(six[3], six[4], six[5])
 }
 
-pub(crate) fn sum(a: &Six, b: &Six) -> Six {
+pub(crate) fn sum(a: &Vector6, b: &Vector6) -> Vector6 {
     std::array::from_fn(|k| a[k] + b[k])
 }
 
-pub(crate) fn difference(a: &Six, b: &Six) -> Six {
+pub(crate) fn difference(a: &Vector6, b: &Vector6) -> Vector6 {
     std::array::from_fn(|k| a[k] - b[k])
 }
 
-pub(crate) fn scaled(a: &Six, by: f64) -> Six {
+pub(crate) fn scaled(a: &Vector6, by: f64) -> Vector6 {
     a.map(|part| part * by)
 }
 
 /// Number by number.
-pub(crate) fn each(a: &Six, b: &Six) -> Six {
+pub(crate) fn each(a: &Vector6, b: &Vector6) -> Vector6 {
     std::array::from_fn(|k| a[k] * b[k])
 }
 
-pub(crate) fn dot(a: &Six, b: &Six) -> f64 {
+pub(crate) fn dot(a: &Vector6, b: &Vector6) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-pub(crate) fn product(matrix: &Matrix, six: &Six) -> Six {
+pub(crate) fn product(matrix: &Matrix6, six: &Vector6) -> Vector6 {
     std::array::from_fn(|row| dot(&matrix[row], six))
 }
 
 /// Both parts no longer than these.
-pub(crate) fn limited(six: &Six, [most_along, most_about]: [f64; 2]) -> Six {
+pub(crate) fn limited(six: &Vector6, [most_along, most_about]: [f64; 2]) -> Vector6 {
     joined(
         along(six).clamp_length_max(most_along),
         about(six).clamp_length_max(most_about),
@@ -62,12 +62,12 @@ pub(crate) fn limited(six: &Six, [most_along, most_about]: [f64; 2]) -> Six {
 }
 
 /// The matrix with these on its diagonal.
-pub(crate) fn diagonal(six: &Six) -> Matrix {
+pub(crate) fn diagonal(six: &Vector6) -> Matrix6 {
     std::array::from_fn(|row| std::array::from_fn(|column| if row == column { six[row] } else { 0.0 }))
 }
 
 /// The inverse of a symmetric positive definite matrix (Gauss and Jordan); there is one.
-pub(crate) fn inverse(matrix: &Matrix) -> Matrix {
+pub(crate) fn inverse(matrix: &Matrix6) -> Matrix6 {
     let mut left = *matrix;
     let mut inverse = diagonal(&[1.0; 6]);
     for k in 0..6 {
@@ -87,7 +87,7 @@ pub(crate) fn inverse(matrix: &Matrix) -> Matrix {
 const SWEEPS: usize = 8;
 
 /// The symmetric matrix whose eigenvalues are those of this one within a range (cyclic Jacobi rotations).
-pub(crate) fn clamped(matrix: &Matrix, range: [f64; 2]) -> Matrix {
+pub(crate) fn clamped(matrix: &Matrix6, range: [f64; 2]) -> Matrix6 {
     let mut rest = *matrix;
     let mut vectors = diagonal(&[1.0; 6]);
     for _ in 0..SWEEPS {
@@ -138,8 +138,8 @@ mod tests {
         }
     }
 
-    fn symmetric(next: &mut impl FnMut() -> f64) -> Matrix {
-        let any: Matrix = std::array::from_fn(|_| std::array::from_fn(|_| next()));
+    fn symmetric(next: &mut impl FnMut() -> f64) -> Matrix6 {
+        let any: Matrix6 = std::array::from_fn(|_| std::array::from_fn(|_| next()));
         std::array::from_fn(|i| std::array::from_fn(|j| any[i][j] + any[j][i]))
     }
 
@@ -159,7 +159,7 @@ mod tests {
                     assert!(product.abs() < 1e-12);
                 }
             }
-            let any: Six = std::array::from_fn(|_| next());
+            let any: Vector6 = std::array::from_fn(|_| next());
             assert!(dot(&any, &product(&positive, &any)) > -1e-12);
             assert!(dot(&any, &product(&negative, &any)) < 1e-12);
         }
@@ -172,7 +172,7 @@ mod tests {
             let mut matrix = clamped(&symmetric(&mut next), [0.0, 100.0]);
             (0..6).for_each(|k| matrix[k][k] += 0.1);
             let inverse = inverse(&matrix);
-            let any: Six = std::array::from_fn(|_| next());
+            let any: Vector6 = std::array::from_fn(|_| next());
             let back = product(&inverse, &product(&matrix, &any));
             assert!((0..6).all(|k| (back[k] - any[k]).abs() < 1e-11));
         }

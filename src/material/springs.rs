@@ -18,7 +18,7 @@ const CELL_DIAGONAL: f64 = 0.4 / 2.0;
 const LARGEST_MERGER: f64 = 1e-3;
 
 /// What one element adds to the stiffness of an edge, packed, N/m.
-type Share = (u64, f64);
+type EdgeShare = (u64, f64);
 
 /// The springs of a material, each once, in ascending order, and their stiffnesses in N/m.
 pub(super) fn of(
@@ -49,7 +49,7 @@ pub(super) fn of(
     }
 }
 
-fn shares(elements: &Filled, young_modulus: f64, definition: &BodyDefinition) -> Result<Vec<Share>> {
+fn shares(elements: &Filled, young_modulus: f64, definition: &BodyDefinition) -> Result<Vec<EdgeShare>> {
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let along = |corners: &[DVec3], [a, b]: [usize; 2], energy: f64| energy / corners[a].distance_squared(corners[b]);
     let mut shares;

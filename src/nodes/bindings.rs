@@ -16,7 +16,7 @@ pub(crate) struct Bound {
     pub weights: [f32; 4],
 }
 
-saved!(Bound { node, nodes, weights });
+saved! { Bound { node, nodes, weights } }
 
 impl Bound {
     /// A node that is bound to none: to itself.
@@ -65,7 +65,7 @@ pub(crate) struct Bindings {
     hidden: Vec<u64>,
 }
 
-saved!(Bindings { points, places, hidden });
+saved! { Bindings { points, places, hidden } }
 
 /// The nodes that a number stands for, with their weights: itself where it is not bound, as where nothing is.
 #[inline]

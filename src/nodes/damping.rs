@@ -20,12 +20,7 @@ pub(crate) struct NodeDamping {
     substep: f32,
 }
 
-saved!(NodeDamping {
-    rates,
-    loss,
-    gain,
-    substep
-});
+saved! { NodeDamping { rates, loss, gain, substep } }
 
 impl NodeDamping {
     pub fn new(rates: Vec<f32>) -> Result<Self> {

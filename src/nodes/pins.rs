@@ -29,17 +29,7 @@ pub(crate) struct Pin {
     pub axes: BVec3,
 }
 
-saved!(Pin {
-    node,
-    target,
-    force,
-    closing_share,
-    goal,
-    travel,
-    force_sum,
-    solved,
-    axes
-});
+saved! { Pin { node, target, force, closing_share, goal, travel, force_sum, solved, axes } }
 
 impl Pin {
     fn new(node: u32, axes: BVec3) -> Self {
@@ -107,11 +97,7 @@ pub(crate) struct Pins {
     partial_count: usize,
 }
 
-saved!(Pins {
-    pins,
-    tiles,
-    partial_count
-});
+saved! { Pins { pins, tiles, partial_count } }
 
 impl Pins {
     pub fn iter(&self) -> std::slice::Iter<'_, Pin> {

@@ -32,17 +32,7 @@ pub(crate) struct State {
     carried: usize,
 }
 
-saved!(State {
-    positions,
-    velocities,
-    forces,
-    remainders,
-    current,
-    latest,
-    settled,
-    kept,
-    carried
-});
+saved! { State { positions, velocities, forces, remainders, current, latest, settled, kept, carried } }
 
 /// What a substep reads and writes.
 pub(crate) struct Substep<'a> {

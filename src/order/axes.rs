@@ -37,7 +37,7 @@ impl Axes {
     }
 
     /// Takes the first `count` axes from steps along them, as far as there are any, and the rest accordingly.
-    pub fn fit(&mut self, steps: &Steps, count: usize) {
+    pub fn fit(&mut self, steps: &AxisSteps, count: usize) {
         for axis in 0..count {
             if steps.counts[axis] > 0.0 {
                 self.0[axis] = (steps.sums[axis] / steps.counts[axis]).as_vec3();
@@ -74,12 +74,12 @@ impl Axes {
 
 /// Single steps along the axes, in space.
 #[derive(Default)]
-pub(super) struct Steps {
+pub(super) struct AxisSteps {
     sums: [DVec3; 3],
     counts: [f64; 3],
 }
 
-impl Steps {
+impl AxisSteps {
     /// Adds an offset that is this whole multiple of the axes, if that is a single step.
     pub fn add(&mut self, offset: DVec3, multiple: [i32; 3]) {
         let axis = match multiple {

@@ -2,7 +2,7 @@
 
 use super::inverse;
 use super::links::Links;
-use super::{Row, Split, cheapest};
+use super::{BlockSplit, Row, cheapest};
 use crate::Result;
 use crate::base::memory;
 
@@ -30,7 +30,7 @@ pub(super) fn least_cost(links: &Links) -> f64 {
 /// makes of each sixteen nodes. There is a node at least.
 pub(super) fn cost(order: &[u32], links: &Links) -> Result<f64> {
     let places = inverse(order)?;
-    let mut block = Block::default();
+    let mut block = CacheBlock::default();
     // Odd, as the rows of a grid are rarely that long.
     let step = (order.len() / MOST_NODES) | 1;
     let mut sum = 0.0;
@@ -47,7 +47,7 @@ pub(super) fn cost(order: &[u32], links: &Links) -> Result<f64> {
 
 /// What counting a block needs, kept from block to block.
 #[derive(Default)]
-struct Block {
+struct CacheBlock {
     /// How far away the neighbour is, above the bits of the lane.
     links: Vec<i64>,
     rows: Vec<Row>,
@@ -56,7 +56,7 @@ struct Block {
     lines: Vec<(u64, bool)>,
 }
 
-impl Block {
+impl CacheBlock {
     fn cost(&mut self, first: i64, nodes: &[u32], places: &[u32], links: &Links) -> Result<f64> {
         let costs = links.costs;
         self.links.clear();
@@ -82,7 +82,7 @@ impl Block {
             let (kind, costs) = (0, costs);
             memory::push(&mut self.rows, Row { kind, costs, lanes })?;
         }
-        let Split { run, cost: mut sum, .. } = cheapest(&self.rows, &mut self.levels)?;
+        let BlockSplit { run, cost: mut sum, .. } = cheapest(&self.rows, &mut self.levels)?;
         for links in self.links.chunk_by(same).filter(|links| links.len() < run) {
             for &link in links {
                 let (offset, lane) = (link >> LANE_BITS, link & (LANES as i64 - 1));

@@ -26,7 +26,7 @@ use cuthill_mckee::reverse_cuthill_mckee;
 use hilbert::along_curve;
 use links::Links;
 use rows::along_rows;
-pub(crate) use split::{Costs, GATHER, Row, Split, cheapest};
+pub(crate) use split::{BlockSplit, Costs, GATHER, Row, cheapest};
 
 /// Nodes side by side whose links share columns.
 pub(crate) const LANES: usize = 16;

@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 
 use glam::{DVec3, Vec3};
 
-use super::axes::{Axes, NEAR, Steps, whole};
+use super::axes::{Axes, AxisSteps, NEAR, whole};
 use super::links::Links;
 use crate::Result;
 use crate::base::memory;
@@ -45,7 +45,7 @@ pub(super) fn along_rows(positions: &[Vec3], links: &Links) -> Result<Option<Vec
     keyed.extend(
         (0..)
             .zip(&cells)
-            .map(|(node, Cell { part, at }): (u32, _)| (*part, at[up], at[across], at[along], node)),
+            .map(|(node, LatticeCell { part, at }): (u32, _)| (*part, at[up], at[across], at[along], node)),
     );
     keyed.sort_unstable();
     let mut order = memory::reserved(cells.len())?;
@@ -55,12 +55,12 @@ pub(super) fn along_rows(positions: &[Vec3], links: &Links) -> Result<Option<Vec
 
 /// The place of a node in the lattice of its part.
 #[derive(Clone, Copy)]
-struct Cell {
+struct LatticeCell {
     part: u32,
     at: [i32; 3],
 }
 
-impl Cell {
+impl LatticeCell {
     /// Of a node that was not reached yet.
     const UNKNOWN: Self = Self {
         part: u32::MAX,
@@ -87,7 +87,7 @@ impl Cell {
 struct Walk<'a> {
     positions: &'a [Vec3],
     links: &'a Links,
-    cells: Vec<Cell>,
+    cells: Vec<LatticeCell>,
     /// Of nodes with a cell: those it was found with, and from the node's own springs once the walk went on from there.
     axes: Vec<Axes>,
     /// How many axes the lattice of the part has.
@@ -103,12 +103,12 @@ struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     /// The cells of all nodes, unless the mesh is no lattice.
-    fn through(positions: &'a [Vec3], links: &'a Links) -> Result<Option<Vec<Cell>>> {
+    fn through(positions: &'a [Vec3], links: &'a Links) -> Result<Option<Vec<LatticeCell>>> {
         let count = positions.len();
         let mut walk = Self {
             positions,
             links,
-            cells: memory::filled(Cell::UNKNOWN, count)?,
+            cells: memory::filled(LatticeCell::UNKNOWN, count)?,
             axes: memory::filled(Axes::default(), count)?,
             axis_count: 0,
             members: memory::reserved(count)?,
@@ -140,7 +140,7 @@ impl<'a> Walk<'a> {
         (axes, self.axis_count) = self.axes_at(start);
         self.reached.clear();
         self.doubtful.clear();
-        self.reach(start, Cell { part, at: [0; 3] }, axes);
+        self.reach(start, LatticeCell { part, at: [0; 3] }, axes);
         let (mut next, mut next_doubtful) = (0, 0);
         loop {
             if let Some(&node) = self.reached.get(next) {
@@ -206,7 +206,7 @@ impl<'a> Walk<'a> {
         Axes::of(offsets.iter().copied())
     }
 
-    fn reach(&mut self, node: u32, cell: Cell, axes: Axes) {
+    fn reach(&mut self, node: u32, cell: LatticeCell, axes: Axes) {
         self.cells[node as usize] = cell;
         self.axes[node as usize] = axes;
         self.reached.push(node);
@@ -217,7 +217,7 @@ impl<'a> Walk<'a> {
         let links = self.links;
         let mut axes = self.axes[node as usize];
         let to_axes = axes.inverse();
-        let mut single_steps = Steps::default();
+        let mut single_steps = AxisSteps::default();
         let first = self.reached.len();
         for &neighbour in links.of(node) {
             let offset = self.offset(node, neighbour);

@@ -52,7 +52,7 @@ impl Row {
 
 /// How a block is split.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Split {
+pub(crate) struct BlockSplit {
     /// The fewest links that make a run.
     pub run: usize,
     /// Whether springs are gathered whatever their kinds, and each brings its own parameters.
@@ -61,9 +61,9 @@ pub(crate) struct Split {
 }
 
 /// Finds the split of a block that costs least; `levels` is room to count in.
-pub(crate) fn cheapest(rows: &[Row], levels: &mut Vec<u32>) -> Result<Split> {
+pub(crate) fn cheapest(rows: &[Row], levels: &mut Vec<u32>) -> Result<BlockSplit> {
     let has_kinds = rows.windows(2).any(|pair| pair[0].kind != pair[1].kind);
-    let mut best = Split {
+    let mut best = BlockSplit {
         run: FEWEST[0],
         mixed: false,
         cost: cost(rows, FEWEST[0], false, levels)?,
@@ -71,7 +71,7 @@ pub(crate) fn cheapest(rows: &[Row], levels: &mut Vec<u32>) -> Result<Split> {
     let mut offer = |run, mixed| -> Result<()> {
         let cost = cost(rows, run, mixed, levels)?;
         if cost < best.cost {
-            best = Split { run, mixed, cost };
+            best = BlockSplit { run, mixed, cost };
         }
         Ok(())
     };

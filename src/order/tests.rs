@@ -4,10 +4,10 @@ use super::*;
 use crate::mesh::Mesh;
 use crate::random::Random;
 
-type Body = (Vec<Vec3>, Vec<[u32; 2]>);
+type TestBody = (Vec<Vec3>, Vec<[u32; 2]>);
 
 /// A lattice in rows along x, every node joined to all around it.
-fn lattice(size: [u32; 3]) -> Body {
+fn lattice(size: [u32; 3]) -> TestBody {
     let [nx, ny, nz] = size;
     let node = |x, y, z| x + nx * (y + ny * z);
     let mut positions = Vec::new();
@@ -30,7 +30,7 @@ fn lattice(size: [u32; 3]) -> Body {
 }
 
 /// The same body, its nodes and springs in random order.
-fn mixed((positions, springs): &Body) -> Body {
+fn mixed((positions, springs): &TestBody) -> TestBody {
     let mut random = Random(7);
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();
     random.shuffle(&mut order);
@@ -43,7 +43,7 @@ fn mixed((positions, springs): &Body) -> Body {
     (order.iter().map(|&node| positions[node as usize]).collect(), springs)
 }
 
-fn organ() -> Body {
+fn organ() -> TestBody {
     let organ = Mesh::organ(0.2, 0.2 / 40.0).expect("a sound organ");
     let springs = organ.edges().expect("memory for a test");
     (organ.positions, springs)
@@ -53,17 +53,17 @@ fn identity(count: usize) -> Vec<u32> {
     (0..count as u32).collect()
 }
 
-fn cost_of(order: &[u32], (positions, springs): &Body) -> f64 {
+fn cost_of(order: &[u32], (positions, springs): &TestBody) -> f64 {
     let links = Links::new(springs, &identity(positions.len()), Costs::SHARED).expect("memory for a test");
     cost(order, &links).expect("memory for a test")
 }
 
-fn cost_as_given(body: &Body) -> f64 {
+fn cost_as_given(body: &TestBody) -> f64 {
     cost_of(&identity(body.0.len()), body)
 }
 
 /// The best order, checked to be one.
-fn best((positions, springs): &Body) -> Option<Vec<u32>> {
+fn best((positions, springs): &TestBody) -> Option<Vec<u32>> {
     let order = best_order(positions, springs, Costs::SHARED).expect("memory for a test");
     if let Some(order) = &order {
         let mut sorted = order.clone();
@@ -73,7 +73,7 @@ fn best((positions, springs): &Body) -> Option<Vec<u32>> {
     order
 }
 
-fn best_cost(body: &Body) -> f64 {
+fn best_cost(body: &TestBody) -> f64 {
     let order = best(body).unwrap_or_else(|| identity(body.0.len()));
     cost_of(&order, body)
 }
@@ -157,7 +157,7 @@ fn the_order_does_not_depend_on_the_run() {
 }
 
 /// Bodies that a definition may describe, though nobody would call them meshes.
-fn nasty() -> Vec<(&'static str, Body)> {
+fn nasty() -> Vec<(&'static str, TestBody)> {
     let count = 3000;
     let mut random = Random(11);
     let mut point = |scale: f32| Vec3::new(random.unit(), random.unit(), random.unit()) * scale;

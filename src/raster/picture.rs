@@ -5,7 +5,7 @@ use super::fragment::Window;
 use super::geometry::{Geometry, Kind};
 use super::occlusion::Occlusion;
 use super::scene::Scene;
-use super::shade::{self, Encoder, Lights, Place};
+use super::shade::{self, Encoder, Lights, SurfacePlace};
 use super::shadow::ShadowMap;
 use super::view::{Homogeneous, View};
 use crate::base::memory;
@@ -74,7 +74,7 @@ struct Painter<'a> {
 
 /// What a sample sees first.
 #[derive(Clone, Copy)]
-struct Sample {
+struct PixelSample {
     depth: f32,
     triangle: u32,
     /// Of the first two corners.
@@ -89,7 +89,7 @@ struct Shaded {
 }
 
 /// The samples of a pixel.
-type Samples = [Sample; (FINE * FINE) as usize];
+type Samples = [PixelSample; (FINE * FINE) as usize];
 
 impl<'a> Painter<'a> {
     fn new(geometry: &'a Geometry, camera: &Camera, view: View, size: [u32; 2], scene: &Scene) -> Result<Self> {
@@ -142,7 +142,7 @@ impl<'a> Painter<'a> {
                 let empty = self.encoder.encode(background);
                 for x in 0..self.width {
                     let place = ((y - top) * FINE * fine_width + x * FINE) as usize;
-                    let gather = |layer: &[Sample]| -> Samples {
+                    let gather = |layer: &[PixelSample]| -> Samples {
                         let below = place + fine_width as usize;
                         [place, place + 1, below, below + 1].map(|place| layer[place])
                     };
@@ -166,7 +166,7 @@ impl<'a> Painter<'a> {
         points: &[Homogeneous],
         top: u32,
         bottom: u32,
-        samples: &mut Vec<Sample>,
+        samples: &mut Vec<PixelSample>,
         wanted: impl Fn(u32) -> bool,
     ) {
         let width = self.width * FINE;
@@ -176,7 +176,7 @@ impl<'a> Painter<'a> {
             right: width,
             bottom: bottom * FINE,
         };
-        let empty = Sample {
+        let empty = PixelSample {
             depth: f32::INFINITY,
             triangle: NOTHING,
             weights: [0.0; 2],
@@ -193,7 +193,7 @@ impl<'a> Painter<'a> {
                 let place = (fragment.y - window.top) * width + fragment.x;
                 let sample = &mut samples[place as usize];
                 if fragment.depth < sample.depth {
-                    *sample = Sample {
+                    *sample = PixelSample {
                         depth: fragment.depth,
                         triangle,
                         weights: [fragment.weights[0], fragment.weights[1]],
@@ -261,7 +261,7 @@ impl<'a> Painter<'a> {
     }
 
     /// The colour at a place in the fine grid that these samples, all of one part, stand for; `hidden`: behind something.
-    fn shade(&self, [x, y]: [f64; 2], samples: &[Sample], background: Vec3, hidden: bool) -> Option<Shaded> {
+    fn shade(&self, [x, y]: [f64; 2], samples: &[PixelSample], background: Vec3, hidden: bool) -> Option<Shaded> {
         let first = samples.first()?;
         let part = self.geometry.part(first.triangle);
         let look = &part.look;
@@ -289,7 +289,7 @@ impl<'a> Painter<'a> {
                 self.occlusion.open(x * scale, y * scale, depth, self.reach),
             )
         };
-        let place = Place {
+        let place = SurfacePlace {
             normal,
             to_eye,
             front,
@@ -312,7 +312,7 @@ impl<'a> Painter<'a> {
     }
 
     /// How much of a sample an edge of its triangle covers, 0 to 1; fades out where triangles are a few pixels.
-    fn edge_cover(&self, sample: &Sample, metres_per_pixel: f32) -> f32 {
+    fn edge_cover(&self, sample: &PixelSample, metres_per_pixel: f32) -> f32 {
         let corners = self.geometry.corners(sample.triangle);
         let [a, b, c] = corners;
         let area = (b - a).cross(c - a).length();
@@ -331,7 +331,7 @@ impl<'a> Painter<'a> {
     }
 }
 
-impl Sample {
+impl PixelSample {
     fn all_weights(&self) -> [f32; 3] {
         let [a, b] = self.weights;
         [a, b, 1.0 - a - b]

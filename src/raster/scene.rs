@@ -22,22 +22,27 @@ pub struct Look {
 }
 
 impl Look {
+    /// What the looks below have in common.
+    const MATT: Look = Look {
+        colour: [0.0; 3],
+        gloss: 0.0,
+        two_sided: false,
+        mesh_edges: 0.0,
+        show_through: 0.0,
+    };
+
     /// The wet, dark red of a liver.
     pub const TISSUE: Look = Look {
         colour: [0.62, 0.24, 0.20],
         gloss: 0.75,
-        two_sided: false,
-        mesh_edges: 0.0,
-        show_through: 0.0,
+        ..Look::MATT
     };
 
     /// What a cut has bared of it.
     pub const INSIDE: Look = Look {
         colour: [0.46, 0.10, 0.11],
         gloss: 0.5,
-        two_sided: false,
-        mesh_edges: 0.0,
-        show_through: 0.0,
+        ..Look::MATT
     };
 
     /// A light membrane with both sides alike and its mesh drawn faintly.
@@ -46,34 +51,28 @@ impl Look {
         gloss: 0.3,
         two_sided: true,
         mesh_edges: 0.3,
-        show_through: 0.0,
+        ..Look::MATT
     };
 
     /// An instrument, visible through the tissue that hides it.
     pub const INSTRUMENT: Look = Look {
         colour: [0.50, 0.57, 0.64],
         gloss: 0.9,
-        two_sided: false,
-        mesh_edges: 0.0,
         show_through: 0.8,
+        ..Look::MATT
     };
 
     /// Where an instrument presses, and how hard.
     pub const CONTACT: Look = Look {
         colour: [0.95, 0.80, 0.10],
-        gloss: 0.0,
-        two_sided: false,
-        mesh_edges: 0.0,
         show_through: 0.9,
+        ..Look::MATT
     };
 
     /// A plane to stand on.
     pub const GROUND: Look = Look {
         colour: [0.85, 0.86, 0.88],
-        gloss: 0.0,
-        two_sided: false,
-        mesh_edges: 0.0,
-        show_through: 0.0,
+        ..Look::MATT
     };
 
     /// What is coloured by numbers: dull, so that light changes its colours little.
@@ -81,8 +80,7 @@ impl Look {
         colour: [0.8, 0.8, 0.8],
         gloss: 0.15,
         two_sided: true,
-        mesh_edges: 0.0,
-        show_through: 0.0,
+        ..Look::MATT
     };
 
     /// Springs of a body that has no surface.
@@ -90,18 +88,12 @@ impl Look {
         colour: [0.70, 0.33, 0.27],
         gloss: 0.2,
         two_sided: true,
-        mesh_edges: 0.0,
-        show_through: 0.0,
+        ..Look::MATT
     };
 
     /// The same in another colour (sRGB, 0 to 1).
     pub const fn coloured(self, colour: [f32; 3]) -> Look {
         Look { colour, ..self }
-    }
-
-    /// The same with the edges of the mesh drawn this strongly, 0 to 1.
-    pub const fn with_mesh_edges(self, mesh_edges: f32) -> Look {
-        Look { mesh_edges, ..self }
     }
 }
 

@@ -26,7 +26,7 @@ pub(crate) struct Lights {
 }
 
 /// A place on a surface, as the eye sees it.
-pub(crate) struct Place {
+pub(crate) struct SurfacePlace {
     pub normal: Vec3,
     pub to_eye: Vec3,
     /// Whether the eye sees the outside.
@@ -48,7 +48,7 @@ impl Lights {
     }
 
     /// The colour of a place with this look and (linear) colour.
-    pub fn shade(&self, look: &Look, colour: Vec3, place: &Place) -> Vec3 {
+    pub fn shade(&self, look: &Look, colour: Vec3, place: &SurfacePlace) -> Vec3 {
         let inside = !place.front && !look.two_sided;
         let lit = place.lit * (0.6 + 0.4 * place.open);
         let albedo = if inside { colour * 0.6 } else { colour };
@@ -80,7 +80,7 @@ impl Lights {
 
     /// The reflection of the key light (Walter et al., "Microfacet models for refraction", 2007: GGX), with the masking
     /// of Kelemen and Szirmay-Kalos (2001).
-    fn highlight(&self, place: &Place, roughness: f32) -> f32 {
+    fn highlight(&self, place: &SurfacePlace, roughness: f32) -> f32 {
         let toward_light = place.normal.dot(self.key);
         if toward_light <= 0.0 || place.lit == 0.0 {
             return 0.0;

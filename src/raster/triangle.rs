@@ -41,9 +41,9 @@ pub fn rasterise_triangle(window: &Window, vertices: &[PixelVertex; 3], mut sink
 
     // Each edge faces the vertex whose weight it gives.
     let mut edges = [
-        Edge::new(b, c, left, top),
-        Edge::new(c, a, left, top),
-        Edge::new(a, b, left, top),
+        EdgeFunction::new(b, c, left, top),
+        EdgeFunction::new(c, a, left, top),
+        EdgeFunction::new(a, b, left, top),
     ];
     let reciprocals = [va.reciprocal, vb.reciprocal, vc.reciprocal];
     let depths = [va.depth, vb.depth, vc.depth];
@@ -82,7 +82,7 @@ pub fn rasterise_triangle(window: &Window, vertices: &[PixelVertex; 3], mut sink
 }
 
 /// One edge function along the rows: positive inside.
-struct Edge {
+struct EdgeFunction {
     /// At the leftmost pixel's centre of the current row.
     value: i64,
     step_x: i64,
@@ -91,11 +91,11 @@ struct Edge {
     least: i64,
 }
 
-impl Edge {
+impl EdgeFunction {
     fn new(from: (i64, i64), to: (i64, i64), left: i64, top: i64) -> Self {
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
         let top_or_left = dy < 0 || (dy == 0 && dx > 0);
-        Edge {
+        EdgeFunction {
             value: cross(from, to, (left * ONE + HALF, top * ONE + HALF)),
             step_x: -dy * ONE,
             step_y: dx * ONE,

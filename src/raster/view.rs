@@ -30,7 +30,7 @@ pub(crate) struct Homogeneous {
 
 /// A corner of a clipped polygon, with the weights of the triangle or line that it was cut from.
 #[derive(Clone, Copy, Default)]
-struct Corner {
+struct ClippedCorner {
     point: Homogeneous,
     weights: [f64; 3],
 }
@@ -103,8 +103,9 @@ impl View {
             return;
         }
         let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let [mut a, mut b] = [(a, corners[0]), (b, corners[1])].map(|(point, weights)| Corner { point, weights });
-        let distance = |corner: &Corner| corner.point.depth - self.near;
+        let [mut a, mut b] =
+            [(a, corners[0]), (b, corners[1])].map(|(point, weights)| ClippedCorner { point, weights });
+        let distance = |corner: &ClippedCorner| corner.point.depth - self.near;
         match (distance(&a) < 0.0, distance(&b) < 0.0) {
             (true, true) => return,
             (true, false) => a = b.towards(&a, distance(&b), distance(&a)),
@@ -113,7 +114,7 @@ impl View {
         }
         let ends = [a, b].map(|corner| corner.point.divide(self.perspective));
         rasterise_line(window, &ends, |fragment| {
-            sink(reweighted(fragment, [&a, &b, &Corner::default()]));
+            sink(reweighted(fragment, [&a, &b, &ClippedCorner::default()]));
         });
     }
 
@@ -148,7 +149,7 @@ impl View {
         if !points.iter().all(Homogeneous::is_finite) {
             return;
         }
-        let mut polygon = [Corner::default(); MAX_CORNERS];
+        let mut polygon = [ClippedCorner::default(); MAX_CORNERS];
         for (i, &point) in points.iter().enumerate() {
             polygon[i].point = point;
             polygon[i].weights[i] = 1.0;
@@ -217,14 +218,14 @@ impl Homogeneous {
     }
 }
 
-impl Corner {
+impl ClippedCorner {
     /// Where the way from here, inside by `inside`, to `other`, outside by `outside` < 0, meets the plane. Always from
     /// inside out, so that two triangles cut their common edge at the same point.
-    fn towards(&self, other: &Corner, inside: f64, outside: f64) -> Corner {
+    fn towards(&self, other: &ClippedCorner, inside: f64, outside: f64) -> ClippedCorner {
         let share = inside / (inside - outside);
         let mix = |from: f64, to: f64| from + share * (to - from);
         let (a, b) = (&self.point, &other.point);
-        Corner {
+        ClippedCorner {
             point: Homogeneous {
                 x: mix(a.x, b.x),
                 y: mix(a.y, b.y),
@@ -248,10 +249,10 @@ fn beyond(window: &Window, points: &[Homogeneous; 3]) -> bool {
 }
 
 /// The part of a convex polygon on the positive side of a plane (Sutherland and Hodgman, 1974).
-fn cut(polygon: &[Corner], distance: impl Fn(&Corner) -> f64) -> ([Corner; MAX_CORNERS], usize) {
-    let mut result = [Corner::default(); MAX_CORNERS];
+fn cut(polygon: &[ClippedCorner], distance: impl Fn(&ClippedCorner) -> f64) -> ([ClippedCorner; MAX_CORNERS], usize) {
+    let mut result = [ClippedCorner::default(); MAX_CORNERS];
     let mut count = 0;
-    let mut push = |corner: Corner| {
+    let mut push = |corner: ClippedCorner| {
         if let Some(place) = result.get_mut(count) {
             *place = corner;
             count += 1;
@@ -274,7 +275,7 @@ fn cut(polygon: &[Corner], distance: impl Fn(&Corner) -> f64) -> ([Corner; MAX_C
 }
 
 /// A fragment of a clipped piece, with weights of the whole.
-fn reweighted(fragment: Fragment, corners: [&Corner; 3]) -> Fragment {
+fn reweighted(fragment: Fragment, corners: [&ClippedCorner; 3]) -> Fragment {
     let weight = |i: usize| -> f32 {
         (0..3)
             .map(|k| f64::from(fragment.weights[k]) * corners[k].weights[i])

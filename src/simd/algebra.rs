@@ -9,7 +9,7 @@ use super::Lanes;
 pub type Vector<L> = [L; 3];
 
 /// The columns of a matrix.
-pub type Matrix<L> = [Vector<L>; 3];
+pub type Matrix3<L> = [Vector<L>; 3];
 
 /// The entries 00, 01, 02, 11, 12, 22 of a triangular or symmetric matrix.
 pub type Six<L> = [L; 6];
@@ -65,7 +65,7 @@ pub unsafe fn cross<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
 
 /// A matrix times an upper triangular one.
 #[inline(always)]
-pub unsafe fn times_upper<L: Lanes>([a, b, c]: Matrix<L>, upper: Six<L>) -> Matrix<L> {
+pub unsafe fn times_upper<L: Lanes>([a, b, c]: Matrix3<L>, upper: Six<L>) -> Matrix3<L> {
     unsafe {
         [
             scaled(a, upper[0]),
@@ -77,7 +77,7 @@ pub unsafe fn times_upper<L: Lanes>([a, b, c]: Matrix<L>, upper: Six<L>) -> Matr
 
 /// A matrix times the transposed of an upper triangular one.
 #[inline(always)]
-pub unsafe fn times_lower<L: Lanes>([a, b, c]: Matrix<L>, upper: Six<L>) -> Matrix<L> {
+pub unsafe fn times_lower<L: Lanes>([a, b, c]: Matrix3<L>, upper: Six<L>) -> Matrix3<L> {
     unsafe {
         [
             add_scaled(add_scaled(scaled(a, upper[0]), b, upper[1]), c, upper[2]),
@@ -89,7 +89,7 @@ pub unsafe fn times_lower<L: Lanes>([a, b, c]: Matrix<L>, upper: Six<L>) -> Matr
 
 /// `sum` and a matrix times a symmetric one.
 #[inline(always)]
-pub unsafe fn add_times<L: Lanes>(sum: Matrix<L>, [a, b, c]: Matrix<L>, s: Six<L>) -> Matrix<L> {
+pub unsafe fn add_times<L: Lanes>(sum: Matrix3<L>, [a, b, c]: Matrix3<L>, s: Six<L>) -> Matrix3<L> {
     unsafe {
         [
             add_scaled(add_scaled(add_scaled(sum[0], a, s[0]), b, s[1]), c, s[2]),
@@ -100,7 +100,7 @@ pub unsafe fn add_times<L: Lanes>(sum: Matrix<L>, [a, b, c]: Matrix<L>, s: Six<L
 }
 
 #[inline(always)]
-pub unsafe fn scaled_matrix<L: Lanes>([a, b, c]: Matrix<L>, factor: L) -> Matrix<L> {
+pub unsafe fn scaled_matrix<L: Lanes>([a, b, c]: Matrix3<L>, factor: L) -> Matrix3<L> {
     unsafe { [scaled(a, factor), scaled(b, factor), scaled(c, factor)] }
 }
 

@@ -7,6 +7,7 @@ use glam::Vec3;
 
 use super::Lanes;
 use super::Record;
+use super::lanes::instructions;
 use super::link_batches::{EightLinks, Sight};
 
 #[derive(Clone, Copy)]
@@ -92,39 +93,18 @@ impl Lanes for Avx2Lanes {
         unsafe { transposed(|lane: usize| twice(base, indices.add(lane)).cast_const()) }
     }
 
-    #[inline(always)]
-    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
-        Self(unsafe { _mm256_fmsub_ps(self.0, factor.0, subtrahend.0) })
+    instructions! {
+        multiply_subtract(factor, subtrahend) = _mm256_fmsub_ps;
+        add(other) = _mm256_add_ps;
+        subtract(other) = _mm256_sub_ps;
+        multiply(other) = _mm256_mul_ps;
+        divide(other) = _mm256_div_ps;
+        multiply_add(factor, summand) = _mm256_fmadd_ps;
     }
 
     #[inline(always)]
     unsafe fn size(self) -> Self {
         Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        Self(unsafe { _mm256_add_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn subtract(self, other: Self) -> Self {
-        Self(unsafe { _mm256_sub_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn multiply(self, other: Self) -> Self {
-        Self(unsafe { _mm256_mul_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn divide(self, other: Self) -> Self {
-        Self(unsafe { _mm256_div_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
-        Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, summand.0) })
     }
 
     #[inline(always)]

@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::Lanes;
 use super::Record;
 use super::avx2::{Avx2Lanes, add_record, four_at, four_near, record, twice};
+use super::lanes::instructions;
 use super::link_batches::{EightLinks, Sight};
 
 #[derive(Clone, Copy)]
@@ -98,39 +99,14 @@ impl Lanes for Avx512Lanes {
         unsafe { transposed(|lane: usize| twice(base, indices.add(lane)).cast_const()) }
     }
 
-    #[inline(always)]
-    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
-        Self(unsafe { _mm512_fmsub_ps(self.0, factor.0, subtrahend.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn size(self) -> Self {
-        Self(unsafe { _mm512_abs_ps(self.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        Self(unsafe { _mm512_add_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn subtract(self, other: Self) -> Self {
-        Self(unsafe { _mm512_sub_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn multiply(self, other: Self) -> Self {
-        Self(unsafe { _mm512_mul_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn divide(self, other: Self) -> Self {
-        Self(unsafe { _mm512_div_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
-        Self(unsafe { _mm512_fmadd_ps(self.0, factor.0, summand.0) })
+    instructions! {
+        multiply_subtract(factor, subtrahend) = _mm512_fmsub_ps;
+        size() = _mm512_abs_ps;
+        add(other) = _mm512_add_ps;
+        subtract(other) = _mm512_sub_ps;
+        multiply(other) = _mm512_mul_ps;
+        divide(other) = _mm512_div_ps;
+        multiply_add(factor, summand) = _mm512_fmadd_ps;
     }
 
     #[inline(always)]

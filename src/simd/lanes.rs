@@ -100,3 +100,15 @@ pub(crate) trait Lanes: Copy {
     /// Whether any lane is NaN.
     unsafe fn any_nan(self) -> bool;
 }
+
+/// Functions of lanes that are one instruction each.
+macro_rules! instructions {
+    ($($name:ident($($operand:ident),*) = $instruction:ident;)*) => {$(
+        #[inline(always)]
+        unsafe fn $name(self $(, $operand: Self)*) -> Self {
+            Self(unsafe { $instruction(self.0 $(, $operand.0)*) })
+        }
+    )*};
+}
+
+pub(super) use instructions;

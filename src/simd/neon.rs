@@ -4,6 +4,7 @@ use std::arch::aarch64::*;
 
 use super::Lanes;
 use super::Record;
+use super::lanes::instructions;
 
 #[derive(Clone, Copy)]
 pub(super) struct NeonLanes(float32x4_t);
@@ -90,29 +91,12 @@ impl Lanes for NeonLanes {
         Self(unsafe { vnegq_f32(vfmsq_f32(subtrahend.0, self.0, factor.0)) })
     }
 
-    #[inline(always)]
-    unsafe fn size(self) -> Self {
-        Self(unsafe { vabsq_f32(self.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        Self(unsafe { vaddq_f32(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn subtract(self, other: Self) -> Self {
-        Self(unsafe { vsubq_f32(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn multiply(self, other: Self) -> Self {
-        Self(unsafe { vmulq_f32(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn divide(self, other: Self) -> Self {
-        Self(unsafe { vdivq_f32(self.0, other.0) })
+    instructions! {
+        size() = vabsq_f32;
+        add(other) = vaddq_f32;
+        subtract(other) = vsubq_f32;
+        multiply(other) = vmulq_f32;
+        divide(other) = vdivq_f32;
     }
 
     #[inline(always)]

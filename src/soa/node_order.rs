@@ -16,7 +16,7 @@ pub(crate) struct NodeOrder {
     caller: Vec<u32>,
 }
 
-saved!(NodeOrder { own, caller });
+saved! { NodeOrder { own, caller } }
 
 impl NodeOrder {
     /// Whether nodes are kept in the caller's order.

@@ -11,7 +11,7 @@ pub(crate) struct Rates {
     pub most_damped: f32,
 }
 
-saved!(Rates { stiffest, most_damped });
+saved! { Rates { stiffest, most_damped } }
 
 impl Rates {
     pub const ZERO: Self = Self {

@@ -6,13 +6,13 @@ use crate::codec::saved;
 use crate::simd::{Loops, Record};
 use crate::threads::Tiles;
 
-saved!(Record { 0 });
+saved! { Record { 0 } }
 
 /// One record per node.
 #[derive(Debug)]
 pub(crate) struct Records(Vec<Record>);
 
-saved!(Records { 0 });
+saved! { Records { 0 } }
 
 impl Records {
     /// `count` of them, all zero.

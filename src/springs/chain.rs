@@ -4,11 +4,11 @@ use crate::base::{Error, Result, memory};
 use crate::codec::{Reader, Saved, Writer};
 
 /// An element on the heap: an array of one, because its memory can be asked for in a way that may be refused.
-type Owned<T> = Box<[Element<T>; 1]>;
+type Owned<T> = Box<[ListElement<T>; 1]>;
 
 /// An element of a list.
 #[derive(Debug)]
-pub(super) struct Element<T> {
+pub(super) struct ListElement<T> {
     pub value: T,
     next: Option<Owned<T>>,
 }
@@ -53,7 +53,7 @@ impl<T> Chain<T> {
     }
 
     #[inline(always)]
-    pub fn first(&self) -> Option<&Element<T>> {
+    pub fn first(&self) -> Option<&ListElement<T>> {
         self.first.as_deref().map(|[element]| element)
     }
 
@@ -75,7 +75,7 @@ impl<T> Chain<T> {
     }
 }
 
-impl<T> Element<T> {
+impl<T> ListElement<T> {
     #[inline(always)]
     pub fn next(&self) -> Option<&Self> {
         self.next.as_deref().map(|[element]| element)
@@ -100,7 +100,7 @@ impl<T: Saved> Saved for Chain<T> {
     fn save(&self, to: &mut Writer) {
         self.iter().count().save(to);
         for value in self.iter() {
-            to.needs(size_of::<Element<T>>());
+            to.needs(size_of::<ListElement<T>>());
             value.save(to);
         }
     }
@@ -110,7 +110,7 @@ impl<T: Saved> Saved for Chain<T> {
         if count > from.left() / T::LEAST {
             return Err(from.refusal("more is announced than there is"));
         }
-        from.will_take(count.checked_mul(size_of::<Element<T>>()))?;
+        from.will_take(count.checked_mul(size_of::<ListElement<T>>()))?;
         let mut values = memory::reserved(count)?;
         T::load_all(count, &mut values, from)?;
         let mut chain = Self::EMPTY;
@@ -126,7 +126,7 @@ pub(super) struct Unlinked<T>(Owned<T>);
 /// Allocates an element.
 pub(super) fn unlinked<T>(value: T) -> Result<Unlinked<T>> {
     let mut element = memory::reserved(1)?;
-    element.push(Element { value, next: None });
+    element.push(ListElement { value, next: None });
     match element.into_boxed_slice().try_into() {
         Ok(element) => Ok(Unlinked(element)),
         Err(_) => Err(Error::Internal("a list's element is not one".into())),

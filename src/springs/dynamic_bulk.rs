@@ -5,11 +5,11 @@
 
 use std::ops::RangeInclusive;
 
-use super::chain::{Chain, Element, Unlinked, unlinked};
+use super::chain::{Chain, ListElement, Unlinked, unlinked};
 use super::ends::Ends;
 use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
-use super::{Change, Link, Motion, Springs, already_joined, not_joined};
+use super::{Link, Motion, SpringChange, Springs, already_joined, not_joined};
 use crate::base::{Result, memory};
 use crate::codec::{Saved, Writer, saved};
 use crate::def::Spring;
@@ -29,10 +29,10 @@ struct Bulks<L> {
     more: Chain<Bulk<L>>,
 }
 
-saved!([L: Saved] Bulks<L> { first, more });
+saved! { [L: Saved] Bulks<L> { first, more } }
 
 /// Where a node's next link goes, with memory for it.
-enum Room<L> {
+enum LinkRoom<L> {
     Open,
     First(Bulk<L>),
     More(Unlinked<Bulk<L>>),
@@ -67,24 +67,24 @@ impl<L: KeptLink> Bulks<L> {
     }
 
     /// Finds room for a link, in a new array of `places` where there is none.
-    fn room(&mut self, places: usize) -> Result<Room<L>> {
+    fn room(&mut self, places: usize) -> Result<LinkRoom<L>> {
         if self.open().is_some() {
-            return Ok(Room::Open);
+            return Ok(LinkRoom::Open);
         }
         let bulk = memory::filled(L::EMPTY, places)?.into_boxed_slice();
         if self.first.is_empty() {
-            Ok(Room::First(bulk))
+            Ok(LinkRoom::First(bulk))
         } else {
-            Ok(Room::More(unlinked(bulk)?))
+            Ok(LinkRoom::More(unlinked(bulk)?))
         }
     }
 
     /// Puts in a link where room was found.
-    fn insert(&mut self, link: &Link, room: Room<L>) {
+    fn insert(&mut self, link: &Link, room: LinkRoom<L>) {
         match room {
-            Room::Open => {}
-            Room::First(bulk) => self.first = bulk,
-            Room::More(bulk) => self.more.put(bulk),
+            LinkRoom::Open => {}
+            LinkRoom::First(bulk) => self.first = bulk,
+            LinkRoom::More(bulk) => self.more.put(bulk),
         }
         if let Some(bulk) = self.open()
             && let Some(place) = empty_place(bulk)
@@ -137,7 +137,7 @@ pub(super) struct DynamicBulk<L> {
     nodes: Vec<Bulks<L>>,
 }
 
-saved!([L: Saved] DynamicBulk<L> { kernel, spring_count, springs_per_node, nodes });
+saved! { [L: Saved] DynamicBulk<L> { kernel, spring_count, springs_per_node, nodes } }
 
 impl<L: KeptLink> DynamicBulk<L> {
     /// Arrays of `springs_per_node` places; 0: chosen from the springs.
@@ -198,7 +198,7 @@ fn least_memory<L>(node_count: usize, ends: &Ends) -> usize {
     let bytes = |places: &usize| {
         let of_node = |node| {
             let arrays = ends.links(node).len().div_ceil(*places);
-            arrays * places * size_of::<L>() + arrays.saturating_sub(1) * size_of::<Element<Bulk<L>>>()
+            arrays * places * size_of::<L>() + arrays.saturating_sub(1) * size_of::<ListElement<Bulk<L>>>()
         };
         (0..node_count).map(of_node).sum::<usize>()
     };
@@ -233,7 +233,7 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
         for bulks in &self.nodes {
             held += size_of_val(&*bulks.first);
             for bulk in bulks.more.iter() {
-                held += size_of::<Element<Bulk<L>>>() + size_of_val(&**bulk);
+                held += size_of::<ListElement<Bulk<L>>>() + size_of_val(&**bulk);
             }
         }
         (2 * self.spring_count * size_of::<L>(), held)
@@ -286,8 +286,8 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
         Ok(())
     }
 
-    fn set(&mut self, changes: &[Change]) -> Result<()> {
-        for (node, link) in changes.iter().flat_map(Change::ends) {
+    fn set(&mut self, changes: &[SpringChange]) -> Result<()> {
+        for (node, link) in changes.iter().flat_map(SpringChange::ends) {
             self.nodes[node as usize].replace(&link);
         }
         Ok(())

@@ -4,11 +4,11 @@
 //! that a list must be followed from link to link: here sixteen lists are followed side by side, so that the waits for
 //! memory overlap.
 
-use super::chain::{Chain, Element, unlinked};
+use super::chain::{Chain, ListElement, unlinked};
 use super::ends::Ends;
 use super::gather::Gather;
 use super::kept::{DampedLink, KeptLink};
-use super::{Change, Link, Motion, Springs, already_joined, not_joined};
+use super::{Link, Motion, SpringChange, Springs, already_joined, not_joined};
 use crate::base::{Result, memory};
 use crate::codec::{Saved, Writer, saved};
 use crate::def::Spring;
@@ -27,11 +27,7 @@ pub(super) struct Efficient {
     lists: Vec<Chain<DampedLink>>,
 }
 
-saved!(Efficient {
-    spring_count,
-    damped,
-    lists
-});
+saved! { Efficient { spring_count, damped, lists } }
 
 impl Efficient {
     pub fn new(node_count: usize, springs: &[Spring]) -> Result<Self> {
@@ -74,7 +70,7 @@ impl Efficient {
 /// Follows lists side by side, so that all their links are in the nearest cache.
 #[inline(always)]
 fn fetch(lists: &[Chain<DampedLink>]) {
-    let mut followed: [Option<&Element<DampedLink>>; SIDE_BY_SIDE] = [None; SIDE_BY_SIDE];
+    let mut followed: [Option<&ListElement<DampedLink>>; SIDE_BY_SIDE] = [None; SIDE_BY_SIDE];
     for (followed, list) in followed.iter_mut().zip(lists) {
         *followed = list.first();
     }
@@ -117,7 +113,7 @@ impl Springs for Efficient {
     }
 
     fn bytes(&self) -> (usize, usize) {
-        let links = 2 * self.spring_count * size_of::<Element<DampedLink>>();
+        let links = 2 * self.spring_count * size_of::<ListElement<DampedLink>>();
         (links, links + self.lists.capacity() * size_of::<Chain<DampedLink>>())
     }
 
@@ -169,8 +165,8 @@ impl Springs for Efficient {
         Ok(())
     }
 
-    fn set(&mut self, changes: &[Change]) -> Result<()> {
-        for (node, link) in changes.iter().flat_map(Change::ends) {
+    fn set(&mut self, changes: &[SpringChange]) -> Result<()> {
+        for (node, link) in changes.iter().flat_map(SpringChange::ends) {
             if let Some(kept) = self.lists[node as usize].find_mut(|kept| kept.neighbour() == link.neighbour) {
                 *kept = DampedLink::of(&link);
             }

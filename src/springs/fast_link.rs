@@ -6,7 +6,7 @@
 use super::ends::Ends;
 use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
-use super::{Change, Link, Motion, Rewiring, Springs, already_joined, not_joined};
+use super::{Link, Motion, Rewiring, SpringChange, Springs, already_joined, not_joined};
 use crate::base::{Error, Result, memory};
 use crate::codec::{Saved, Writer, saved};
 use crate::def::Spring;
@@ -26,7 +26,7 @@ pub(super) struct FastLink<L> {
     places: Vec<L>,
 }
 
-saved!([L: Saved] FastLink<L> { kernel, node_count, spring_count, springs_per_node, places } where Self::has_rows);
+saved! { [L: Saved] FastLink<L> { kernel, node_count, spring_count, springs_per_node, places } where Self::has_rows }
 
 impl<L> FastLink<L> {
     fn has_rows(&self) -> bool {
@@ -215,8 +215,8 @@ impl<L: KeptLink> Springs for FastLink<L> {
         Ok(())
     }
 
-    fn set(&mut self, changes: &[Change]) -> Result<()> {
-        for (node, link) in changes.iter().flat_map(Change::ends) {
+    fn set(&mut self, changes: &[SpringChange]) -> Result<()> {
+        for (node, link) in changes.iter().flat_map(SpringChange::ends) {
             let row = self.row_mut(node);
             if let Some(place) = place_of(row, link.neighbour) {
                 row[place] = L::of(&link);

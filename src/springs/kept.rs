@@ -36,7 +36,7 @@ pub(super) struct DampedLink {
     damping: f32,
 }
 
-saved!(DampedLink { undamped, damping });
+saved! { DampedLink { undamped, damping } }
 
 impl KeptLink for UndampedLink {
     const DAMPED: bool = false;

@@ -43,12 +43,7 @@ pub(crate) struct Link {
     pub damping: f32,
 }
 
-saved!(Link {
-    neighbour,
-    stiffness,
-    rest_length,
-    damping
-});
+saved! { Link { neighbour, stiffness, rest_length, damping } }
 
 impl Link {
     /// One that pulls at nothing, of this rest length.
@@ -75,14 +70,14 @@ impl Link {
 
 /// A spring that is to have another stiffness, rest length or damping, as one of its nodes sees it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Change {
+pub(crate) struct SpringChange {
     pub node: u32,
     pub before: Link,
     /// To the same neighbour.
     pub after: Link,
 }
 
-impl Change {
+impl SpringChange {
     /// Its nodes, each with what it sees then.
     pub fn ends(&self) -> [(u32, Link); 2] {
         let other = Link {
@@ -99,7 +94,7 @@ pub(crate) struct Rewiring {
     /// Springs that there are.
     pub removed: Vec<Spring>,
     /// Others that there are, each once.
-    pub changed: Vec<Change>,
+    pub changed: Vec<SpringChange>,
     /// Between nodes that have none.
     pub added: Vec<Spring>,
 }
@@ -217,7 +212,7 @@ pub(crate) trait Springs: Debug + Send + Sync {
     fn remove(&mut self, a: u32, b: u32) -> Result<()>;
 
     /// Gives springs that there are, each once, other parameters. Changes nothing where it fails.
-    fn set(&mut self, changes: &[Change]) -> Result<()>;
+    fn set(&mut self, changes: &[SpringChange]) -> Result<()>;
 
     /// Writes which storage it is, and what it keeps.
     fn save(&self, to: &mut Writer);

@@ -6,10 +6,10 @@
 use glam::{DMat3, DVec3};
 
 use super::nonlinear::Curve;
-use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
+use super::stencils::{StencilLaw, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use super::{Event, Term};
-use crate::base::{Result, StateHasher, memory};
+use crate::base::{Result, StateHasher};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, RelaxationStep, Spring, SpringLaw, Viscosity};
 use crate::soa::NodeOrder;
@@ -25,13 +25,7 @@ pub(super) struct Arms {
     course: RelaxationStep,
 }
 
-saved!(Arms {
-    law,
-    curve,
-    viscosity,
-    stiffening,
-    course
-});
+saved! { Arms { law, curve, viscosity, stiffening, course } }
 
 /// Stresses are pulls over the spring's stiffness, m.
 #[derive(Clone, Copy, Debug)]
@@ -44,14 +38,7 @@ pub(super) struct Arm {
     kept_elastic: f32,
 }
 
-saved!(Arm {
-    rest_length,
-    load,
-    stress,
-    elastic,
-    kept_stress,
-    kept_elastic
-});
+saved! { Arm { rest_length, load, stress, elastic, kept_stress, kept_elastic } }
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let viscosity = definition.viscosity;
@@ -73,15 +60,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         stiffening,
         course: RelaxationStep::NOTHING,
     };
-    Ok(Some(memory::boxed(Stencils::new(
-        law,
-        arms,
-        definition.positions.len(),
-    )?)?))
+    Stencils::boxed(law, arms, definition.positions.len())
 }
 
 /// An arm where it is: the way from its first node to the other, and what is elastic.
-struct Placed {
+struct PlacedArm {
     way: DVec3,
     length: f64,
     strain: f64,
@@ -91,10 +74,10 @@ struct Placed {
 }
 
 impl Arms {
-    fn place(&self, arm: &Arm, [from, to]: &[DVec3; 2]) -> Placed {
+    fn place(&self, arm: &Arm, [from, to]: &[DVec3; 2]) -> PlacedArm {
         let way = *to - *from;
         let (length, rest_length) = (way.length(), f64::from(arm.rest_length));
-        let mut placed = Placed {
+        let mut placed = PlacedArm {
             way,
             length,
             strain: 0.0,
@@ -119,11 +102,11 @@ impl Arms {
         [longer + rest_length * pull, 1.0 + slope]
     }
 
-    fn pull(&self, arm: &Arm, placed: &Placed) -> f64 {
+    fn pull(&self, arm: &Arm, placed: &PlacedArm) -> f64 {
         f64::from(arm.load) + self.course.gain * placed.elastic
     }
 
-    fn stiffness(&self, arm: &Arm, placed: &Placed, is_exact: bool) -> DMat3 {
+    fn stiffness(&self, arm: &Arm, placed: &PlacedArm, is_exact: bool) -> DMat3 {
         let pull = self.pull(arm, placed);
         let across = if placed.length > 0.0 && (is_exact || pull > 0.0) {
             pull / placed.length
@@ -134,7 +117,7 @@ impl Arms {
     }
 }
 
-impl Law<2> for Arms {
+impl StencilLaw<2> for Arms {
     const SAVED_AS: u8 = 1;
 
     type Shape = Arm;

@@ -19,7 +19,7 @@ use glam::{DMat3, DVec3};
 
 use super::Term;
 use super::parting::Parting;
-use super::stencils::{Law, SeePart, Stencil, Stencils};
+use super::stencils::{SeePart, Stencil, StencilLaw, Stencils};
 use crate::base::{Error, Result, memory, not_negative};
 use crate::codec::saved;
 use crate::def::BodyDefinition;
@@ -29,11 +29,11 @@ use crate::soa::NodeOrder;
 #[derive(Debug)]
 pub(super) struct Hinges;
 
-saved!(Hinges);
+saved! { Hinges }
 
 /// A hinge at rest.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shape {
+pub(super) struct HingeShape {
     /// Where the feet of the arms lie on the edge, 0: at its first node, 1: at its second.
     feet: [f32; 2],
     /// 1/m
@@ -44,12 +44,7 @@ pub(super) struct Shape {
     sine: f32,
 }
 
-saved!(Shape {
-    feet,
-    inverse_heights,
-    cosine,
-    sine
-});
+saved! { HingeShape { feet, inverse_heights, cosine, sine } }
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let rigidity = definition.bending_stiffness;
@@ -86,7 +81,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
         }
         let reach = nodes.map(|node| rest[node as usize].abs().max_element());
         let reach = reach.into_iter().fold(0.0, f32::max);
-        let Some((shape, stiffness)) = Shape::of(nodes.map(at), f64::from(reach)) else {
+        let Some((shape, stiffness)) = HingeShape::of(nodes.map(at), f64::from(reach)) else {
             return Err(Error::invalid(format!(
                 "triangles[{}] or triangles[{}] has no area at rest: too little for bending_stiffness",
                 a.triangle, b.triangle
@@ -100,22 +95,22 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
             shape,
         });
     }
-    Ok(Some(memory::boxed(Stencils::new(Hinges, hinges, rest.len())?)?))
+    Stencils::boxed(Hinges, hinges, rest.len())
 }
 
 /// A side of a triangle.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
+struct TriangleSide {
     edge: [u32; 2],
     opposite: u32,
     triangle: u32,
 }
 
 /// The sides of all triangles, those of one edge in a row.
-fn sides(triangles: &[[u32; 3]]) -> Result<Vec<Side>> {
+fn sides(triangles: &[[u32; 3]]) -> Result<Vec<TriangleSide>> {
     let mut sides = memory::reserved(3 * triangles.len())?;
     for (triangle, &[a, b, c]) in (0..).zip(triangles) {
-        sides.extend([[a, b, c], [b, c, a], [c, a, b]].map(|[a, b, opposite]| Side {
+        sides.extend([[a, b, c], [b, c, a], [c, a, b]].map(|[a, b, opposite]| TriangleSide {
             edge: [a.min(b), a.max(b)],
             opposite,
             triangle,
@@ -125,7 +120,7 @@ fn sides(triangles: &[[u32; 3]]) -> Result<Vec<Side>> {
     Ok(sides)
 }
 
-impl Shape {
+impl HingeShape {
     /// Of a hinge whose corners are here at rest, with coordinates up to `reach`, and its stiffness over the flexural rigidity;
     /// `None`: a triangle has no area.
     fn of(corners: [DVec3; 4], reach: f64) -> Option<(Self, f64)> {
@@ -202,7 +197,7 @@ struct Bent {
 impl Bent {
     /// How G changes where nodes go these ways: in the first order, and what there is of the second.
     #[inline(always)]
-    fn changes(&self, shape: &Shape, ways: &[DVec3; 4]) -> [DVec3; 2] {
+    fn changes(&self, shape: &HingeShape, ways: &[DVec3; 4]) -> [DVec3; 2] {
         let [first, second] = shape.arms(ways);
         let change = (first + second) * f64::from(shape.cosine);
         if shape.sine == 0.0 {
@@ -217,7 +212,7 @@ impl Bent {
 
     /// What a weight on G is on each node.
     #[inline(always)]
-    fn spread(&self, shape: &Shape, weight: DVec3) -> [DVec3; 4] {
+    fn spread(&self, shape: &HingeShape, weight: DVec3) -> [DVec3; 4] {
         let along = weight * f64::from(shape.cosine);
         let (mut sideways, mut of_edge) = (DVec3::ZERO, DVec3::ZERO);
         if shape.sine != 0.0 {
@@ -243,17 +238,17 @@ fn cross(vector: DVec3) -> DMat3 {
 /// The share of the places in the edge.
 const EDGE: [f64; 4] = [-1.0, 1.0, 0.0, 0.0];
 
-impl Law<4> for Hinges {
+impl StencilLaw<4> for Hinges {
     const SAVED_AS: u8 = 4;
 
-    type Shape = Shape;
+    type Shape = HingeShape;
 
-    fn energy(&self, shape: &Shape, places: &[DVec3; 4]) -> f64 {
+    fn energy(&self, shape: &HingeShape, places: &[DVec3; 4]) -> f64 {
         0.5 * shape.bent(places).turn.length_squared()
     }
 
     /// Pieces of its two triangles that still have an edge together are hinges, as stiff as what they have of its area.
-    fn show_parts(&self, shape: &Shape, [a, b, c, d]: [u32; 4], parting: &Parting, see: &mut SeePart<4>) {
+    fn show_parts(&self, shape: &HingeShape, [a, b, c, d]: [u32; 4], parting: &Parting, see: &mut SeePart<4>) {
         let areas = shape.inverse_heights.map(|inverse| 1.0 / f64::from(inverse));
         let show = |see: &mut SeePart<4>| {
             for first in parting.of_cell([a, b, c]) {
@@ -272,7 +267,7 @@ impl Law<4> for Hinges {
         show(&mut |nodes, part| see(nodes, part / sum.max(1.0)));
     }
 
-    fn change(&self, shape: &Shape, places: &[DVec3; 4], ways: &[DVec3; 4]) -> f64 {
+    fn change(&self, shape: &HingeShape, places: &[DVec3; 4], ways: &[DVec3; 4]) -> f64 {
         let bent = shape.bent(places);
         let [first, second] = bent.changes(shape, ways);
         let change = first + second;
@@ -280,19 +275,19 @@ impl Law<4> for Hinges {
     }
 
     #[inline(always)]
-    fn forces(&self, shape: &Shape, places: &[DVec3; 4]) -> [DVec3; 4] {
+    fn forces(&self, shape: &HingeShape, places: &[DVec3; 4]) -> [DVec3; 4] {
         let bent = shape.bent(places);
         bent.spread(shape, -bent.turn)
     }
 
     #[inline(always)]
-    fn changes(&self, shape: &Shape, places: &[DVec3; 4], ways: &[DVec3; 4]) -> [DVec3; 4] {
+    fn changes(&self, shape: &HingeShape, places: &[DVec3; 4], ways: &[DVec3; 4]) -> [DVec3; 4] {
         let bent = shape.bent(places);
         let [change, _] = bent.changes(shape, ways);
         bent.spread(shape, -change)
     }
 
-    fn blocks(&self, shape: &Shape, places: &[DVec3; 4], is_exact: bool) -> [[DMat3; 4]; 4] {
+    fn blocks(&self, shape: &HingeShape, places: &[DVec3; 4], is_exact: bool) -> [[DMat3; 4]; 4] {
         let bent = shape.bent(places);
         let (cosine, sine) = (f64::from(shape.cosine), f64::from(shape.sine));
         let [first, second] = shape.shares();
@@ -315,7 +310,7 @@ impl Law<4> for Hinges {
     }
 
     /// With the arms no longer than 1 and the edge no longer than at rest `|dG|` is at most the sum of what is here, times the ways.
-    fn rate(&self, shape: &Shape, inverse_masses: [f64; 4]) -> f64 {
+    fn rate(&self, shape: &HingeShape, inverse_masses: [f64; 4]) -> f64 {
         let [first, second] = shape.shares();
         let (cosine, sine) = (f64::from(shape.cosine), f64::from(shape.sine).abs());
         let bound = |node: usize| {
@@ -333,7 +328,7 @@ impl Law<4> for Hinges {
 
     /// Longer arms and edges raise that bound; and with x the arms' part of it and y the edge's, G adds `|G| x y <= |G| (x + y)²/4`.
     #[inline(always)]
-    fn stiffening(&self, shape: &Shape, places: &[DVec3; 4]) -> f64 {
+    fn stiffening(&self, shape: &HingeShape, places: &[DVec3; 4]) -> f64 {
         if shape.sine == 0.0 {
             return 1.0;
         }
@@ -345,9 +340,9 @@ impl Law<4> for Hinges {
         longest + 0.25 * bent.turn.length()
     }
 
-    fn scaled(&self, shape: &Shape, length: f64) -> (Shape, f64) {
+    fn scaled(&self, shape: &HingeShape, length: f64) -> (HingeShape, f64) {
         let over = |number: f32| (f64::from(number) / length) as f32;
-        let scaled = Shape {
+        let scaled = HingeShape {
             inverse_heights: shape.inverse_heights.map(over),
             sine: over(shape.sine),
             ..*shape
@@ -355,12 +350,12 @@ impl Law<4> for Hinges {
         (scaled, 1.0)
     }
 
-    fn is_finite(&self, shape: &Shape) -> bool {
+    fn is_finite(&self, shape: &HingeShape) -> bool {
         let [first, second] = shape.inverse_heights;
         first.is_finite() && second.is_finite() && shape.sine.is_finite()
     }
 
-    fn size(&self, shape: &Shape) -> f32 {
+    fn size(&self, shape: &HingeShape) -> f32 {
         shape.inverse_heights[0]
     }
 

@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 
 use super::Term;
 use super::parting::Parting;
-use super::stencils::{Law, SeePart, Stencil, Stencils, directed, lengthening, shares, weighted};
+use super::stencils::{SeePart, Stencil, StencilLaw, Stencils, directed, lengthening, shares, weighted};
 use super::strings::Tension;
 use crate::base::{Error, Result, memory};
 use crate::codec::saved;
@@ -23,7 +23,7 @@ const UNIT: f32 = 1e-3;
 #[derive(Debug)]
 pub(super) struct Fibres;
 
-saved!(Fibres);
+saved! { Fibres }
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let (directions, stiffnesses) = (definition.fibre_directions, &definition.fibre_stiffnesses);
@@ -74,7 +74,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
     if fibres.is_empty() {
         return Ok(None);
     }
-    Ok(Some(memory::boxed(Stencils::new(Fibres, fibres, rest.len())?)?))
+    Stencils::boxed(Fibres, fibres, rest.len())
 }
 
 /// By how much a fibre is longer than at rest, as a part of its length there.
@@ -91,7 +91,7 @@ fn stiffness(fibre: DVec3) -> DMat3 {
     directed(fibre / length, 1.0, 1.0 - 1.0 / length)
 }
 
-impl Law<4> for Fibres {
+impl StencilLaw<4> for Fibres {
     const SAVED_AS: u8 = 6;
 
     type Shape = [f32; 3];

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::Term;
 use super::parting::Parting;
-use super::stencils::{Law, SeePart, Stencil, Stencils};
+use super::stencils::{SeePart, Stencil, StencilLaw, Stencils};
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, check_values};
@@ -14,17 +14,17 @@ use crate::soa::NodeOrder;
 #[derive(Debug)]
 pub(super) struct Home;
 
-saved!(Home);
+saved! { Home }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shape {
+pub(super) struct HomeShape {
     /// In the caller's coordinates, m.
     rest: Vec3,
     /// In the body's.
     local: Vec3,
 }
 
-saved!(Shape { rest, local });
+saved! { HomeShape { rest, local } }
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let (stiffnesses, node_count) = (&definition.home_stiffnesses, definition.positions.len());
@@ -38,53 +38,53 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
     springs.extend(there.map(|(node, &rest)| Stencil {
         nodes: [order.own(node as u32)],
         stiffness: stiffnesses.get(node),
-        shape: Shape { rest, local: rest },
+        shape: HomeShape { rest, local: rest },
     }));
-    Ok(Some(memory::boxed(Stencils::new(Home, springs, node_count)?)?))
+    Stencils::boxed(Home, springs, node_count)
 }
 
-impl Law<1> for Home {
+impl StencilLaw<1> for Home {
     const SAVED_AS: u8 = 0;
 
-    type Shape = Shape;
+    type Shape = HomeShape;
 
-    fn energy(&self, shape: &Shape, [place]: &[DVec3; 1]) -> f64 {
+    fn energy(&self, shape: &HomeShape, [place]: &[DVec3; 1]) -> f64 {
         0.5 * place.distance_squared(shape.local.as_dvec3())
     }
 
-    fn change(&self, shape: &Shape, [place]: &[DVec3; 1], [way]: &[DVec3; 1]) -> f64 {
+    fn change(&self, shape: &HomeShape, [place]: &[DVec3; 1], [way]: &[DVec3; 1]) -> f64 {
         way.dot(*place - shape.local.as_dvec3()) + 0.5 * way.length_squared()
     }
 
-    fn forces(&self, shape: &Shape, [place]: &[DVec3; 1]) -> [DVec3; 1] {
+    fn forces(&self, shape: &HomeShape, [place]: &[DVec3; 1]) -> [DVec3; 1] {
         [shape.local.as_dvec3() - *place]
     }
 
-    fn changes(&self, _shape: &Shape, _places: &[DVec3; 1], [way]: &[DVec3; 1]) -> [DVec3; 1] {
+    fn changes(&self, _shape: &HomeShape, _places: &[DVec3; 1], [way]: &[DVec3; 1]) -> [DVec3; 1] {
         [-*way]
     }
 
-    fn blocks(&self, _shape: &Shape, _places: &[DVec3; 1], _is_exact: bool) -> [[DMat3; 1]; 1] {
+    fn blocks(&self, _shape: &HomeShape, _places: &[DVec3; 1], _is_exact: bool) -> [[DMat3; 1]; 1] {
         [[DMat3::IDENTITY]]
     }
 
-    fn rate(&self, _shape: &Shape, [inverse_mass]: [f64; 1]) -> f64 {
+    fn rate(&self, _shape: &HomeShape, [inverse_mass]: [f64; 1]) -> f64 {
         inverse_mass
     }
 
-    fn show_parts(&self, _shape: &Shape, [node]: [u32; 1], parting: &Parting, see: &mut SeePart<1>) {
+    fn show_parts(&self, _shape: &HomeShape, [node]: [u32; 1], parting: &Parting, see: &mut SeePart<1>) {
         parting.of_node(node).for_each(|part| see(part.nodes, part.part));
     }
 
-    fn scaled(&self, shape: &Shape, _length: f64) -> (Shape, f64) {
+    fn scaled(&self, shape: &HomeShape, _length: f64) -> (HomeShape, f64) {
         (*shape, 1.0)
     }
 
-    fn is_finite(&self, _shape: &Shape) -> bool {
+    fn is_finite(&self, _shape: &HomeShape) -> bool {
         true
     }
 
-    fn move_origin(&self, shape: &mut Shape, origin: DVec3) {
+    fn move_origin(&self, shape: &mut HomeShape, origin: DVec3) {
         shape.local = (shape.rest.as_dvec3() - origin).as_vec3();
     }
 }

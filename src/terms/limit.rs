@@ -6,9 +6,9 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencils, directed, lengthening, of_springs};
+use super::stencils::{StencilLaw, Stencils, directed, lengthening, of_springs};
 use super::strings::Tension;
-use crate::base::{Error, Result, memory, not_negative};
+use crate::base::{Error, Result, not_negative};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, Spring};
 use crate::soa::NodeOrder;
@@ -21,7 +21,7 @@ pub(super) struct Limit {
     stiffening: f64,
 }
 
-saved!(Limit { strain, stiffening });
+saved! { Limit { strain, stiffening } }
 
 /// A spring is never stiffer than this many times.
 const STIFFEST: f32 = 1e6;
@@ -47,11 +47,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         strain: f64::from(strain),
         stiffening: f64::from(stiffening),
     };
-    Ok(Some(memory::boxed(Stencils::new(
-        law,
-        limits,
-        definition.positions.len(),
-    )?)?))
+    Stencils::boxed(law, limits, definition.positions.len())
 }
 
 impl Limit {
@@ -72,7 +68,7 @@ impl Limit {
     }
 }
 
-impl Law<2> for Limit {
+impl StencilLaw<2> for Limit {
     const SAVED_AS: u8 = 2;
 
     type Shape = f32;

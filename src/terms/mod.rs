@@ -14,6 +14,7 @@ mod limit;
 mod nonlinear;
 mod parting;
 mod set;
+mod stencil_term;
 mod stencils;
 mod strings;
 
@@ -28,7 +29,7 @@ use crate::codec::{Reader, Saved, Writer, saved, shape_with};
 use crate::def::{BodyDefinition, Carried, RelaxationStep, Spring, Viscosity};
 use crate::simd::ChosenKernel;
 use crate::soa::{Masses, NodeOrder, Rates, Region, Scale, TileForces, Vectors, View, tile_count};
-use crate::springs::{Change, Springs, rates_anywhere};
+use crate::springs::{SpringChange, Springs, rates_anywhere};
 use crate::threads::Team;
 use arms::Arms;
 use bending::Hinges;
@@ -38,10 +39,10 @@ use limit::Limit;
 use nonlinear::Stiffening;
 pub(crate) use parting::Parting;
 use set::Sets;
-use stencils::{Law, Stencils};
+use stencils::{StencilLaw, Stencils};
 
 /// How much the force on one node of a term lessens with the place of another, N/m, for its first nodes.
-pub(crate) type Blocks = [[DMat3; 4]; 4];
+pub(crate) type TangentBlocks = [[DMat3; 4]; 4];
 
 /// What is done to terms that remember.
 #[derive(Clone, Copy, Debug)]
@@ -83,7 +84,7 @@ pub(crate) trait Term: Debug + Send + Sync {
     fn show_changes(&self, at: &dyn Fn(usize) -> DVec3, more: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(f64));
 
     /// Shows each term's nodes and blocks: all second derivatives, or what is positive semidefinite of them.
-    fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &Blocks));
+    fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &TangentBlocks));
 
     /// Shows the nodes of each term and how stiff it is, those of no stiffness too.
     fn show_nodes(&self, see: &mut dyn FnMut(&[u32], f32));
@@ -101,7 +102,7 @@ pub(crate) trait Term: Debug + Send + Sync {
     fn remove_edge(&mut self, a: u32, b: u32) -> usize;
 
     /// The spring between two nodes has another stiffness and rest length.
-    fn set_spring(&mut self, _change: &Change) {}
+    fn set_spring(&mut self, _change: &SpringChange) {}
 
     /// Makes room for the parts that so many more nodes bring, beside so many.
     fn reserve_nodes(&mut self, node_count: usize, more: usize) -> Result<()>;
@@ -195,17 +196,7 @@ pub(crate) struct Terms {
     settled: f32,
 }
 
-saved!(Terms {
-    laws,
-    holds_any,
-    viscosity,
-    kernel,
-    sums,
-    rates,
-    rates_known,
-    stiffening,
-    settled
-});
+saved! { Terms { laws, holds_any, viscosity, kernel, sums, rates, rates_known, stiffening, settled } }
 
 impl Terms {
     /// Those that a definition asks for; `springs` are its springs. `None`: it asks for none.

@@ -7,9 +7,9 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
+use super::stencils::{StencilLaw, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, Spring, SpringLaw};
 use crate::soa::NodeOrder;
@@ -87,13 +87,7 @@ pub(super) struct Curve {
     limit: f32,
 }
 
-saved!(Curve {
-    steepness,
-    inverse_steepness,
-    quadratic,
-    cubic,
-    limit
-});
+saved! { Curve { steepness, inverse_steepness, quadratic, cubic, limit } }
 
 impl Curve {
     pub fn new(law: SpringLaw) -> Self {
@@ -167,7 +161,7 @@ pub(super) struct Stiffening {
     stiffest: f64,
 }
 
-saved!(Stiffening { law, curve, stiffest });
+saved! { Stiffening { law, curve, stiffest } }
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let law = definition.spring_law;
@@ -185,11 +179,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         curve: Curve::new(law),
         stiffest,
     };
-    Ok(Some(memory::boxed(Stencils::new(
-        law,
-        stiffening,
-        definition.positions.len(),
-    )?)?))
+    Stencils::boxed(law, stiffening, definition.positions.len())
 }
 
 /// A spring where it is.
@@ -226,7 +216,7 @@ impl Stiffening {
     }
 }
 
-impl Law<2> for Stiffening {
+impl StencilLaw<2> for Stiffening {
     const SAVED_AS: u8 = 5;
 
     type Shape = f32;

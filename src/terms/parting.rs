@@ -10,9 +10,9 @@ const NONE: u32 = u32::MAX;
 
 #[derive(Debug, Default)]
 pub(crate) struct Parting {
-    nodes: Vec<PieceOfNode>,
-    springs: Vec<PieceOfSpring>,
-    cells: Vec<PieceOfCell>,
+    nodes: Vec<NodePart>,
+    springs: Vec<SpringPart>,
+    cells: Vec<CellPart>,
     /// The faces of cells as they were, each with the place of the piece.
     faces: Vec<([u32; 3], u32)>,
     /// All nodes that terms which change have one of, in order.
@@ -20,7 +20,7 @@ pub(crate) struct Parting {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct PieceOfNode {
+struct NodePart {
     source: u32,
     node: u32,
     part: f64,
@@ -28,7 +28,7 @@ struct PieceOfNode {
 
 /// With nodes in order; of no stiffness: it is gone.
 #[derive(Clone, Copy, Debug)]
-struct PieceOfSpring {
+struct SpringPart {
     source: [u32; 2],
     nodes: [u32; 2],
     part: f64,
@@ -36,7 +36,7 @@ struct PieceOfSpring {
 
 /// A piece of a triangle, with a node that is none, or of a tetrahedron.
 #[derive(Clone, Copy, Debug)]
-struct PieceOfCell {
+struct CellPart {
     before: [u32; 4],
     nodes: [u32; 4],
     part: f64,
@@ -44,7 +44,7 @@ struct PieceOfCell {
 
 /// A part of what some nodes are joined by.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Part<const N: usize> {
+pub(super) struct StencilPart<const N: usize> {
     pub nodes: [u32; N],
     pub part: f64,
 }
@@ -56,13 +56,13 @@ fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
 impl Parting {
     /// A node is now a part of what another was, which may be itself.
     pub fn add_node(&mut self, source: u32, node: u32, part: f64) -> Result<()> {
-        memory::push(&mut self.nodes, PieceOfNode { source, node, part })
+        memory::push(&mut self.nodes, NodePart { source, node, part })
     }
 
     /// A spring is now a part of what another was; 0: it is gone.
     pub fn add_spring(&mut self, source: [u32; 2], nodes: [u32; 2], part: f64) -> Result<()> {
         let (source, nodes) = (ordered(source), ordered(nodes));
-        memory::push(&mut self.springs, PieceOfSpring { source, nodes, part })
+        memory::push(&mut self.springs, SpringPart { source, nodes, part })
     }
 
     /// The spring between these nodes is a part of what it was, if it is none of the first so many, which are in order.
@@ -85,7 +85,7 @@ impl Parting {
 
     /// A triangle or tetrahedron of these nodes is now a part of what it was between those that [`Self::know_nodes`] tells.
     pub fn add_cell(&mut self, nodes: impl Iterator<Item = u32>, part: f64, by_node: &[(u32, u32)]) -> Result<()> {
-        let mut piece = PieceOfCell {
+        let mut piece = CellPart {
             before: [NONE; 4],
             nodes: [NONE; 4],
             part,
@@ -139,10 +139,10 @@ impl Parting {
     }
 
     /// The parts of a node.
-    pub(super) fn of_node(&self, node: u32) -> impl Iterator<Item = Part<1>> {
+    pub(super) fn of_node(&self, node: u32) -> impl Iterator<Item = StencilPart<1>> {
         let first = self.nodes.partition_point(|piece| piece.source < node);
         let pieces = self.nodes[first..].iter().take_while(move |piece| piece.source == node);
-        let parts = pieces.map(|piece| Part {
+        let parts = pieces.map(|piece| StencilPart {
             nodes: [piece.node],
             part: piece.part,
         });
@@ -150,13 +150,13 @@ impl Parting {
     }
 
     /// What is left of a spring.
-    pub(super) fn of_spring(&self, nodes: [u32; 2]) -> impl Iterator<Item = Part<2>> {
+    pub(super) fn of_spring(&self, nodes: [u32; 2]) -> impl Iterator<Item = StencilPart<2>> {
         let source = ordered(nodes);
         let first = self.springs.partition_point(|piece| piece.source < source);
         let pieces = self.springs[first..]
             .iter()
             .take_while(move |piece| piece.source == source);
-        let parts = pieces.map(|piece| Part {
+        let parts = pieces.map(|piece| StencilPart {
             nodes: piece.nodes,
             part: piece.part,
         });
@@ -164,7 +164,7 @@ impl Parting {
     }
 
     /// The parts of a cell that has these nodes, three at least.
-    pub(super) fn of_cell<const N: usize>(&self, nodes: [u32; N]) -> impl Iterator<Item = Part<N>> {
+    pub(super) fn of_cell<const N: usize>(&self, nodes: [u32; N]) -> impl Iterator<Item = StencilPart<N>> {
         let mut face = [nodes[0], nodes[1], nodes[2]];
         face.sort_unstable();
         let first = self.faces.partition_point(|&(other, _)| other < face);
@@ -175,7 +175,7 @@ impl Parting {
             for (copy, node) in copies.iter_mut().zip(nodes) {
                 *copy = piece.nodes[piece.before.iter().position(|&other| other == node)?];
             }
-            Some(Part {
+            Some(StencilPart {
                 nodes: copies,
                 part: piece.part,
             })
@@ -185,8 +185,11 @@ impl Parting {
 }
 
 /// The parts, or the whole where there are none.
-fn or_whole<const N: usize>(nodes: [u32; N], parts: impl Iterator<Item = Part<N>>) -> impl Iterator<Item = Part<N>> {
+fn or_whole<const N: usize>(
+    nodes: [u32; N],
+    parts: impl Iterator<Item = StencilPart<N>>,
+) -> impl Iterator<Item = StencilPart<N>> {
     let mut parts = parts.peekable();
-    let whole = parts.peek().is_none().then_some(Part { nodes, part: 1.0 });
+    let whole = parts.peek().is_none().then_some(StencilPart { nodes, part: 1.0 });
     parts.chain(whole)
 }

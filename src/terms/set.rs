@@ -7,10 +7,10 @@
 
 use glam::{DMat3, DVec3};
 
-use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
+use super::stencils::{StencilLaw, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use super::{Event, Term};
-use crate::base::{Error, Result, StateHasher, memory};
+use crate::base::{Error, Result, StateHasher};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, RelaxationStep, Spring, SpringLaw, Yielding};
 use crate::soa::NodeOrder;
@@ -22,7 +22,7 @@ pub(super) struct Sets {
     largest: f64,
 }
 
-saved!(Sets { yield_strain, largest });
+saved! { Sets { yield_strain, largest } }
 
 /// m
 #[derive(Clone, Copy, Debug)]
@@ -33,11 +33,7 @@ pub(super) struct Set {
     kept: f32,
 }
 
-saved!(Set {
-    rest_length,
-    longer,
-    kept
-});
+saved! { Set { rest_length, longer, kept } }
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let Yielding { strain, largest } = definition.yielding;
@@ -58,16 +54,12 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         yield_strain: f64::from(strain),
         largest: f64::from(largest),
     };
-    Ok(Some(memory::boxed(Stencils::new(
-        law,
-        sets,
-        definition.positions.len(),
-    )?)?))
+    Stencils::boxed(law, sets, definition.positions.len())
 }
 
 /// What a spring does at a length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Flow {
+enum SpringFlow {
     Elastic,
     Yields,
     /// By as much as it may, longer or shorter.
@@ -76,18 +68,18 @@ enum Flow {
 
 impl Sets {
     /// By how much longer it would be at rest if it stopped at this length, m.
-    fn longer_at(&self, set: &Set, length: f64) -> (f64, Flow) {
+    fn longer_at(&self, set: &Set, length: f64) -> (f64, SpringFlow) {
         let (rest_length, longer) = (f64::from(set.rest_length), f64::from(set.longer));
         let stretch = length - rest_length - longer;
         let yielded = stretch.abs() - self.yield_strain * rest_length;
         if yielded <= 0.0 {
-            return (longer, Flow::Elastic);
+            return (longer, SpringFlow::Elastic);
         }
         let (after, most) = (longer + yielded.copysign(stretch), self.largest * rest_length);
         if after.abs() < most {
-            (after, Flow::Yields)
+            (after, SpringFlow::Yields)
         } else {
-            (after.clamp(-most, most), Flow::AtEnd)
+            (after.clamp(-most, most), SpringFlow::AtEnd)
         }
     }
 
@@ -106,7 +98,7 @@ impl Sets {
     }
 }
 
-impl Law<2> for Sets {
+impl StencilLaw<2> for Sets {
     const SAVED_AS: u8 = 3;
 
     type Shape = Set;
@@ -140,7 +132,7 @@ impl Law<2> for Sets {
         let way = *to - *from;
         let length = way.length();
         let (longer, flow) = self.longer_at(set, length);
-        let along = if flow == Flow::Yields { -1.0 } else { 0.0 };
+        let along = if flow == SpringFlow::Yields { -1.0 } else { 0.0 };
         let across = if length > 0.0 && (is_exact || longer < 0.0) {
             -longer / length
         } else {

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use glam::Vec4;
 
-use super::stencils::{Law, Stencil};
+use super::stencils::{Stencil, StencilLaw};
 use crate::def::RelaxationStep;
 use crate::simd::Loops;
 use crate::soa::{TILE, TileForces, View};
@@ -32,7 +32,7 @@ pub(super) struct Tension {
 }
 
 /// The strings that have a node of a tile.
-pub(super) struct OfTile<'a, L: Law<N>, const N: usize> {
+pub(super) struct OfTile<'a, L: StencilLaw<N>, const N: usize> {
     pub law: &'a L,
     pub all: &'a [Stencil<L::Shape, N>],
     /// Those that begin in it, and those that only end in it.
@@ -48,9 +48,9 @@ pub(super) struct OfTile<'a, L: Law<N>, const N: usize> {
 }
 
 /// A vector for each of them, by axes.
-struct Vectors([[f32; BLOCK]; 3]);
+struct StringVectors([[f32; BLOCK]; 3]);
 
-impl Vectors {
+impl StringVectors {
     const ZERO: Self = Self([[0.0; BLOCK]; 3]);
 
     #[inline(always)]
@@ -70,11 +70,11 @@ struct Block {
     strings: [u32; BLOCK],
     stiffnesses: [f32; BLOCK],
     numbers: [[f32; BLOCK]; 2],
-    lines: Vectors,
+    lines: StringVectors,
     /// How lines change.
-    changes: Vectors,
+    changes: StringVectors,
     /// What strings pull with, N.
-    pulls: Vectors,
+    pulls: StringVectors,
 }
 
 impl Block {
@@ -83,9 +83,9 @@ impl Block {
         strings: [0; BLOCK],
         stiffnesses: [0.0; BLOCK],
         numbers: [[0.0; BLOCK]; 2],
-        lines: Vectors::ZERO,
-        changes: Vectors::ZERO,
-        pulls: Vectors::ZERO,
+        lines: StringVectors::ZERO,
+        changes: StringVectors::ZERO,
+        pulls: StringVectors::ZERO,
     };
 
     /// The numbers of a string.
@@ -97,7 +97,7 @@ impl Block {
 
 /// The vector of a string, given what its nodes have; as records or not.
 #[inline(always)]
-fn line<const RECORDS: bool, L: Law<N>, const N: usize>(stencil: &Stencil<L::Shape, N>, of: &View) -> [f32; 3] {
+fn line<const RECORDS: bool, L: StencilLaw<N>, const N: usize>(stencil: &Stencil<L::Shape, N>, of: &View) -> [f32; 3] {
     let weights = L::weights(&stencil.shape);
     let first = four::<RECORDS>(of, stencil.nodes[0]);
     let mut line = Vec4::ZERO;
@@ -134,7 +134,7 @@ fn measured(line: [f32; 3]) -> (f32, f32, [f32; 3]) {
     )
 }
 
-impl<L: Law<N>, const N: usize> OfTile<'_, L, N> {
+impl<L: StencilLaw<N>, const N: usize> OfTile<'_, L, N> {
     #[inline(always)]
     fn gather<const RECORDS: bool>(&self, indices: &mut impl Iterator<Item = usize>, block: &mut Block) {
         let mut count = 0;
@@ -228,7 +228,7 @@ impl<L: Law<N>, const N: usize> OfTile<'_, L, N> {
     }
 }
 
-impl<L: Law<N>, const N: usize> Loops for OfTile<'_, L, N> {
+impl<L: StencilLaw<N>, const N: usize> Loops for OfTile<'_, L, N> {
     /// By how much the stiffest is stiffer than its rate says, 1: not at all.
     type Output = f64;
 
@@ -250,14 +250,14 @@ impl<L: Law<N>, const N: usize> Loops for OfTile<'_, L, N> {
 }
 
 /// Makes strings remember where their nodes have come to.
-pub(super) struct Aging<'a, L: Law<N>, const N: usize> {
+pub(super) struct Aging<'a, L: StencilLaw<N>, const N: usize> {
     pub law: &'a L,
     pub strings: &'a mut [Stencil<L::Shape, N>],
     pub positions: View<'a>,
     pub course: RelaxationStep,
 }
 
-impl<L: Law<N>, const N: usize> Loops for Aging<'_, L, N> {
+impl<L: StencilLaw<N>, const N: usize> Loops for Aging<'_, L, N> {
     type Output = ();
 
     #[inline(always)]

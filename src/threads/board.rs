@@ -28,7 +28,7 @@ pub(super) struct Apart<T>(pub T);
 
 /// A pass that is going on.
 #[derive(Clone, Copy)]
-struct Pass {
+struct BoardPass {
     tiles: usize,
     /// It lives as long as the pass.
     run: &'static (dyn Fn(usize) + Sync),
@@ -38,7 +38,7 @@ struct Pass {
 pub(super) struct Board {
     lanes: Vec<Apart<Lane>>,
     /// Written by the leader while no tile is left in any lane and none is being worked on; read by who has claimed one.
-    pass: Apart<UnsafeCell<Pass>>,
+    pass: Apart<UnsafeCell<BoardPass>>,
     /// Which pass it is; the leader's alone.
     generation: AtomicU32,
     /// Tiles of this pass that followers have finished.
@@ -62,7 +62,7 @@ impl Board {
         lanes.resize_with(count, Apart::default);
         Ok(Self {
             lanes,
-            pass: Apart(UnsafeCell::new(Pass { tiles: 0, run: &|_| {} })),
+            pass: Apart(UnsafeCell::new(BoardPass { tiles: 0, run: &|_| {} })),
             generation: AtomicU32::new(0),
             finished: Apart::default(),
             panicked: AtomicBool::new(false),
@@ -88,7 +88,7 @@ impl Board {
         // SAFETY: the lifetime alone changes. This function returns only after every claimed tile is finished and none
         // is left to claim, and nobody uses `run` but for a tile that it has claimed.
         let run = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), &'static (dyn Fn(usize) + Sync)>(run) };
-        let pass = Pass { tiles, run };
+        let pass = BoardPass { tiles, run };
         // SAFETY: no tile is left in any lane, so that nobody reads this.
         unsafe { *self.pass.0.get() = pass };
         self.finished.0.store(0, Ordering::Relaxed);
@@ -134,7 +134,7 @@ impl Board {
             while let Some(left) = self.lanes[lane].0.claim() {
                 // SAFETY: a tile is claimed and not finished, so that the pass cannot end, and was written before the
                 // lane was filled.
-                let Pass { tiles, run } = unsafe { *self.pass.0.get() };
+                let BoardPass { tiles, run } = unsafe { *self.pass.0.get() };
                 let tile = self.lane_start(tiles, lane + 1) - left as usize;
                 // What a panic leaves half done is looked at by nobody: the leader panics too.
                 if let Err(panic) = catch_unwind(AssertUnwindSafe(|| run(tile))) {

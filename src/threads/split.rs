@@ -22,16 +22,16 @@ pub(crate) unsafe trait Split: Sync {
 }
 
 /// A slice, borrowed mutably by whoever asks for a range that nobody else has.
-struct Shared<'a, T> {
+struct SharedSlice<'a, T> {
     start: *mut T,
     length: usize,
     slice: PhantomData<&'a mut [T]>,
 }
 
 // SAFETY: `range` is all it offers, which hands out values of `&mut T`.
-unsafe impl<T: Send> Sync for Shared<'_, T> {}
+unsafe impl<T: Send> Sync for SharedSlice<'_, T> {}
 
-impl<'a, T> Shared<'a, T> {
+impl<'a, T> SharedSlice<'a, T> {
     fn new(slice: &'a mut [T]) -> Self {
         Self {
             start: slice.as_mut_ptr(),
@@ -50,7 +50,7 @@ impl<'a, T> Shared<'a, T> {
 
 /// A slice in pieces of one length, the last shorter.
 pub(crate) struct Tiles<'a, T> {
-    slice: Shared<'a, T>,
+    slice: SharedSlice<'a, T>,
     length: usize,
 }
 
@@ -59,7 +59,7 @@ impl<'a, T> Tiles<'a, T> {
     pub fn new(slice: &'a mut [T], length: usize) -> Self {
         assert!(length > 0, "tiles have a length");
         Self {
-            slice: Shared::new(slice),
+            slice: SharedSlice::new(slice),
             length,
         }
     }
@@ -82,12 +82,12 @@ unsafe impl<'a, T: Send> Split for Tiles<'a, T> {
 }
 
 /// A slice with one item for each tile.
-pub(crate) struct Items<'a, T>(Shared<'a, T>);
+pub(crate) struct Items<'a, T>(SharedSlice<'a, T>);
 
 impl<'a, T> Items<'a, T> {
     /// As many tiles as the slice has items.
     pub fn new(slice: &'a mut [T]) -> Self {
-        Self(Shared::new(slice))
+        Self(SharedSlice::new(slice))
     }
 }
 
@@ -107,7 +107,7 @@ unsafe impl<'a, T: Send> Split for Items<'a, T> {
 
 /// A slice in pieces of various lengths.
 pub(crate) struct Ragged<'a, T> {
-    slice: Shared<'a, T>,
+    slice: SharedSlice<'a, T>,
     starts: &'a [usize],
 }
 
@@ -121,7 +121,7 @@ impl<'a, T> Ragged<'a, T> {
         let end = starts.last().copied().unwrap_or(0);
         assert!(starts.is_sorted() && end <= slice.len(), "pieces lie in order within");
         Self {
-            slice: Shared::new(slice),
+            slice: SharedSlice::new(slice),
             starts,
         }
     }

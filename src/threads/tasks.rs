@@ -26,10 +26,10 @@ type CRun = unsafe extern "C" fn(context: *mut c_void, task: Option<CTask>, task
 /// Tasks of one step help each other where they run at the same time, and each takes until the step ends: a job system
 /// should not be asked for more tasks than it has threads that are free.
 #[derive(Clone, Copy)]
-pub struct RunTasks(System);
+pub struct RunTasks(JobSystem);
 
 #[derive(Clone, Copy)]
-enum System {
+enum JobSystem {
     Rust(&'static Run),
     C { run: CRun, context: *mut c_void },
 }
@@ -43,7 +43,7 @@ impl RunTasks {
     /// A function that calls the task it is given once for every index below the count, on any threads, in any order,
     /// even one after another, and returns when all of them have.
     pub fn new(run: &'static Run) -> Self {
-        Self(System::Rust(run))
+        Self(JobSystem::Rust(run))
     }
 
     /// The same in C: `run(context, task, task_data, count)` calls `task(task_data, index)`.
@@ -52,13 +52,13 @@ impl RunTasks {
     /// As long as a world uses it, `run` may be called with `context` from any thread that steps the world; it calls
     /// `task` with the data it was given, not after it has returned, and does not return before these calls have.
     pub unsafe fn from_c(run: CRun, context: *mut c_void) -> Self {
-        Self(System::C { run, context })
+        Self(JobSystem::C { run, context })
     }
 
     fn run(self, count: u32, task: &(dyn Fn(u32) + Sync)) {
         match self.0 {
-            System::Rust(run) => run(count, task),
-            System::C { run, context } => {
+            JobSystem::Rust(run) => run(count, task),
+            JobSystem::C { run, context } => {
                 let data = (&raw const task).cast_mut().cast();
                 // SAFETY: `from_c` was promised that this call is fine, and that `task` is not used after it.
                 unsafe { run(context, Some(run_c_task), data, count) }
@@ -78,10 +78,10 @@ unsafe extern "C" fn run_c_task(data: *mut c_void, index: u32) {
 impl PartialEq for RunTasks {
     fn eq(&self, other: &Self) -> bool {
         match (self.0, other.0) {
-            (System::Rust(run), System::Rust(other)) => std::ptr::addr_eq(run, other),
+            (JobSystem::Rust(run), JobSystem::Rust(other)) => std::ptr::addr_eq(run, other),
             (
-                System::C { run, context },
-                System::C {
+                JobSystem::C { run, context },
+                JobSystem::C {
                     run: other,
                     context: its,
                 },
@@ -94,8 +94,8 @@ impl PartialEq for RunTasks {
 impl fmt::Debug for RunTasks {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self.0 {
-            System::Rust(_) => "RunTasks(Rust)",
-            System::C { .. } => "RunTasks(C)",
+            JobSystem::Rust(_) => "RunTasks(Rust)",
+            JobSystem::C { .. } => "RunTasks(C)",
         })
     }
 }
@@ -120,7 +120,7 @@ impl Tasks {
     /// The first task to begin leads, those that begin before it ends follow, and later ones have nothing to do: no task
     /// waits for one that may never begin. Where none begins, this thread leads.
     pub fn lead<R: Send>(&mut self, lead: impl FnOnce(&Team) -> R + Send) -> R {
-        let step = Step {
+        let step = TaskStep {
             board: &self.board,
             begun: AtomicUsize::new(0),
             ended: AtomicBool::new(false),
@@ -137,7 +137,7 @@ impl Tasks {
 }
 
 /// A step that tasks take together.
-struct Step<'a, F, R> {
+struct TaskStep<'a, F, R> {
     board: &'a Board,
     /// How many tasks have begun.
     begun: AtomicUsize,
@@ -148,9 +148,9 @@ struct Step<'a, F, R> {
 }
 
 // SAFETY: the cells are used by one task alone, and what is in them may go to its thread.
-unsafe impl<F: Send, R: Send> Sync for Step<'_, F, R> {}
+unsafe impl<F: Send, R: Send> Sync for TaskStep<'_, F, R> {}
 
-impl<F: FnOnce(&Team) -> R, R> Step<'_, F, R> {
+impl<F: FnOnce(&Team) -> R, R> TaskStep<'_, F, R> {
     /// Does not panic.
     fn task(&self) {
         match self.begun.fetch_add(1, Ordering::Relaxed) {

@@ -10,9 +10,9 @@ use super::*;
 use crate::base::Error;
 
 /// Numbers that look random (SplitMix64).
-struct Random(u64);
+struct SplitMix64(u64);
 
-impl Random {
+impl SplitMix64 {
     fn below(&mut self, end: usize) -> usize {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.0;
@@ -23,7 +23,7 @@ impl Random {
 }
 
 type Task<'a> = &'a (dyn Fn(u32) + Sync);
-type System = &'static (dyn for<'a> Fn(u32, Task<'a>) + Sync);
+type TestJobs = &'static (dyn for<'a> Fn(u32, Task<'a>) + Sync);
 
 fn in_order(count: u32, task: Task) {
     (0..count).for_each(task);
@@ -69,7 +69,7 @@ fn too_often(count: u32, task: Task) {
 
 fn everybody() -> Vec<Threads> {
     let workers = (1..=5).map(|count| Threads::new(count).expect("threads"));
-    let systems: [System; 6] = [&in_order, &in_reverse, &on_threads, &on_two_threads, &never, &too_often];
+    let systems: [TestJobs; 6] = [&in_order, &in_reverse, &on_threads, &on_two_threads, &never, &too_often];
     let tasks = systems.map(|run| Threads::of_tasks(RunTasks::new(run), 3).expect("room"));
     workers.chain(tasks).collect()
 }
@@ -78,7 +78,7 @@ fn everybody() -> Vec<Threads> {
 fn every_tile_of_every_pass_is_run_once_with_its_own_part() {
     for mut threads in everybody() {
         let name = format!("{threads:?}");
-        let mut random = Random(7);
+        let mut random = SplitMix64(7);
         for _ in 0..20 {
             let passes: Vec<usize> = (0..20).map(|_| random.below(40)).collect();
             let length = 1 + random.below(9);

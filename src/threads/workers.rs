@@ -15,12 +15,12 @@ struct Shared {
     asleep: Vec<Apart<AtomicBool>>,
     /// How many workers have begun.
     begun: AtomicUsize,
-    state: Apart<State>,
+    state: Apart<IdleState>,
 }
 
 /// Looked at by workers that find nothing to do.
 #[derive(Default)]
-struct State {
+struct IdleState {
     leading: AtomicBool,
     closing: AtomicBool,
 }
@@ -110,7 +110,7 @@ impl Drop for Leading<'_> {
 impl Shared {
     /// What the worker of this seat does in its life.
     fn work(&self, seat: usize) {
-        let State { leading, closing } = &self.state.0;
+        let IdleState { leading, closing } = &self.state.0;
         self.begun.fetch_add(1, Ordering::Relaxed);
         let mut seen = 0;
         let mut patience = Patience::new();

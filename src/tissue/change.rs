@@ -37,14 +37,7 @@ pub(super) struct Changing {
     pub wound: Option<Wound>,
 }
 
-saved!(Changing {
-    movers,
-    roles,
-    sides,
-    triangles,
-    first_later,
-    wound
-});
+saved! { Changing { movers, roles, sides, triangles, first_later, wound } }
 
 /// A body's surface as it is to be, and what moves it.
 pub(crate) struct SurfaceToBe<'a> {
@@ -394,12 +387,29 @@ fn place_of(places: &Vectors, body: &System, new: &[NewNode], number: u32) -> Ve
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::cutting::Sweep;
     use crate::mesh::{self, Mesh};
     use crate::random::Random;
     use crate::{Body, BodyContact, BodyDefinition, Values, World, WorldDefinition};
+
+    /// A body of springs that meets itself, with room for cuts.
+    pub fn meets_itself(mesh: &Mesh) -> BodyDefinition<'_> {
+        BodyDefinition {
+            positions: &mesh.positions,
+            masses: Values::Uniform(1e-3),
+            stiffnesses: Values::Uniform(10.0),
+            triangles: &mesh.triangles,
+            tetrahedra: &mesh.tetrahedra,
+            spare_nodes: 20_000,
+            contact: BodyContact {
+                with_itself: true,
+                ..BodyContact::NOTHING
+            },
+            ..Default::default()
+        }
+    }
 
     /// Whether it is what the skin of the body would be if it were made now, in some order.
     fn check(body: &Body, skin: &Skin) {
@@ -452,21 +462,7 @@ mod tests {
         let block = Mesh::block([0.05; 3], [5; 3]).expect("a block");
         for mesh in [sheet, block] {
             let mut world = World::new(WorldDefinition::default()).expect("a world");
-            let id = world
-                .create_body(&BodyDefinition {
-                    positions: &mesh.positions,
-                    masses: Values::Uniform(1e-3),
-                    stiffnesses: Values::Uniform(10.0),
-                    triangles: &mesh.triangles,
-                    tetrahedra: &mesh.tetrahedra,
-                    spare_nodes: 20_000,
-                    contact: BodyContact {
-                        with_itself: true,
-                        ..BodyContact::NOTHING
-                    },
-                    ..Default::default()
-                })
-                .expect("a body");
+            let id = world.create_body(&meets_itself(&mesh)).expect("a body");
             let body = world.body_mut(id).expect("a body");
             let mut skin = Skin::new(body.system()).expect("memory");
             check(body, &skin);

@@ -8,21 +8,21 @@ use crate::codec::saved;
 
 /// Of a corner or an edge.
 #[derive(Clone, Copy, Debug)]
-struct Clearance {
+struct FeatureClearance {
     /// So near it may come, m; infinity: it is not reduced.
     allowed: f32,
     /// What is nearest in the search in progress, m.
     nearest: f32,
 }
 
-saved!(Clearance { allowed, nearest });
+saved! { FeatureClearance { allowed, nearest } }
 
-const WHOLE: Clearance = Clearance {
+const WHOLE: FeatureClearance = FeatureClearance {
     allowed: f32::INFINITY,
     nearest: f32::INFINITY,
 };
 
-impl Clearance {
+impl FeatureClearance {
     fn settle(&mut self) {
         *self = Self {
             allowed: if self.nearest == f32::INFINITY || self.allowed == f32::INFINITY {
@@ -38,13 +38,13 @@ impl Clearance {
 /// The clearances of one surface.
 #[derive(Debug)]
 pub(super) struct Clearances {
-    corners: Vec<Clearance>,
-    edges: Vec<Clearance>,
+    corners: Vec<FeatureClearance>,
+    edges: Vec<FeatureClearance>,
     /// Whether the surface has been compared with no other yet.
     pub is_new: bool,
 }
 
-saved!(Clearances { corners, edges, is_new });
+saved! { Clearances { corners, edges, is_new } }
 
 /// A corner or an edge of a surface.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +63,7 @@ impl Clearances {
         })
     }
 
-    fn get_mut(&mut self, part: SurfaceFeature) -> Option<&mut Clearance> {
+    fn get_mut(&mut self, part: SurfaceFeature) -> Option<&mut FeatureClearance> {
         match part {
             SurfaceFeature::Corner(corner) => self.corners.get_mut(corner),
             SurfaceFeature::Edge(edge) => self.edges.get_mut(edge),
@@ -96,7 +96,7 @@ impl Clearances {
     /// Gives back what a part has moved away since it was reduced, once all that is near has been seen. Edges that pass through tissue are near
     /// whatever was seen: those that were made so touch it, others keep what they have.
     pub fn settle(&mut self, pierces: &[bool]) {
-        self.corners.iter_mut().for_each(Clearance::settle);
+        self.corners.iter_mut().for_each(FeatureClearance::settle);
         for (number, edge) in self.edges.iter_mut().enumerate() {
             if pierces.get(number).copied().unwrap_or(false) {
                 edge.nearest = f32::INFINITY;

@@ -13,7 +13,7 @@ const ROOM: usize = 8;
 #[derive(Debug, Default)]
 pub(super) struct Entangled(Vec<[u32; 2]>);
 
-saved!(Entangled { 0 });
+saved! { Entangled { 0 } }
 
 impl Entangled {
     /// Makes room for one more surface, where there are so many.

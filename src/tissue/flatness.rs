@@ -19,7 +19,7 @@ struct Fan {
     edges: u16,
 }
 
-saved!(Fan { normals, faces, edges });
+saved! { Fan { normals, faces, edges } }
 
 impl Fan {
     /// By how much the normals leave their mean, root mean square, rad; infinity at the rim of an open surface, which has an edge more than faces.
@@ -41,7 +41,7 @@ pub(super) struct Ridge {
     length: f32,
 }
 
-saved!(Ridge { turn, length });
+saved! { Ridge { turn, length } }
 
 impl Ridge {
     pub const UNKNOWN: Self = Self {
@@ -69,7 +69,7 @@ pub(super) struct Flatness {
     ridges: Vec<Ridge>,
 }
 
-saved!(Flatness { fans, ridges });
+saved! { Flatness { fans, ridges } }
 
 impl Flatness {
     /// Of nothing yet, with room for a surface of so many numbers of nodes, and so many edges.

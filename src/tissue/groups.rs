@@ -15,7 +15,7 @@ pub(crate) struct Groups {
     is_awake: Vec<bool>,
 }
 
-saved!(Groups { groups, is_awake });
+saved! { Groups { groups, is_awake } }
 
 impl Groups {
     /// Makes room for the body at this place.

@@ -21,7 +21,7 @@ pub(super) struct Images {
     pixel: f32,
 }
 
-saved!(Images { drawn, edges, pixel });
+saved! { Images { drawn, edges, pixel } }
 
 impl Images {
     /// Room for those of a surface.

@@ -27,7 +27,7 @@ pub(crate) struct Reach {
     pub travel: f32,
 }
 
-saved!(Reach { place, bounds, travel });
+saved! { Reach { place, bounds, travel } }
 
 /// Some bodies of a world: an island.
 #[derive(Clone, Debug, Default)]
@@ -36,7 +36,7 @@ pub(super) struct Island {
     pub pairs: Range<usize>,
 }
 
-saved!(Island { members, pairs });
+saved! { Island { members, pairs } }
 
 /// The islands of the bodies of a world.
 #[derive(Debug, Default)]
@@ -53,14 +53,7 @@ pub(crate) struct Islands {
     reaches: Vec<Reach>,
 }
 
-saved!(Islands {
-    parents,
-    members,
-    islands,
-    pairs,
-    is_full,
-    reaches
-});
+saved! { Islands { parents, members, islands, pairs, is_full, reaches } }
 
 impl Islands {
     /// Makes room for the body at this place.

@@ -10,7 +10,7 @@ use crate::solver::System;
 
 /// A node, edge or face of a body, and a point of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Side {
+pub(super) struct ContactSide {
     /// Which body, by its place in the world.
     pub body: usize,
     /// Of nodes that it does not have the weight is 0.
@@ -18,7 +18,7 @@ pub(super) struct Side {
     pub weights: [f32; 3],
 }
 
-saved!(Side { body, nodes, weights });
+saved! { ContactSide { body, nodes, weights } }
 
 /// Which sides a contact is between, whatever points of them.
 pub(super) type Key = [(usize, [u32; 3]); 2];
@@ -26,7 +26,7 @@ pub(super) type Key = [(usize, [u32; 3]); 2];
 /// A contact over one step: the first side stays clear of the second.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Link {
-    pub sides: [Side; 2],
+    pub sides: [ContactSide; 2],
     /// From the second side to the first.
     pub normal: Vec3,
     /// The mean velocity of the first side against the second along the normal is at least this, m/s.
@@ -47,22 +47,11 @@ pub(super) struct Link {
     friction_impulse: Vec3,
 }
 
-saved!(Link {
-    sides,
-    normal,
-    least_speed,
-    depth,
-    is_parted,
-    friction,
-    movers,
-    counts,
-    answers,
-    mass,
-    impulse,
-    friction_impulse
-});
+saved! { Link {
+    sides, normal, least_speed, depth, is_parted, friction, movers, counts, answers, mass, impulse, friction_impulse,
+} }
 
-impl Side {
+impl ContactSide {
     /// A node of a body.
     pub fn of_node(body: usize, node: u32) -> Self {
         Self {
@@ -120,7 +109,7 @@ fn weighted(parts: impl Iterator<Item = (u32, f32)>, vector_of: impl Fn(usize) -
 
 impl Link {
     /// A contact that has given nothing yet; `None` where neither side can move.
-    pub fn new(sides: [Side; 2], normal: Vec3, bodies: [&System; 2]) -> Option<Self> {
+    pub fn new(sides: [ContactSide; 2], normal: Vec3, bodies: [&System; 2]) -> Option<Self> {
         let mut answers = [[Vec3::ZERO; MOST]; 2];
         let (mut whole, mut leverage) = (0.0, 0.0_f32);
         let movers = [0, 1].map(|side| used_first(sides[side].movers(bodies[side])));

@@ -16,26 +16,26 @@ mod images;
 mod islands;
 mod link;
 mod lockstep;
+mod narrow_phase;
 mod nearby;
 mod pairs;
+mod plan;
 mod search;
 mod skin;
 mod warm_start;
 mod wound;
 
-pub(crate) use self::bonds::{Bonds, Bound, Lead, Thread, are_one, distance};
+pub(crate) use self::bonds::{BondPoint, Bonds, Lead, Thread, are_one, distance};
 pub(crate) use self::change::{SkinChange, SurfaceToBe};
 use self::clearances::Clearances;
 use self::entangled::Entangled;
 use self::groups::Groups;
-use self::islands::{Islands, Reach};
-use self::link::{Link, Side};
+use self::islands::Islands;
+use self::link::Link;
 pub(crate) use self::lockstep::{CoupledBody, CoupledGroup};
 use self::pairs::Pairs;
-use self::search::{Measure, Party, Search};
 pub(crate) use self::skin::Skin;
 use self::warm_start::{Pushes, give_again};
-use glam::{DVec3, Vec3};
 
 use crate::base::{Count, Result, Stage, Stopwatch, memory};
 use crate::codec::saved;
@@ -54,24 +54,9 @@ const EFFORT: Effort = Effort {
     goes_on_later: true,
 };
 
-/// An edge meets so many edges at most. With the closest alone, an edge that lies across several would be held up by each in turn, and tremble.
-const EDGES: usize = 4;
-
-/// What keeps off a surface without thickness, as a part of its short edges: in `f32` something must.
-const LEAST_THICKNESS: f32 = 1e-3;
-
-/// It is foreseen that a body becomes so many times as fast in a step; where it is faster, the step is taken again.
-const FASTER: f32 = 2.0;
-
-/// How far bodies come against each other in a substep, as a part of the short edges.
-const TRAVEL: f32 = 0.5;
-
 /// How fast one contact moves what began too close apart at most, as a part of the smaller body's extent, 1/s. The bodies keep about this speed, so
 /// it bounds the energy that they gain.
 const PARTING_SPEED: f32 = 0.3;
-
-/// How much further than they can come bodies count as near, as a part of their extents.
-const MARGIN: f32 = 0.005;
 
 /// What moves three corners, each of them bound to four nodes at most.
 const MOST_MOVERS: usize = 12;
@@ -102,18 +87,7 @@ pub(crate) struct Tissue {
     pub bonds: Bonds,
 }
 
-saved!(Tissue {
-    islands,
-    skins,
-    clearances,
-    entangled,
-    links,
-    known,
-    pushes,
-    pairs,
-    groups,
-    bonds
-});
+saved! { Tissue { islands, skins, clearances, entangled, links, known, pushes, pairs, groups, bonds } }
 
 impl Tissue {
     /// Makes room for a body at this place in the world, which meets tissue.
@@ -203,187 +177,6 @@ impl Tissue {
     fn room(&self) -> usize {
         let of_skins = self.skins.iter().flatten();
         of_skins.map(|skin| ROOM * skin.room).sum()
-    }
-
-    /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, those that are attached,
-    /// and by themselves those that meet themselves.
-    pub fn plan(&mut self, bodies: &impl Systems, dt: f32) {
-        self.islands.part(|place| {
-            let meets_itself = |body: &System| body.meets_tissue() && body.contact.with_itself;
-            bodies.at(place).is_some_and(meets_itself)
-        });
-        for [first, second] in self.bonds.bodies() {
-            self.islands.join(first, second);
-        }
-        let common = self.common_velocity(bodies);
-        let origin = self.origin(bodies);
-        let reaches = meeting(&self.skins, bodies).map(|(place, body)| {
-            let margin = body.contact.thickness + MARGIN * body.extent();
-            let bounds = body.local_bounds().moved(body.origin - origin).extended(margin);
-            Reach::new(place, bounds, &velocities(body), common, FASTER * dt)
-        });
-        let are_near = |one: &Reach, other: &Reach| {
-            let both = [one, other].map(|reach| bodies.at(reach.place as usize));
-            let [Some(first), Some(second)] = both else {
-                return false;
-            };
-            let travel = FASTER * dt * relative_speed(first, second);
-            meet_each_other(first, second) && one.bounds.extended(travel).overlaps(&other.bounds)
-        };
-        self.islands.join_near(reaches, are_near);
-        self.islands.settle();
-    }
-
-    /// Has bodies go together that came near each other in a step that was tried, and were not known to: whether there are such.
-    pub fn plan_again(&mut self, bodies: &impl Systems, dt: f32) -> bool {
-        let origin = self.origin(bodies);
-        let common = self.common_velocity(bodies) * dt;
-        let reaches = meeting(&self.skins, bodies).map(|(place, body)| Reach {
-            place: place as u32,
-            bounds: swept(body, common).moved(body.origin - origin),
-            travel: 0.0,
-        });
-        let are_near = |one: &Reach, other: &Reach| {
-            let both = [one, other].map(|reach| bodies.at(reach.place as usize));
-            matches!(both, [Some(first), Some(second)] if meet_each_other(first, second))
-        };
-        let is_changed = self.islands.join_near(reaches, are_near);
-        self.islands.settle();
-        is_changed
-    }
-
-    /// The mean of the velocities in the middle of what bodies have, m/s.
-    fn common_velocity(&self, bodies: &impl Systems) -> Vec3 {
-        let middles = meeting(&self.skins, bodies).map(|(_, body)| {
-            let all = velocities(body);
-            0.5 * (all.min + all.max)
-        });
-        let (count, sum) = middles.fold((0, Vec3::ZERO), |(count, sum), middle| (count + 1, sum + middle));
-        sum / (count.max(1) as f32)
-    }
-
-    /// Where the coordinates begin in which bodies are compared.
-    fn origin(&self, bodies: &impl Systems) -> DVec3 {
-        meeting(&self.skins, bodies)
-            .next()
-            .map_or(DVec3::ZERO, |(_, body)| body.origin)
-    }
-
-    /// Whether all bodies of an island sleep: then nothing of it changes.
-    pub fn is_asleep(&self, island: usize, bodies: &impl Systems) -> bool {
-        are_asleep(self.islands.members(island), bodies)
-    }
-
-    /// Whether all bodies of an island have been at rest for long enough, and may sleep: what is attached does not.
-    pub fn is_at_rest(&self, island: usize, bodies: &impl Systems) -> bool {
-        let members = self.islands.members(island);
-        let mut bound = self.bonds.bodies().flatten();
-        members
-            .iter()
-            .all(|&place| bodies.at(place as usize).is_some_and(System::is_at_rest))
-            && !bound.any(|place| members.contains(&(place as u32)))
-    }
-
-    /// Finds the edges of bodies that go together that pass through tissue when a step begins, or as one that was tried ends: how many
-    /// there are.
-    pub fn find_crossings(&mut self, bodies: &impl Systems, at_end: bool) -> u32 {
-        let mut count = 0_u32;
-        let islands = std::mem::take(&mut self.islands);
-        for island in 0..islands.count() {
-            let members = islands.members(island).iter().map(|&place| place as usize);
-            if are_asleep(islands.members(island), bodies) {
-                let skins = members.filter_map(|place| self.skins.get(place)?.as_ref());
-                count = skins.fold(count, |count, skin| count.saturating_add(skin.crossings));
-                continue;
-            }
-            for place in members.clone() {
-                if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at(place)) {
-                    skin.stand(body, at_end);
-                    skin.pierces.fill(false);
-                    skin.crossings = 0;
-                }
-            }
-            for a in members {
-                if bodies.at(a).is_some_and(|body| body.contact.with_itself) {
-                    count = count.saturating_add(self.mark_crossings(bodies, [a; 2]));
-                }
-            }
-            for [a, b] in islands.pairs(island) {
-                if let (Some(first), Some(second)) = (bodies.at(a), bodies.at(b))
-                    && meet_each_other(first, second)
-                {
-                    let of_pair = [[a, b], [b, a]].map(|pair| self.mark_crossings(bodies, pair));
-                    count = of_pair.into_iter().fold(count, u32::saturating_add);
-                    if !at_end {
-                        self.entangle([a, b], of_pair != [0; 2]);
-                    }
-                }
-            }
-        }
-        self.islands = islands;
-        count
-    }
-
-    /// Has two open surfaces that were made through each other let go, and those that no longer cross keep each other off again, from as near as
-    /// they are.
-    fn entangle(&mut self, pair: [usize; 2], cross: bool) {
-        let [Some(Some(first)), Some(Some(second))] = pair.map(|place| self.skins.get(place)) else {
-            return;
-        };
-        let Ok([Some(kept_a), Some(kept_b)]) = self.clearances.get_disjoint_mut(pair) else {
-            return;
-        };
-        if !cross {
-            if self.entangled.remove(pair) {
-                (kept_a.is_new, kept_b.is_new) = (true, true);
-            }
-            return;
-        }
-        let are_open = !first.is_closed && !second.is_closed;
-        if are_open && (kept_a.is_new || kept_b.is_new) {
-            // Surfaces that lie flush on each other cross by rounding.
-            let depth = first.least_thickness().min(second.least_thickness());
-            if crossing::is_deep(first, second, depth) || crossing::is_deep(second, first, depth) {
-                self.entangled.add(pair);
-            }
-        }
-    }
-
-    /// Marks the edges of the first of two bodies, or of one, that pass through triangles of the second: how many there are.
-    fn mark_crossings(&mut self, bodies: &impl Systems, [a, b]: [usize; 2]) -> u32 {
-        // It is written to while both are read.
-        let Some(Some(first)) = self.skins.get_mut(a) else {
-            return 0;
-        };
-        let mut pierces = std::mem::take(&mut first.pierces);
-        let mut count = 0;
-        if let (Some(Some(first)), Some(Some(second))) = (self.skins.get(a), self.skins.get(b)) {
-            let are_joined = |edge: &[u32], triangle: &[u32]| {
-                a == b && edge.iter().any(|node| triangle.contains(node))
-                    || !self.bonds.are_none() && join_movers(&self.bonds, bodies, [a, b], [edge, triangle])
-            };
-            count = crossing::mark(first, second, are_joined, &mut pierces);
-        }
-        if let Some(Some(first)) = self.skins.get_mut(a) {
-            first.pierces = pierces;
-            first.crossings = first.crossings.saturating_add(count);
-        }
-        count
-    }
-
-    /// In how many substeps bodies of an island come no further against each other in one, or parts of one that meets itself, than what they are
-    /// made of is small.
-    pub fn substeps_wished(&self, island: usize, bodies: &impl Systems, dt: f32) -> u32 {
-        let short = |place: usize| self.skins.get(place)?.as_ref().map(|skin| skin.short);
-        let wished = |[a, b]: [usize; 2]| {
-            let speed = relative_speed(bodies.at(a)?, bodies.at(b)?);
-            Some(dt * speed / (TRAVEL * short(a)?.min(short(b)?)))
-        };
-        let members = self.islands.members(island).iter().map(|&place| place as usize);
-        let meets_itself = |place: &usize| bodies.at(*place).is_some_and(|body| body.contact.with_itself);
-        let of_one = members.filter(meets_itself).map(|place| [place; 2]);
-        let all = of_one.chain(self.islands.pairs(island)).filter_map(wished);
-        all.fold(1.0, f32::max).ceil().min(1e6) as u32
     }
 
     /// The box of all velocities of a body, given that of those before the contacts of a substep.
@@ -494,17 +287,6 @@ impl Tissue {
         }
     }
 
-    /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after gravity has given as much as this, m/s.
-    pub fn fastest(&self, island: usize, bodies: &impl Systems, fall: f32) -> f32 {
-        let members = self.islands.members(island).iter();
-        let members = members.filter_map(|&place| bodies.at(place as usize));
-        let speeds = members.map(|body| {
-            let all = velocities(body);
-            all.magnitudes().length() + fall * body.gravity_scale.abs()
-        });
-        speeds.fold(0.0, f32::max)
-    }
-
     /// Gives nodes and tools what contacts with tools have done beside those of tissue.
     fn end_with_tools(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) {
         let members = self.islands.members(island);
@@ -516,37 +298,6 @@ impl Tissue {
                 body.nudge(node, velocity, impulse, moment);
             });
         });
-    }
-
-    /// Draws what of each surface is near others that it is found by in images, as the substep begins.
-    fn draw(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
-        for member in 0..self.islands.members(island).len() {
-            let a = self.islands.members(island)[member] as usize;
-            // It is written to while others are read.
-            let Some(mut first) = self.skins.get_mut(a).and_then(Option::take) else {
-                continue;
-            };
-            if let Some(body) = bodies.at(a)
-                && first.images.is_some()
-                && moment.concerns(body)
-            {
-                let mut part = Bounds::EMPTY;
-                for &b in self.islands.members(island) {
-                    let b = b as usize;
-                    if let (Some(Some(other)), Some(other_body)) = (self.skins.get(b), bodies.at(b))
-                        && moment.concerns(other_body)
-                        && meet_in_images(&first, other)
-                    {
-                        let parties = [(a, &first), (b, other)].map(|(place, skin)| Party { place, skin });
-                        if let Some(radius) = radius(&parties[0], &parties[1], [body, other_body]) {
-                            part = part.and(&near(&first, other, radius));
-                        }
-                    }
-                }
-                first.draw(&part);
-            }
-            self.skins[a] = Some(first);
-        }
     }
 
     /// Finds contacts and gives their impulses, with those of tools, until they lead to no others: whether there were any.
@@ -614,16 +365,6 @@ impl Tissue {
         }
     }
 
-    /// Whether what may meet where impulses have led nodes was found before they acted.
-    fn has_foreseen(&self, island: usize, bodies: &impl Systems, moment: &Span) -> bool {
-        let of_one = self.islands.members(island).iter().map(|&place| [place as usize; 2]);
-        let mut all = of_one.chain(self.islands.pairs(island));
-        all.all(|pair| {
-            let search = Self::search((&self.skins, &self.entangled), pair, bodies, moment);
-            search.is_none_or(|search| search.has_foreseen())
-        })
-    }
-
     /// Moves what began too close apart, without giving it speed.
     fn part(&self, bodies: &mut impl Systems, duration: f32) {
         for link in self.links.iter().filter(|link| link.depth > 0.0) {
@@ -634,157 +375,6 @@ impl Tissue {
             for (place, node, displacement) in link.parting(most.min(PUSHED_OUT * link.depth), duration) {
                 if let Some(body) = bodies.at_mut(place) {
                     body.part_substep(node, displacement);
-                }
-            }
-        }
-    }
-
-    /// The search of one of the near pairs of bodies, or of one body, in a substep, if they meet then.
-    fn search<'a>(
-        (skins, entangled): (&'a [Option<Skin>], &Entangled),
-        [a, b]: [usize; 2],
-        bodies: &impl Systems,
-        moment: &Span,
-    ) -> Option<Search<'a>> {
-        let party = |place: usize| {
-            let skin = skins.get(place)?.as_ref()?;
-            Some(Party { place, skin })
-        };
-        let both = [bodies.at(a)?, bodies.at(b)?];
-        let (mut first, mut second) = (party(a)?, party(b)?);
-        let radius = radius(&first, &second, both)?;
-        // Each edge of the first meets one edge of the second: of a long edge across short ones, that would be one of many.
-        if second.skin.short < first.skin.short {
-            std::mem::swap(&mut first, &mut second);
-        }
-        let is_looked_at = both.into_iter().all(|body| moment.concerns(body));
-        let [own, others] = [first.skin, second.skin];
-        (is_looked_at && !entangled.has([a, b])).then(|| Search {
-            parties: [first, second],
-            dt: moment.duration,
-            radius,
-            ahead: own.ahead().min(others.ahead()),
-            motion: own.spread + others.spread + (own.drift - others.drift).length() * moment.duration,
-            in_images: a != b && meet_in_images(own, others),
-            measures: Measure::Nothing,
-        })
-    }
-
-    /// The same of a pair that is not found in images.
-    fn search_by_distance<'a>(
-        skins: (&'a [Option<Skin>], &Entangled),
-        pair: [usize; 2],
-        bodies: &impl Systems,
-        moment: &Span,
-    ) -> Option<Search<'a>> {
-        Self::search(skins, pair, bodies, moment).filter(|search| !search.in_images)
-    }
-
-    /// Has what is near be known of the pairs of an island, or trees be where surfaces are.
-    fn know_pairs(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
-        let Self {
-            skins,
-            entangled,
-            pairs,
-            islands,
-            ..
-        } = self;
-        let mut all = islands.pairs(island).enumerate();
-        let holds = all.all(|(number, pair)| {
-            let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
-            search.is_none_or(|search| pairs.holds(number, &search))
-        });
-        if holds {
-            return;
-        }
-        for &place in islands.members(island) {
-            if let Some(Some(skin)) = skins.get_mut(place as usize) {
-                skin.fit();
-            }
-        }
-        if pairs.can_be_found() {
-            pairs.begin();
-            let added = islands.pairs(island).try_for_each(|pair| {
-                let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
-                pairs.add(search.as_ref())
-            });
-            if added.is_none() {
-                pairs.fail();
-            }
-        }
-    }
-
-    /// Adds the contacts that are not known yet, of those that meet; again in the same substep: where impulses have led further than was looked.
-    fn find(&mut self, island: usize, bodies: &impl Systems, moment: &Span, again: bool) {
-        let measures = moment.begins && !again;
-        self.know_pairs(island, bodies, moment);
-        let Self {
-            skins,
-            clearances,
-            entangled,
-            links,
-            known,
-            pushes,
-            pairs,
-            bonds,
-            islands,
-            ..
-        } = self;
-        let key = Link::key;
-        known.clear();
-        known.extend(0..links.len() as u32);
-        known.sort_unstable_by_key(|&link| key(&links[link as usize]));
-        let of_one = islands.members(island).iter().map(|&place| (None, [place as usize; 2]));
-        let of_two = islands.pairs(island).enumerate();
-        for (number, [a, b]) in of_one.chain(of_two.map(|(number, pair)| (Some(number), pair))) {
-            let Some(mut search) = Self::search((skins, entangled), [a, b], bodies, moment) else {
-                continue;
-            };
-            if again && search.has_foreseen() {
-                continue;
-            }
-            let [a, b] = search.parties.map(|party| party.place);
-            let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {
-                continue;
-            };
-            let friction = body_a.contact.friction.max(body_b.contact.friction);
-            let number = number.filter(|_| !search.in_images);
-            // A place is lent to neither where it is its own partner.
-            let mut none = [None, None];
-            let [kept_a, kept_b] = match clearances.get_disjoint_mut([a, b]) {
-                Ok(both) => both,
-                Err(_) => none.each_mut(),
-            };
-            if measures && [&*kept_a, &*kept_b].into_iter().flatten().any(|kept| kept.is_new) {
-                search.measures = Measure::Reductions;
-                let known = number.and_then(|number| pairs.of(number));
-                search.run([&mut *kept_a, &mut *kept_b], known, |_| {});
-            }
-            search.measures = if measures { Measure::Distances } else { Measure::Nothing };
-            let near = number.and_then(|number| pairs.of(number));
-            search.run([kept_a, kept_b], near, |touch| {
-                let sides = touch.sides.map(|side| side.key());
-                let is_known = known
-                    .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
-                    .is_ok();
-                if is_known || links.len() == links.capacity() || are_joined(bonds, bodies, &touch.sides) {
-                    return;
-                }
-                let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });
-                if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides) {
-                    link.friction = friction;
-                    link.is_parted = touch.is_parted;
-                    link.allow_gap(touch.gap, moment.duration);
-                    pushes.recall(&mut link);
-                    links.push(link);
-                }
-            });
-        }
-        if measures {
-            for &place in islands.members(island) {
-                if let Some(Some(kept)) = clearances.get_mut(place as usize) {
-                    let skin = skins.get(place as usize).and_then(Option::as_ref);
-                    kept.settle(skin.map_or(&[], |skin| &skin.pierces));
                 }
             }
         }
@@ -812,12 +402,6 @@ fn each_pressed(
     }
 }
 
-/// Whether a bond makes one point of nodes of both sides.
-fn are_joined(bonds: &Bonds, bodies: &impl Systems, sides: &[Side; 2]) -> bool {
-    let [a, b] = sides;
-    !bonds.are_none() && join_movers(bonds, bodies, [a.body, b.body], [&a.nodes, &b.nodes])
-}
-
 /// The same of corners of surfaces: what those are bound to counts.
 fn join_movers(bonds: &Bonds, bodies: &impl Systems, places: [usize; 2], corners: [&[u32]; 2]) -> bool {
     let mut movers = [[0; MOST_MOVERS]; 2];
@@ -835,75 +419,7 @@ fn join_movers(bonds: &Bonds, bodies: &impl Systems, places: [usize; 2], corners
     bonds.join(places, [0, 1].map(|side| &movers[side][..counts[side]]))
 }
 
-/// Whether the bodies at all these places sleep.
-fn are_asleep(places: &[u32], bodies: &impl Systems) -> bool {
-    let mut places = places.iter();
-    places.all(|&place| bodies.at(place as usize).is_some_and(System::is_asleep))
-}
-
-/// How far two bodies, or one with itself, keep apart, m; `None` where they do not meet.
-fn radius(first: &Party, second: &Party, bodies: [&System; 2]) -> Option<f32> {
-    let [a, b] = bodies.map(|body| &body.contact);
-    if first.place == second.place {
-        return first.skin.radius_with_itself(a);
-    }
-    let shortest = first.skin.short.min(second.skin.short);
-    let apart = (a.thickness + b.thickness).max(LEAST_THICKNESS * shortest);
-    meet_each_other(bodies[0], bodies[1]).then_some(apart)
-}
-
-/// Whether two bodies that meet are found in images.
-fn meet_in_images(first: &Skin, second: &Skin) -> bool {
-    first.asks_for_images || second.asks_for_images
-}
-
-/// A box about what of a surface another may meet that it keeps `radius` away from.
-fn near(skin: &Skin, other: &Skin, radius: f32) -> Bounds {
-    let margin = radius + skin.short + FASTER * (skin.travel + other.travel);
-    let shift = search::shift(other, skin);
-    let (own, others) = (skin.forest.bounds(), other.forest.bounds());
-    Bounds {
-        min: (others.min + shift - margin).max(own.min),
-        max: (others.max + shift + margin).min(own.max),
-    }
-}
-
 fn meet_each_other(first: &System, second: &System) -> bool {
     let (a, b) = (&first.contact, &second.contact);
     a.with_bodies && b.with_bodies && a.filter.meets(b.filter)
-}
-
-/// The bodies that meet tissue, with their places in the world.
-fn meeting<'a, B: Systems>(
-    skins: &'a [Option<Skin>],
-    bodies: &'a B,
-) -> impl Iterator<Item = (usize, &'a System)> + use<'a, B> {
-    let with_skin = skins.iter().enumerate().filter(|(_, skin)| skin.is_some());
-    with_skin.filter_map(|(place, _)| Some((place, bodies.at(place)?)))
-}
-
-/// A box about the velocities of a body, m/s, as far as that is kept.
-fn velocities(body: &System) -> Bounds {
-    let velocities = body.carry.gravity.velocities;
-    if velocities.min.is_finite() && velocities.max.is_finite() {
-        velocities
-    } else {
-        Bounds {
-            min: Vec3::ZERO,
-            max: Vec3::ZERO,
-        }
-    }
-}
-
-/// No node of a body is faster against one of another, or of the same, m/s, as far as their velocities are kept.
-fn relative_speed(first: &System, second: &System) -> f32 {
-    let [a, b] = [first, second].map(velocities);
-    (a.max - b.min).abs().max((b.max - a.min).abs()).length()
-}
-
-/// A box about a body as a step that was tried begins, and as it ends beside the displacement that all bodies have in common, and what keeps off it,
-/// in its own coordinates.
-fn swept(body: &System, common: Vec3) -> Bounds {
-    let ends = body.state.newest().0.iter().map(|position| position - common);
-    Bounds::of(body.state.positions().iter().chain(ends)).extended(body.contact.thickness + 1e-3 * body.extent())
 }

@@ -41,16 +41,7 @@ pub(super) struct Nearby {
     triangles: Vec<u32>,
 }
 
-saved!(Nearby {
-    is_found,
-    within,
-    margin,
-    share,
-    waits,
-    places,
-    firsts,
-    triangles
-});
+saved! { Nearby { is_found, within, margin, share, waits, places, firsts, triangles } }
 
 impl Nearby {
     /// Nothing yet, with room for a surface of so many corners and edges.
@@ -218,31 +209,19 @@ fn is_near(skin: &Skin, edge: &Segment, [a, b, c]: [u32; 3], margin: f32) -> boo
 
 #[cfg(test)]
 mod tests {
+    use super::super::change::tests::meets_itself;
     use super::*;
     use crate::cutting::Sweep;
     use crate::mesh::Mesh;
     use crate::random::Random;
-    use crate::{BodyContact, BodyDefinition, BodyId, Solver, Values, World, WorldDefinition};
+    use crate::{BodyId, Solver, World, WorldDefinition};
 
     fn world(mesh: &Mesh, solver: Solver, thickness: f32) -> (World, BodyId) {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
-        let id = world
-            .create_body(&BodyDefinition {
-                positions: &mesh.positions,
-                masses: Values::Uniform(1e-3),
-                stiffnesses: Values::Uniform(10.0),
-                triangles: &mesh.triangles,
-                tetrahedra: &mesh.tetrahedra,
-                spare_nodes: 5_000,
-                contact: BodyContact {
-                    with_itself: true,
-                    thickness,
-                    ..BodyContact::NOTHING
-                },
-                solver,
-                ..Default::default()
-            })
-            .expect("a body");
+        let mut definition = meets_itself(mesh);
+        definition.contact.thickness = thickness;
+        definition.solver = solver;
+        let id = world.create_body(&definition).expect("a body");
         // What is thrown together from both ends is crumpled.
         let mut random = Random(9);
         let velocities: Vec<Vec3> = mesh

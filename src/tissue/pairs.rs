@@ -6,7 +6,7 @@
 
 use glam::Vec3;
 
-use super::search::{Party, Search};
+use super::search::{PairSearch, Party};
 use super::skin::{NONE, Skin};
 use crate::base::{Result, memory};
 use crate::codec::saved;
@@ -34,11 +34,11 @@ pub(super) struct Near {
     pub apart: f32,
 }
 
-saved!(Near { feature, apart });
+saved! { Near { feature, apart } }
 
 /// A corner or an edge, and what of the other body is near it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
+pub(super) struct NearRun {
     /// Its place among those of its surface.
     pub number: u32,
     first: u32,
@@ -47,12 +47,7 @@ pub(super) struct Run {
     pub apart: f32,
 }
 
-saved!(Run {
-    number,
-    first,
-    end,
-    apart
-});
+saved! { NearRun { number, first, end, apart } }
 
 /// What of two bodies is near: corners of the first with triangles of the second, the other way round, and edges with edges.
 #[derive(Clone, Copy, Debug)]
@@ -65,12 +60,7 @@ struct List {
     moved: f32,
 }
 
-saved!(List {
-    first,
-    ends,
-    within,
-    moved
-});
+saved! { List { first, ends, within, moved } }
 
 /// The lists of the near pairs of an island, in their order.
 #[derive(Debug, Default)]
@@ -79,26 +69,20 @@ pub(super) struct Pairs {
     /// Whether there was no room in this step.
     is_full: bool,
     lists: Vec<List>,
-    runs: Vec<Run>,
+    runs: Vec<NearRun>,
     features: Vec<Near>,
 }
 
-saved!(Pairs {
-    is_known,
-    is_full,
-    lists,
-    runs,
-    features
-});
+saved! { Pairs { is_known, is_full, lists, runs, features } }
 
 /// The list of one pair, to be gone through.
 pub(super) struct Known<'a> {
-    pub runs: [&'a mut [Run]; 3],
+    pub runs: [&'a mut [NearRun]; 3],
     pub features: &'a mut [Near],
     pub moved: f32,
 }
 
-impl Run {
+impl NearRun {
     /// What is near it, of all features that are listed.
     pub fn of<'a>(&self, features: &'a mut [Near]) -> &'a mut [Near] {
         &mut features[self.first as usize..self.end as usize]
@@ -133,7 +117,7 @@ impl Pairs {
     }
 
     /// Whether everything that can meet in this search is in the list of the pair.
-    pub fn holds(&self, pair: usize, search: &Search) -> bool {
+    pub fn holds(&self, pair: usize, search: &PairSearch) -> bool {
         let list = self.lists.get(pair).filter(|_| self.is_known);
         list.is_some_and(|list| search.reach() * (1.0 + ROUNDING) + list.moved <= list.within)
     }
@@ -157,7 +141,7 @@ impl Pairs {
     }
 
     /// Adds the list of the next pair, by trees that are where the surfaces are; of one that does not meet nothing is listed. `None` without room.
-    pub fn add(&mut self, search: Option<&Search>) -> Option<()> {
+    pub fn add(&mut self, search: Option<&PairSearch>) -> Option<()> {
         let first = self.runs.len() as u32;
         let mut list = List {
             first,
@@ -192,7 +176,7 @@ impl Pairs {
         })
     }
 
-    fn corners(&mut self, search: &Search, [of_nodes, of_faces]: [Party; 2], within: f32) -> Option<()> {
+    fn corners(&mut self, search: &PairSearch, [of_nodes, of_faces]: [Party; 2], within: f32) -> Option<()> {
         let skin = of_faces.skin;
         let shift = super::search::shift(of_nodes.skin, skin);
         let around = skin.forest.bounds().extended(within);
@@ -213,7 +197,7 @@ impl Pairs {
         Some(())
     }
 
-    fn edges(&mut self, search: &Search, within: f32) -> Option<()> {
+    fn edges(&mut self, search: &PairSearch, within: f32) -> Option<()> {
         let [first, second] = search.parties;
         let shift = super::search::shift(first.skin, second.skin);
         let around = second.skin.forest.bounds().extended(within);
@@ -256,7 +240,7 @@ impl Pairs {
         }
         if self.features.len() > first {
             self.features[first..].sort_unstable_by_key(|near| near.feature);
-            let run = Run {
+            let run = NearRun {
                 number: number as u32,
                 first: first as u32,
                 end: self.features.len() as u32,
@@ -268,7 +252,7 @@ impl Pairs {
     }
 }
 
-impl Search<'_> {
+impl PairSearch<'_> {
     /// How far apart anything is at most that can meet, m.
     pub fn reach(&self) -> f32 {
         if self.is_of_one() {
@@ -299,7 +283,7 @@ fn still(ends: [Vec3; 2]) -> Segment {
     }
 }
 
-fn distance(search: &Search, party: Party, segment: &Segment, nodes: &[u32]) -> f32 {
+fn distance(search: &PairSearch, party: Party, segment: &Segment, nodes: &[u32]) -> f32 {
     search.corners(party, nodes).separation(segment, 0.0).offset.length()
 }
 

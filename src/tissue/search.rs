@@ -3,9 +3,8 @@
 
 use glam::Vec3;
 
-use super::EDGES;
 use super::clearances::{Clearances, SurfaceFeature};
-use super::link::Side;
+use super::link::ContactSide;
 use super::pairs::{Known, Near};
 use super::skin::{Clearance, NONE, PARTED, Skin};
 use crate::contact::sweep::{Corners, Segment, Separation};
@@ -18,9 +17,12 @@ const SAME: f32 = 1e-4;
 /// A corner meets so many faces at most. With the closest alone, a corner in a fold would be pushed out of one face into the next, and tremble.
 const FACES: usize = 3;
 
+/// An edge meets so many edges at most. With the closest alone, an edge that lies across several would be held up by each in turn, and tremble.
+const EDGES: usize = 4;
+
 /// A face that a corner meets, or an edge that an edge meets: whether it only comes near, how far away it is, which it is, where they meet and how far
 /// they keep apart.
-type Met<Feature> = (bool, f32, Feature, (Separation, Clearance));
+type FeatureMet<Feature> = (bool, f32, Feature, (Separation, Clearance));
 
 /// A body in a search, by its place in the world.
 #[derive(Clone, Copy)]
@@ -31,8 +33,8 @@ pub(super) struct Party<'a> {
 
 /// What was found.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Touch {
-    pub sides: [Side; 2],
+pub(super) struct PairTouch {
+    pub sides: [ContactSide; 2],
     /// From the second side to the first.
     pub normal: Vec3,
     /// How far apart they are along it when the step begins, less what they keep off, m.
@@ -50,7 +52,7 @@ enum From<'a> {
 }
 
 /// A search over a step of `dt` seconds for what comes closer than `radius`, m, and for what comes within `ahead` of that, m: impulses may lead it there.
-pub(super) struct Search<'a> {
+pub(super) struct PairSearch<'a> {
     pub parties: [Party<'a>; 2],
     pub dt: f32,
     pub radius: f32,
@@ -72,9 +74,9 @@ pub(super) enum Measure {
     Reductions,
 }
 
-impl Search<'_> {
+impl PairSearch<'_> {
     /// Shows all that meets. `kept` are the clearances of the two parties; a surface with itself has none. What of two bodies is near may be known.
-    pub fn run(&self, kept: [&mut Option<Clearances>; 2], known: Option<Known>, mut see: impl FnMut(Touch)) {
+    pub fn run(&self, kept: [&mut Option<Clearances>; 2], known: Option<Known>, mut see: impl FnMut(PairTouch)) {
         let [first, second] = self.parties;
         let [mut of_first, of_second] = kept.map(Option::as_mut);
         if let Some(Known { runs, features, moved }) = known {
@@ -163,7 +165,12 @@ impl Search<'_> {
         }
     }
 
-    fn nodes_with_faces(&self, parties: [Party; 2], mut kept: Option<&mut Clearances>, see: &mut impl FnMut(Touch)) {
+    fn nodes_with_faces(
+        &self,
+        parties: [Party; 2],
+        mut kept: Option<&mut Clearances>,
+        see: &mut impl FnMut(PairTouch),
+    ) {
         for corner in 0..parties[0].skin.nodes.len() {
             self.node_with_faces(parties, corner, From::Search, kept.as_deref_mut(), see);
         }
@@ -176,7 +183,7 @@ impl Search<'_> {
         corner: usize,
         from: From,
         kept: Option<&mut Clearances>,
-        see: &mut impl FnMut(Touch),
+        see: &mut impl FnMut(PairTouch),
     ) -> f32 {
         let shift = shift(of_nodes.skin, of_faces.skin);
         let node = of_nodes.skin.nodes[corner];
@@ -188,7 +195,7 @@ impl Search<'_> {
             radius,
         };
         let mut front = f32::INFINITY;
-        let mut touched: [Option<Met<usize>>; FACES] = [None; FACES];
+        let mut touched: [Option<FeatureMet<usize>>; FACES] = [None; FACES];
         // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
         let mut nearest = (f32::INFINITY, 0.0_f32);
         let mut behind: Option<(usize, Separation)> = None;
@@ -249,7 +256,7 @@ impl Search<'_> {
             let Some((_, _, triangle, (found, clearance))) = touched[place] else {
                 break;
             };
-            let is_shared = |(_, _, _, (other, _)): &Met<usize>| {
+            let is_shared = |(_, _, _, (other, _)): &FeatureMet<usize>| {
                 (other.offset - found.offset).length() <= SAME * found.offset.length()
             };
             if touched[..place].iter().flatten().any(is_shared) {
@@ -257,8 +264,8 @@ impl Search<'_> {
             }
             let nodes = of_faces.skin.triangles[triangle];
             let sides = [
-                Side::of_node(of_nodes.place, node),
-                Side {
+                ContactSide::of_node(of_nodes.place, node),
+                ContactSide {
                     body: of_faces.place,
                     nodes,
                     weights: found.weights,
@@ -276,7 +283,7 @@ impl Search<'_> {
         index: usize,
         from: From,
         kept: Option<&mut Clearances>,
-        see: &mut impl FnMut(Touch),
+        see: &mut impl FnMut(PairTouch),
     ) -> f32 {
         let [first, second] = self.parties;
         let shift = shift(first.skin, second.skin);
@@ -296,7 +303,7 @@ impl Search<'_> {
         let near = Bounds::of(segment.ends.into_iter()).extended(far);
         let mut least = f32::INFINITY;
         let mut nearest = f32::INFINITY;
-        let mut touched: [Option<Met<[u32; 2]>>; EDGES] = [None; EDGES];
+        let mut touched: [Option<FeatureMet<[u32; 2]>>; EDGES] = [None; EDGES];
         let mut see_edges = |edges: [u32; 3]| {
             let mut least = f32::INFINITY;
             for (other, pierces, other_ridge) in second.skin.edges_of(edges) {
@@ -370,8 +377,8 @@ impl Search<'_> {
         self.measure(kept, SurfaceFeature::Edge(index), nearest);
         for (_, _, other, (found, clearance)) in touched.into_iter().flatten() {
             let sides = [
-                Side::of_edge(first.place, edge, found.along),
-                Side {
+                ContactSide::of_edge(first.place, edge, found.along),
+                ContactSide {
                     body: second.place,
                     nodes: [other[0], other[1], other[1]],
                     weights: found.weights,
@@ -421,14 +428,14 @@ impl Search<'_> {
     /// Shows what meets in this direction, of sides that keep so far apart, and in coordinates so far apart.
     pub(super) fn show(
         &self,
-        sides: [Side; 2],
+        sides: [ContactSide; 2],
         offset: Vec3,
         (clearance, shift): (Clearance, Vec3),
-        see: &mut impl FnMut(Touch),
+        see: &mut impl FnMut(PairTouch),
     ) {
         if let Some(normal) = offset.try_normalize() {
             let apart = self.apart(&sides, shift);
-            see(Touch {
+            see(PairTouch {
                 sides,
                 normal,
                 gap: apart.dot(normal) - clearance.radius,
@@ -438,7 +445,7 @@ impl Search<'_> {
     }
 
     /// From the second side to the first when the step begins.
-    fn apart(&self, sides: &[Side; 2], shift: Vec3) -> Vec3 {
+    fn apart(&self, sides: &[ContactSide; 2], shift: Vec3) -> Vec3 {
         let [first, second] = [0, 1].map(|index| {
             let party = if self.parties[0].place == sides[index].body {
                 self.parties[0]
@@ -484,9 +491,9 @@ fn nearest_of(all: &mut [Near], (moved, reach): (f32, f32), mut see: impl FnMut(
 }
 
 /// Has what is met be among the closest, if it is one of them: what comes near after what meets.
-fn keep_closest<Feature: Copy + PartialOrd>(closest: &mut [Option<Met<Feature>>], met: Met<Feature>) {
-    let order = |(is_ahead, distance, feature, _): Met<Feature>| (is_ahead, distance, feature);
-    let is_closer = |known: Met<Feature>| order(met) < order(known);
+fn keep_closest<Feature: Copy + PartialOrd>(closest: &mut [Option<FeatureMet<Feature>>], met: FeatureMet<Feature>) {
+    let order = |(is_ahead, distance, feature, _): FeatureMet<Feature>| (is_ahead, distance, feature);
+    let is_closer = |known: FeatureMet<Feature>| order(met) < order(known);
     if let Some(place) = closest.iter().position(|known| known.is_none_or(is_closer)) {
         closest[place..].rotate_right(1);
         closest[place] = Some(met);

@@ -2,10 +2,10 @@
 
 use glam::{DVec3, Vec3};
 
-use super::LEAST_THICKNESS;
 use super::change::Changing;
 use super::flatness::{Flatness, Ridge};
 use super::images::Images;
+use super::narrow_phase::LEAST_THICKNESS;
 use super::nearby::Nearby;
 use super::wound::Wound;
 use crate::base::{Result, memory};
@@ -79,39 +79,11 @@ pub(crate) struct Skin {
     is_fitted: bool,
 }
 
-saved!(Skin {
-    nodes,
-    edges,
-    triangles,
-    owned,
-    forest,
-    room,
-    is_closed,
-    pierces,
-    flatness,
-    crossings,
-    origin,
-    starts,
-    velocities,
-    expected,
-    changes,
-    drift,
-    spread,
-    moved,
-    given,
-    strayed,
-    short,
-    extent,
-    firsts,
-    travel,
-    meets_bodies,
-    asks_for_images,
-    resolution,
-    images,
-    changing,
-    nearby,
-    is_fitted
-});
+saved! { Skin {
+    nodes, edges, triangles, owned, forest, room, is_closed, pierces, flatness, crossings, origin, starts, velocities,
+    expected, changes, drift, spread, moved, given, strayed, short, extent, firsts, travel, meets_bodies,
+    asks_for_images, resolution, images, changing, nearby, is_fitted,
+} }
 
 /// Features that were no further apart at first than this part of the least thickness were one, and are parted.
 pub(super) const PARTED: f32 = 0.1;

@@ -20,35 +20,29 @@ const PRESSING: usize = 3;
 
 /// What a contact gave in the last substep, N s.
 #[derive(Clone, Copy, Debug)]
-struct Push {
+struct WarmStart {
     key: Key,
     impulse: f32,
     friction: Vec3,
 }
 
-saved!(Push { key, impulse, friction });
+saved! { WarmStart { key, impulse, friction } }
 
 /// The impulses of earlier substeps, in the order of their sides.
 #[derive(Debug, Default)]
 pub(crate) struct Pushes {
     /// Those of the last substep of the island whose turn it is.
-    last: Vec<Push>,
+    last: Vec<WarmStart>,
     /// Those that the last step ended with.
-    settled: Vec<Push>,
+    settled: Vec<WarmStart>,
     /// Those that the step in progress ends with, of islands that have taken it.
-    next: Vec<Push>,
+    next: Vec<WarmStart>,
     /// How many substeps of its step that island has taken, and whether it goes on with what the last step gave.
     substeps: u32,
     recalls: bool,
 }
 
-saved!(Pushes {
-    last,
-    settled,
-    next,
-    substeps,
-    recalls
-});
+saved! { Pushes { last, settled, next, substeps, recalls } }
 
 impl Pushes {
     /// Makes room for those of so many contacts, of which few press at once.
@@ -84,7 +78,7 @@ impl Pushes {
         let pressing = links.iter().filter(|link| link.presses()).take(room);
         self.last.extend(pressing.map(|link| {
             let (impulse, friction) = link.impulses();
-            Push {
+            WarmStart {
                 key: link.key(),
                 impulse,
                 friction,

@@ -6,8 +6,8 @@
 
 use glam::Vec3;
 
-use super::link::Side;
-use super::search::{Search, Touch};
+use super::link::ContactSide;
+use super::search::{PairSearch, PairTouch};
 use super::skin::{Clearance, NONE, Skin};
 use crate::base::{Result, memory};
 use crate::codec::saved;
@@ -53,14 +53,7 @@ pub(super) struct Wound {
     longest: Vec<f32>,
 }
 
-saved!(Wound {
-    faces,
-    is_bared,
-    nodes,
-    is_corner,
-    normals,
-    longest
-});
+saved! { Wound { faces, is_bared, nodes, is_corner, normals, longest } }
 
 impl Wound {
     /// None yet, of a body with so many triangles.
@@ -140,9 +133,9 @@ impl Wound {
     }
 }
 
-impl Search<'_> {
+impl PairSearch<'_> {
     /// Shows the corners of a wound that come behind faces of its other side.
-    pub fn across_wounds(&self, see: &mut impl FnMut(Touch)) {
+    pub fn across_wounds(&self, see: &mut impl FnMut(PairTouch)) {
         let party = self.parties[0];
         let skin = party.skin;
         let Some(wound) = skin.wound().filter(|_| self.is_of_one()) else {
@@ -193,8 +186,8 @@ impl Search<'_> {
                 && over.height < -NOTHING * skin.least_thickness()
             {
                 let sides = [
-                    Side::of_node(party.place, node),
-                    Side {
+                    ContactSide::of_node(party.place, node),
+                    ContactSide {
                         body: party.place,
                         nodes: skin.triangles[triangle],
                         weights: over.weights,
@@ -206,9 +199,9 @@ impl Search<'_> {
     }
 }
 
-impl Search<'_> {
+impl PairSearch<'_> {
     /// Shows the edges of a wound that pass behind edges of its other side.
-    pub fn edges_across_wounds(&self, see: &mut impl FnMut(Touch)) {
+    pub fn edges_across_wounds(&self, see: &mut impl FnMut(PairTouch)) {
         let party = self.parties[0];
         let skin = party.skin;
         let Some(wound) = skin.wound().filter(|wound| !wound.faces.is_empty()) else {
@@ -270,8 +263,8 @@ impl Search<'_> {
             });
             if let Some((_, other, found, normal)) = deepest {
                 let sides = [
-                    Side::of_edge(party.place, edge, found.along),
-                    Side {
+                    ContactSide::of_edge(party.place, edge, found.along),
+                    ContactSide {
                         body: party.place,
                         nodes: [other[0], other[1], other[1]],
                         weights: found.weights,

@@ -8,7 +8,7 @@ use crate::codec::{saved, saved_enum};
 use crate::def::{Anchor, SurfacePoint};
 use crate::solver::Grip;
 use crate::solver::Outcome;
-use crate::tissue::{Bonds, Bound, Thread, are_one};
+use crate::tissue::{BondPoint, Bonds, Thread, are_one};
 
 /// Whose attachment it is.
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +17,7 @@ pub(super) struct Attachment {
     holder: Holder,
 }
 
-saved!(Attachment { body, holder });
+saved! { Attachment { body, holder } }
 
 /// What it is attached to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -237,7 +237,7 @@ impl World {
     pub(super) fn bind(
         &mut self,
         bodies: [BodyId; 2],
-        pairs: &[[Bound; 2]],
+        pairs: &[[BondPoint; 2]],
         force_limit: f32,
         thread: Option<Thread>,
     ) -> Result<Vec<AttachmentId>> {
@@ -270,7 +270,7 @@ impl World {
     }
 
     /// A point of a body by what its corners are there.
-    pub(super) fn bound(&self, id: BodyId, which: Which, anchor: &Anchor) -> Result<Bound> {
+    pub(super) fn bound(&self, id: BodyId, which: Which, anchor: &Anchor) -> Result<BondPoint> {
         let body = self.bodies.get(id.0)?;
         let grip = match anchor {
             Anchor::Node(node) => {
@@ -292,7 +292,7 @@ impl World {
                 }
             }
         }
-        Ok(Bound {
+        Ok(BondPoint {
             body: self.bodies.place(id.0)?,
             anchor: Some(*anchor),
             nodes,
@@ -300,11 +300,11 @@ impl World {
     }
 
     /// A point between the nodes of a cell of a body, in the caller's numbers.
-    pub(super) fn bound_inside(&self, id: BodyId, nodes: [u32; 4], weights: [f64; 4]) -> Result<Bound> {
+    pub(super) fn bound_inside(&self, id: BodyId, nodes: [u32; 4], weights: [f64; 4]) -> Result<BondPoint> {
         let body = self.bodies.get(id.0)?;
         let sum: f64 = weights.iter().sum();
         let own = |node: u32| body.system().parts_of(node).next().map_or(0, |(own, _)| own);
-        Ok(Bound {
+        Ok(BondPoint {
             body: self.bodies.place(id.0)?,
             anchor: None,
             nodes: std::array::from_fn(|k| (own(nodes[k]), (weights[k] / sum) as f32)),
@@ -457,7 +457,7 @@ pub(super) fn check_limit(force_limit: f32) -> Result<()> {
 }
 
 /// Refuses two points of one body that are one.
-pub(super) fn refuse_one_point(pair: &[Bound; 2], [first, second]: [Which; 2]) -> Result<()> {
+pub(super) fn refuse_one_point(pair: &[BondPoint; 2], [first, second]: [Which; 2]) -> Result<()> {
     if !are_one(pair) {
         return Ok(());
     }

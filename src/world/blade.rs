@@ -71,15 +71,7 @@ pub struct BladeReport {
     pub area: f64,
 }
 
-saved!(BladeReport {
-    force,
-    torque,
-    work,
-    length,
-    lag,
-    refused,
-    area
-});
+saved! { BladeReport { force, torque, work, length, lag, refused, area } }
 
 impl BladeReport {
     /// It has made a cut.
@@ -106,18 +98,7 @@ pub(super) struct Blade {
     pub knots: Vec<Knot>,
 }
 
-saved!(Blade {
-    edge,
-    stiffness,
-    filter,
-    pose,
-    target,
-    proxies,
-    report,
-    near,
-    met,
-    knots
-});
+saved! { Blade { edge, stiffness, filter, pose, target, proxies, report, near, met, knots } }
 
 /// Where a blade stands in a body: the edge that tissue is cut to.
 #[derive(Debug, Default)]
@@ -131,7 +112,7 @@ pub(super) struct Proxy {
     pub uncut: f64,
     pub behind: DVec3,
     /// What it is held by; none: nothing resists.
-    pub holds: Vec<Hold>,
+    pub holds: Vec<Snag>,
     /// The shortest edge of what it stands in, m.
     pub size: f64,
     /// What resists, N, and where to.
@@ -141,22 +122,11 @@ pub(super) struct Proxy {
     pub was_outside: Option<bool>,
 }
 
-saved!(Proxy {
-    body,
-    stroke,
-    last,
-    uncut,
-    behind,
-    holds,
-    size,
-    force,
-    forward,
-    was_outside
-});
+saved! { Proxy { body, stroke, last, uncut, behind, holds, size, force, forward, was_outside } }
 
 /// A thread between tissue and the true edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Hold {
+pub(super) struct Snag {
     /// The thread's name.
     pub id: SlotId,
     /// From the point of the proxy to that of the tissue, m.
@@ -165,7 +135,7 @@ pub(super) struct Hold {
     pub way: Lead,
 }
 
-saved!(Hold { id, offset, way });
+saved! { Snag { id, offset, way } }
 
 /// A point of the proxy, and the true edge next to it.
 #[derive(Clone, Copy, Debug)]
@@ -286,7 +256,7 @@ impl Blade {
     }
 }
 
-impl Hold {
+impl Snag {
     /// One of this number, which is nowhere yet. No attachment has place 0.
     pub fn new(number: u32) -> Self {
         Self {

@@ -45,13 +45,13 @@ pub struct BudgetReport {
 
 /// How fast this machine has worked lately. It decides nothing but how much work is allowed.
 #[derive(Debug, Default)]
-pub(super) struct Pace {
+pub(super) struct WorkPace {
     /// s; 0: not known.
     unit: f64,
     last_work: u32,
 }
 
-impl Pace {
+impl WorkPace {
     /// How much work fits into so many seconds.
     fn work(&self, seconds: f64) -> u32 {
         if self.unit == 0.0 {

@@ -6,10 +6,10 @@ use super::World;
 use crate::base::{BodyId, Error, Result, ToolId};
 use crate::contact::{Form, Pose};
 use crate::geometry::rotation;
-use crate::handover::triple_buffer::{Reader, Writer, triple_buffer};
+use crate::handover::triple_buffer::{BufferReader, BufferWriter, triple_buffer};
 use crate::haptics::{
-    Cone, Coupling, HapticContact, HapticDefinition, HapticHandle, MOST_CONTACTS, Model, Secant, Sent, Six, ZERO,
-    about, along, difference, inverse, joined, product, scaled, spread, sum,
+    Cone, Coupling, HapticContact, HapticDefinition, HapticHandle, MOST_CONTACTS, Secant, Sent, Vector6, WrenchModel,
+    ZERO, about, along, difference, inverse, joined, product, scaled, spread, sum,
 };
 
 /// What nobody feels, N.
@@ -32,14 +32,14 @@ const LEAST_LEAN: f64 = 0.3;
 
 /// A haptic handle as the world has it.
 #[derive(Debug)]
-pub(super) struct Link {
+pub(super) struct HapticLink {
     tool: ToolId,
     coupling: Coupling,
-    poses: Reader<Sent>,
-    models: Writer<Model>,
+    poses: BufferReader<Sent>,
+    models: BufferWriter<WrenchModel>,
     secant: Secant,
     /// What the tool felt where, as it is told.
-    felt: Six,
+    felt: Vector6,
     middle: (DVec3, DQuat),
     /// Of the nodes that it touches, kg.
     mass: f64,
@@ -50,11 +50,11 @@ pub(super) struct Link {
     version: u64,
 }
 
-impl Link {
+impl HapticLink {
     /// Takes over what a tool felt in the middle of its way, N, of nodes whose mass, by the square of the step, is so many N/m. What that is more than the
     /// coupling is felt as a jolt when the tool changes its speed, and a proxy without mass would rebound from it: of what the model did not foretell
     /// only so much is taken over at a time that it does not.
-    fn take_over(&mut self, middle: (DVec3, DQuat), wrench: &Six, inertia: f64) -> Six {
+    fn take_over(&mut self, middle: (DVec3, DQuat), wrench: &Vector6, inertia: f64) -> Vector6 {
         let turned = rotation::turn_between(self.middle.1, middle.1) * self.coupling.lever;
         let way = joined(middle.0 - self.middle.0, turned);
         let foretold = difference(&self.felt, &product(self.secant.stiffness(), &way));
@@ -87,7 +87,7 @@ impl World {
         self.check_not_led(definition.tool)?;
         self.haptics.try_reserve(1)?;
         let spring = spread(coupling.stiffness);
-        let free = Model::free(pose.position.as_dvec3(), exact(pose), &spring);
+        let free = WrenchModel::free(pose.position.as_dvec3(), exact(pose), &spring);
         let (models, seen) = triple_buffer([free; 3]);
         let sent = Sent {
             pose,
@@ -95,7 +95,7 @@ impl World {
             work: 0.0,
         };
         let (to_send, poses) = triple_buffer([sent; 3]);
-        self.haptics.push(Link {
+        self.haptics.push(HapticLink {
             tool: definition.tool,
             coupling,
             poses,
@@ -113,7 +113,7 @@ impl World {
 
     /// Refuses a tool that a haptic handle leads.
     pub(super) fn check_not_led(&self, tool: ToolId) -> Result<()> {
-        let leads = |link: &Link| link.tool == tool && !link.poses.is_alone();
+        let leads = |link: &HapticLink| link.tool == tool && !link.poses.is_alone();
         if self.haptics.iter().any(leads) {
             return Err(Error::invalid(format!(
                 "tool is {} of generation {}: a haptic handle leads it",
@@ -158,11 +158,11 @@ impl World {
         self.haptics = haptics;
     }
 
-    fn publish_to(&self, link: &mut Link, dt: f64) {
+    fn publish_to(&self, link: &mut HapticLink, dt: f64) {
         let (Ok(tool), Ok(place)) = (self.tools.get(link.tool.0), self.tools.place(link.tool.0)) else {
             return;
         };
-        let Link { coupling, before, .. } = *link;
+        let HapticLink { coupling, before, .. } = *link;
         let lever = coupling.lever;
         let (start, end) = (before.position.as_dvec3(), tool.pose.position.as_dvec3());
         let turn = rotation::turn_between(exact(before), exact(tool.pose));
@@ -211,7 +211,7 @@ impl World {
     }
 
     /// Takes over the most pressed contacts of the tool at this place.
-    fn gather_contacts(&self, place: usize, model: &mut Model) {
+    fn gather_contacts(&self, place: usize, model: &mut WrenchModel) {
         model.contact_count = 0;
         for (id, body) in self.bodies.iter_ids() {
             for contact in body.contacts_with(place, BodyId(id)) {
@@ -240,7 +240,7 @@ impl World {
 }
 
 /// The wrenches that the contacts of a model can make about a tool's position; `None`: any, where they hold it from all sides.
-fn cone_of(model: &Model, position: DVec3, lever: f64) -> Option<Cone> {
+fn cone_of(model: &WrenchModel, position: DVec3, lever: f64) -> Option<Cone> {
     let force = along(&model.wrench);
     let contacts = || model.contacts[..model.contact_count].iter();
     let pressed: f64 = contacts().map(|contact| f64::from(contact.force.length())).sum();

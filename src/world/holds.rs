@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::attachments::Which;
-use super::blade::{Hold, MOST_HOLDS, Proxy, Stand};
+use super::blade::{MOST_HOLDS, Proxy, Snag, Stand};
 use super::{World, make_walks};
 use crate::base::{Result, memory};
 use crate::body::{Body, HoldAt};
@@ -74,7 +74,7 @@ impl World {
             };
             if index == proxy.holds.len() {
                 *holds_made = holds_made.wrapping_add(1);
-                proxy.holds.push(Hold::new(*holds_made));
+                proxy.holds.push(Snag::new(*holds_made));
             }
             let hold = &mut proxy.holds[index];
             bonds.hold(hold.id, bound)?;

@@ -33,12 +33,7 @@ pub(super) struct Knot {
     begins: bool,
 }
 
-saved!(Knot {
-    at,
-    change,
-    slope,
-    begins
-});
+saved! { Knot { at, change, slope, begins } }
 
 /// How far the proxy follows the true edge.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,10 @@
 //! Spheres and capsules pressed into a cloth that is held at its rim: what they feel is what the rim carries.
 
+use crate::support::organ::of_elements;
 use crate::support::tissue::*;
 use glam::{Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Material, Model, Shape, Solver};
+use sinew::{BodyDefinition, Shape, Solver};
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 const SIZE: f32 = 0.2;
@@ -153,17 +154,8 @@ fn feels_what_theory_gives_at_rest(cells: u32) {
     const STRAIN: f32 = 2e-3;
     let mesh = Mesh::block([SIDE; 3], [cells; 3]).expect("a block");
     let definition = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
-        material: Some(Material {
-            model: Model::Tetrahedra,
-            young_modulus: 5000.0,
-            poisson_ratio: 0.3,
-            density: 1000.0,
-            ..Material::default()
-        }),
         solver: Solver::Newton,
-        ..BodyDefinition::default()
+        ..of_elements(&mesh, [5000.0, 0.3, 1000.0])
     };
     let mut world = world(Vec3::ZERO);
     let block = world.create_body(&definition).expect("a body");

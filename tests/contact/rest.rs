@@ -1,9 +1,10 @@
 //! Bodies that rest on planes or slide down them.
 
+use crate::support::organ::of_elements;
 use crate::support::tissue::*;
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyContact, BodyDefinition, BodyId, Material, Model, Shape, Values, World, WorldDefinition};
+use sinew::{BodyContact, BodyDefinition, BodyId, Shape, Values, World, WorldDefinition};
 
 const GRAVITY: f32 = 9.81;
 const DOWN: Vec3 = Vec3::new(0.0, -GRAVITY, 0.0);
@@ -262,15 +263,6 @@ fn blocks_that_lie_across_each_others_edges_do_not_tremble() {
             let place = Vec3::new(x + askew, 0.022 + 0.042 * layer as f32, z - askew);
             let mesh = moved(mesh.clone(), place);
             let definition = BodyDefinition {
-                positions: &mesh.positions,
-                tetrahedra: &mesh.tetrahedra,
-                material: Some(Material {
-                    model: Model::Tetrahedra,
-                    young_modulus: 2e4,
-                    poisson_ratio: 0.3,
-                    density: 1000.0,
-                    ..Material::default()
-                }),
                 node_dampings: Values::Uniform(4e-2),
                 contact: BodyContact {
                     thickness: 1e-3,
@@ -278,7 +270,7 @@ fn blocks_that_lie_across_each_others_edges_do_not_tremble() {
                     with_bodies: true,
                     ..BodyContact::NOTHING
                 },
-                ..Default::default()
+                ..of_elements(&mesh, [2e4, 0.3, 1000.0])
             };
             blocks.push(world.create_body(&definition).expect("a body"));
         }

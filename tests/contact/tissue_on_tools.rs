@@ -1,11 +1,12 @@
 //! Tissue that other tissue presses against tools.
 
+use crate::support::organ::of_elements;
 use crate::support::tissue::moved;
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyContact, BodyDefinition, BodyId, Material, Model, Shape, Solver, ToolDefinition, ToolId, Values, Viscosity,
-    World, WorldDefinition,
+    BodyContact, BodyDefinition, BodyId, Shape, Solver, ToolDefinition, ToolId, Values, Viscosity, World,
+    WorldDefinition,
 };
 
 const GRAVITY: f32 = 9.81;
@@ -30,15 +31,6 @@ fn world_with_plane(friction: f32) -> (World, ToolId) {
 fn cube(world: &mut World, at: Vec3, solver: Solver, thickness: f32) -> BodyId {
     let mesh = moved(Mesh::block([0.36; 3], [3; 3]).expect("a block"), at);
     let body = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
-        material: Some(Material {
-            model: Model::Tetrahedra,
-            young_modulus: 20e3,
-            poisson_ratio: 0.3,
-            density: 500.0,
-            ..Material::default()
-        }),
         contact: BodyContact {
             thickness,
             with_bodies: true,
@@ -46,7 +38,7 @@ fn cube(world: &mut World, at: Vec3, solver: Solver, thickness: f32) -> BodyId {
             ..BodyContact::NOTHING
         },
         solver,
-        ..Default::default()
+        ..of_elements(&mesh, [20e3, 0.3, 500.0])
     };
     world.create_body(&body).expect("a cube")
 }
@@ -170,15 +162,6 @@ fn viscous_tissue_is_moved_out_of_a_tools_reach() {
     let mesh = moved(Mesh::block([1.0; 3], [3; 3]).expect("a block"), Vec3::Y * 0.5);
     let body = world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
-            material: Some(Material {
-                model: Model::Tetrahedra,
-                young_modulus: 1e4,
-                poisson_ratio: 0.4,
-                density: 6.4,
-                ..Material::default()
-            }),
             viscosity: Viscosity {
                 retardation_time: 0.01,
                 ..Viscosity::default()
@@ -187,7 +170,7 @@ fn viscous_tissue_is_moved_out_of_a_tools_reach() {
                 thickness: THICKNESS,
                 ..BodyContact::NOTHING
             },
-            ..Default::default()
+            ..of_elements(&mesh, [1e4, 0.4, 6.4])
         })
         .expect("a cube");
     for _ in 0..60 {

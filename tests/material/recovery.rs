@@ -1,9 +1,10 @@
 //! Organs of tetrahedra scattered, flattened and collapsed come back to rest, and no tetrahedron stays inside out.
 
 use crate::support::bodies::{FREE, Random};
+use crate::support::organ::of_elements;
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, ElementLaw, Material, Model, Solver, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, ElementLaw, Material, Solver, Values, World, WorldDefinition};
 
 /// How far the edges are from their lengths at rest, RMS, and how many tetrahedra are inside out.
 fn recovery(mesh: &Mesh, positions: &[Vec3]) -> (f64, usize) {
@@ -79,18 +80,9 @@ fn organs_of_tetrahedra_come_back_from_anywhere() {
         ] {
             for (name, start) in starts(&mesh) {
                 let definition = BodyDefinition {
-                    positions: &mesh.positions,
-                    tetrahedra: &mesh.tetrahedra,
-                    material: Some(Material {
-                        model: Model::Tetrahedra,
-                        young_modulus: 5000.0,
-                        poisson_ratio: nu,
-                        density: 1060.0,
-                        ..Material::default()
-                    }),
                     node_dampings: Values::Uniform(0.02),
                     solver,
-                    ..BodyDefinition::default()
+                    ..of_elements(&mesh, [5000.0, nu, 1060.0])
                 };
                 come_back(
                     &mesh,
@@ -124,19 +116,10 @@ fn scattered_and_flat_organs_of_hyperelastic_laws_come_back() {
                     continue;
                 }
                 let definition = BodyDefinition {
-                    positions: &mesh.positions,
-                    tetrahedra: &mesh.tetrahedra,
-                    material: Some(Material {
-                        model: Model::Tetrahedra,
-                        young_modulus: 5000.0,
-                        poisson_ratio: nu,
-                        density: 1060.0,
-                        ..Material::default()
-                    }),
                     element_law: law,
                     node_dampings: Values::Uniform(0.02),
                     solver,
-                    ..BodyDefinition::default()
+                    ..of_elements(&mesh, [5000.0, nu, 1060.0])
                 };
                 let named = format!("{name}, {law:?}, nu {nu}, {solver:?}");
                 come_back(&mesh, &definition, &start, step, &named);

@@ -1,6 +1,7 @@
 //! Springs that yield, and springs with a limit on their strain: forces along their curves, loops of work, and rest under loads.
 
 use crate::support::bodies::FREE;
+use crate::support::organ::of_elements;
 use crate::support::scene::{SOLVERS, STORAGES, Scene};
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
@@ -183,17 +184,8 @@ fn the_state_of_rest_is_where_springs_have_yielded() {
     // Tetrahedra of which this is not known are told of.
     let mesh = Mesh::block([0.04, 0.02, 0.02], [4, 2, 2]).expect("a block");
     let tissue = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
-        material: Some(Material {
-            model: Model::Tetrahedra,
-            young_modulus: 5000.0,
-            poisson_ratio: 0.3,
-            density: 1000.0,
-            ..Material::default()
-        }),
         yielding: yielding(0.02),
-        ..BodyDefinition::default()
+        ..of_elements(&mesh, [5000.0, 0.3, 1000.0])
     };
     for (gravity, holds) in [(0.5, true), (30.0, false)] {
         let gravity = Vec3::NEG_Y * gravity;
@@ -370,18 +362,9 @@ fn tetrahedra_that_yield_lose_energy() {
             let mut left = Vec::new();
             for strain in [0.0, 0.02] {
                 let definition = BodyDefinition {
-                    positions: &mesh.positions,
-                    tetrahedra: &mesh.tetrahedra,
-                    material: Some(Material {
-                        model: Model::Tetrahedra,
-                        young_modulus: 5000.0,
-                        poisson_ratio: nu,
-                        density: 1000.0,
-                        ..Material::default()
-                    }),
                     yielding: yielding(strain),
                     solver,
-                    ..BodyDefinition::default()
+                    ..of_elements(&mesh, [5000.0, nu, 1000.0])
                 };
                 let mut scene = Scene::new(FREE, &definition);
                 let thrown: Vec<Vec3> = mesh

@@ -11,6 +11,7 @@ mod examples;
 mod header;
 mod install;
 mod layering;
+mod names;
 mod readme;
 mod samples;
 mod symbols;

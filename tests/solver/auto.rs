@@ -2,11 +2,10 @@
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
-use sinew::{
-    BodyDefinition, ChoiceReason, Error, LimitKind, Material, Model, Solver, StepLimit, Values, World, WorldDefinition,
-};
+use sinew::{BodyDefinition, ChoiceReason, Error, LimitKind, Solver, StepLimit, Values, World, WorldDefinition};
 
 use crate::support::bodies::{FREE, Parts, Scene};
+use crate::support::organ::of_elements;
 
 /// Two masses of `mass` kg whose spring has the longest stable substep `limit`, s: 2 / omega, with omega^2 = 2 k / m.
 fn pair(limit: f32) -> Parts {
@@ -175,18 +174,9 @@ fn an_unstable_step_names_the_element_or_the_term() {
     let corner = far.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).expect("a node").0;
     mesh.positions[corner] -= Vec3::splat(0.012);
     let elements = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
-        material: Some(Material {
-            model: Model::Tetrahedra,
-            young_modulus: 1e5,
-            poisson_ratio: 0.3,
-            density: 1000.0,
-            ..Material::default()
-        }),
         solver: Solver::Verlet,
         mass_scaling: 0.0,
-        ..BodyDefinition::default()
+        ..of_elements(&mesh, [1e5, 0.3, 1000.0])
     };
     let few = WorldDefinition {
         max_substeps: 5,

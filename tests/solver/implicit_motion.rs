@@ -8,6 +8,7 @@ use crate::support::hanging::nodes_at;
 use crate::support::motion::{
     Mode, Pendulum, STRETCH, Waves, fixed_chain, omega, period_of, rounding, stretch, two_masses,
 };
+use crate::support::organ::of_elements;
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, Material, Model, Solver, World, WorldDefinition};
@@ -392,17 +393,8 @@ fn a_step_that_is_not_solved_does_not_brake_a_spin() {
     let mesh = Mesh::organ(0.15, 0.012).expect("an organ");
     let mut world = World::new(FREE).expect("a world");
     let definition = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
-        material: Some(Material {
-            model: Model::Tetrahedra,
-            young_modulus: 1e5,
-            poisson_ratio: 0.49,
-            density: 1000.0,
-            ..Default::default()
-        }),
         solver: Solver::Implicit,
-        ..Default::default()
+        ..of_elements(&mesh, [1e5, 0.49, 1000.0])
     };
     let id = world.create_body(&definition).expect("a body");
     let mut scene = Scene { world, id };
@@ -473,17 +465,8 @@ fn a_bar_rings_by_however_little() {
             let mut scenes = SOLVERS.map(|solver| {
                 let mut world = World::new(FREE).expect("a world");
                 let definition = BodyDefinition {
-                    positions: &mesh.positions,
-                    tetrahedra: &mesh.tetrahedra,
-                    material: Some(Material {
-                        model: Model::Tetrahedra,
-                        young_modulus: 5400.0,
-                        poisson_ratio: 0.3,
-                        density: 1060.0,
-                        ..Default::default()
-                    }),
                     solver,
-                    ..Default::default()
+                    ..of_elements(&mesh, [5400.0, 0.3, 1060.0])
                 };
                 let id = world.create_body(&definition).expect("a body");
                 crate::support::tissue::pin_all(&mut world, id, &nodes_at(&mesh, |p| p.x < -0.0499));

@@ -1,6 +1,7 @@
 //! What VERLET keeps: energy over a million steps, momentum, the motion itself when the whole scene is turned or moved.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
+use crate::support::organ::of_elements;
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, Material, Model, Solver, Viscosity, World, WorldDefinition};
@@ -195,21 +196,12 @@ fn what_is_viscous_keeps_its_angular_momentum() {
     })
     .expect("a world");
     let body = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
-        material: Some(Material {
-            model: Model::Tetrahedra,
-            young_modulus: 3e6,
-            poisson_ratio: 0.4,
-            density: 0.5,
-            ..Material::default()
-        }),
         viscosity: Viscosity {
             retardation_time: 2.6e-4,
             relaxation_time: 0.0,
         },
         solver: Solver::Verlet,
-        ..BodyDefinition::default()
+        ..of_elements(&mesh, [3e6, 0.4, 0.5])
     });
     let body = body.expect("a body");
     let velocities: Vec<Vec3> = mesh

@@ -4,6 +4,7 @@
 //! 0.8 of its limit of 2 at the positions as they are, or to 0.9 of one that holds anywhere.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
+use crate::support::organ::of_elements;
 use glam::{DVec3, Quat, Vec3};
 use sinew::{BodyDefinition, Error, Material, Model, Solver, Storage, Values, World, WorldDefinition};
 
@@ -606,17 +607,8 @@ fn a_sudden_stretch_is_refused_only_where_it_needs_more_substeps_than_are_allowe
     for (stretch, dt) in [(1.5, 1.0 / 30.0), (2.0, FRAME), (2.0, 1.0 / 30.0), (3.0, FRAME)] {
         let mut world = World::new(FREE).expect("a world");
         let definition = BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
-            material: Some(Material {
-                model: Model::Tetrahedra,
-                young_modulus: 1e3,
-                poisson_ratio: 0.49,
-                density: 1000.0,
-                ..Default::default()
-            }),
             element_law: sinew::ElementLaw::MooneyRivlin { ratio: 0.3 },
-            ..Default::default()
+            ..of_elements(&mesh, [1e3, 0.49, 1000.0])
         };
         let id = world.create_body(&definition).expect("a body");
         let body = world.body_mut(id).expect("the body");

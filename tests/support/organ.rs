@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Material, Model};
 
 use super::bodies::Parts;
 
@@ -32,6 +33,22 @@ pub fn organ(length: f32, spacing: f32, young: f32) -> Parts {
         }
     }
     parts
+}
+
+/// The tetrahedra of a mesh as elements of this Young's modulus, Pa, Poisson's ratio and density, kg/m³.
+pub fn of_elements(mesh: &Mesh, [young_modulus, poisson_ratio, density]: [f32; 3]) -> BodyDefinition<'_> {
+    BodyDefinition {
+        positions: &mesh.positions,
+        tetrahedra: &mesh.tetrahedra,
+        material: Some(Material {
+            model: Model::Tetrahedra,
+            young_modulus,
+            poisson_ratio,
+            density,
+            ..Material::default()
+        }),
+        ..BodyDefinition::default()
+    }
 }
 
 /// A square of cloth, held at two corners.

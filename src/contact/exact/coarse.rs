@@ -27,7 +27,7 @@ pub(in crate::contact) struct Between {
 
 /// Signed distances at the centres of cubes.
 #[derive(Debug)]
-pub(in crate::contact) struct Coarse {
+pub(in crate::contact) struct CoarseField {
     low: Vec3,
     cell: f32,
     counts: UVec3,
@@ -35,7 +35,7 @@ pub(in crate::contact) struct Coarse {
     doubt: f32,
 }
 
-impl Coarse {
+impl CoarseField {
     /// About a solid of so many triangles within `bounds`. `measure` tells of a point, given a triangle that may be closest.
     pub fn new(bounds: Bounds, triangles: usize, measure: impl Fn(Vec3, u32) -> Sample) -> Result<Self> {
         let sides = bounds.max - bounds.min;

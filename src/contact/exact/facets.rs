@@ -23,8 +23,8 @@ const POINTED: u8 = 3;
 #[derive(Debug)]
 pub(super) struct Facets {
     positions: Vec<Vec3>,
-    triangles: Vec<Triangle>,
-    edges: Vec<Edge>,
+    triangles: Vec<Facet>,
+    edges: Vec<FacetEdge>,
     /// Sums of the normals of the faces about each node, weighted by their angles there.
     node_normals: Vec<DVec3>,
     /// The convex edges at each node.
@@ -37,7 +37,7 @@ pub(super) struct Facets {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Triangle {
+struct Facet {
     nodes: [u32; 3],
     edges: [u32; 3],
     /// The edges (bits 0 to 2) and corners (bits 3 to 5) that this triangle is the first to have.
@@ -47,7 +47,7 @@ struct Triangle {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Edge {
+struct FacetEdge {
     nodes: [u32; 2],
     /// The third corners of its two triangles; where more meet, its own first node.
     opposite: [u32; 2],
@@ -60,13 +60,13 @@ impl Facets {
     pub fn new(surface: &ClosedSurface, tree: &Tree) -> Result<Self> {
         let (positions, given) = (surface.positions(), surface.triangles());
         let mut sides: Vec<(u64, u32, u8)> = memory::reserved(3 * given.len())?;
-        let mut triangles: Vec<Triangle> = memory::reserved(given.len())?;
+        let mut triangles: Vec<Facet> = memory::reserved(given.len())?;
         for place in 0..given.len() {
             let nodes = given[tree.triangle(place) as usize];
             for (side, ends) in (0..).zip(TRIANGLE_EDGES) {
                 sides.push((pack(&nodes, ends), place as u32, side));
             }
-            triangles.push(Triangle {
+            triangles.push(Facet {
                 nodes,
                 edges: [0; 3],
                 own: 0,
@@ -75,7 +75,7 @@ impl Facets {
         }
         sides.sort_unstable();
         let count = sides.chunk_by(|a, b| a.0 == b.0).count();
-        let mut edges: Vec<Edge> = memory::reserved(count)?;
+        let mut edges: Vec<FacetEdge> = memory::reserved(count)?;
         for same in sides.chunk_by(|a, b| a.0 == b.0) {
             for &(_, place, side) in same {
                 triangles[place as usize].edges[side as usize] = edges.len() as u32;
@@ -88,7 +88,7 @@ impl Facets {
                     .map(|(place, side)| triangles[place as usize].nodes[(side as usize + 2) % 3]),
                 _ => [nodes[0]; 2],
             };
-            edges.push(Edge {
+            edges.push(FacetEdge {
                 nodes,
                 opposite,
                 normal: DVec3::ZERO,

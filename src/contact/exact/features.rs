@@ -9,7 +9,7 @@ use crate::contact::closest::Closest;
 use crate::geometry::Bounds;
 use crate::geometry::nearest::{Spot, nearest_of_segments, nearest_on_triangle};
 use crate::geometry::predicates::pierce;
-use crate::geometry::tree::Placed;
+use crate::geometry::tree::PlacedTriangle;
 
 /// Where a way that begins on the surface is on it no more.
 const BEGUN: f64 = 1e-6;
@@ -31,7 +31,7 @@ struct Pair {
 
 /// The closest pairs of a feature so far.
 #[derive(Clone, Copy, Debug)]
-struct Pairs {
+struct ClosestPairs {
     /// Between the feature's ends.
     inner: Option<Pair>,
     /// At its border.
@@ -69,7 +69,7 @@ impl ExactSolid {
             return None;
         }
         let ends = corners.map(|corner| corner.as_dvec3());
-        let mut pairs = Pairs::within(within);
+        let mut pairs = ClosestPairs::within(within);
         let mut crossings = [(0.0, false); CROSSINGS];
         let mut count = 0;
         let bounds = Bounds::of(corners.into_iter());
@@ -137,11 +137,11 @@ impl ExactSolid {
             return None;
         }
         let face = corners.map(|corner| corner.as_dvec3());
-        let mut pairs = Pairs::within(within);
+        let mut pairs = ClosestPairs::within(within);
         let mut crossed = [None; STARTS];
         let mut count = 0;
         let bounds = Bounds::of(corners.into_iter());
-        let plane = Placed::new(corners);
+        let plane = PlacedTriangle::new(corners);
         self.tree.near(&bounds, pairs.limit as f32, |place| {
             if plane.is_beside(&self.tree.placed(place).corners, within) {
                 return pairs.limit as f32;
@@ -245,7 +245,7 @@ impl ExactSolid {
     }
 
     /// The answer of an edge or face that passes through no triangle.
-    fn apart_or_within(&self, corners: &[Vec3], middle: Vec3, known: Between, pairs: &Pairs) -> Option<Closest> {
+    fn apart_or_within(&self, corners: &[Vec3], middle: Vec3, known: Between, pairs: &ClosestPairs) -> Option<Closest> {
         // All of it is on one side: that of any of its points.
         let is_inside = if known.least > 0.0 || known.most < 0.0 {
             known.most < 0.0
@@ -266,7 +266,7 @@ impl ExactSolid {
     }
 
     /// The closest pair between the ends of a feature outside, or else at its border.
-    fn answer(&self, corners: &[Vec3], pairs: &Pairs) -> Option<Closest> {
+    fn answer(&self, corners: &[Vec3], pairs: &ClosestPairs) -> Option<Closest> {
         let pair = pairs.inner.or(pairs.border)?;
         let distance = pair.squared.sqrt();
         if self.facets.are_doubtful() && pairs.inner.is_some() {
@@ -291,7 +291,7 @@ impl ExactSolid {
         })
     }
 
-    fn deepest_of(&self, corners: &[Vec3], start: [f64; 3], pairs: &Pairs) -> Option<Closest> {
+    fn deepest_of(&self, corners: &[Vec3], start: [f64; 3], pairs: &ClosestPairs) -> Option<Closest> {
         self.deepest_from(corners, start)
             .or_else(|| self.answer(corners, pairs))
     }
@@ -315,7 +315,7 @@ impl ExactSolid {
     }
 }
 
-impl Pairs {
+impl ClosestPairs {
     fn within(within: f32) -> Self {
         Self {
             inner: None,

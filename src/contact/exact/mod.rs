@@ -14,7 +14,7 @@ pub(super) mod tests;
 
 use glam::{DVec3, Vec3};
 
-use self::coarse::{Between, Coarse};
+use self::coarse::{Between, CoarseField};
 use self::deepest::Signed;
 use self::facets::Facets;
 use crate::base::Result;
@@ -36,7 +36,7 @@ pub(crate) struct ExactSolid {
     tree: Tree,
     facets: Facets,
     /// None where the solid changes its shape.
-    coarse: Option<Coarse>,
+    coarse: Option<CoarseField>,
     /// The largest of its coordinates.
     size: f64,
 }
@@ -67,7 +67,7 @@ impl ExactSolid {
     pub fn new(surface: &ClosedSurface) -> Result<Self> {
         let mut solid = Self::changing(surface)?;
         let count = solid.tree.triangle_count();
-        let coarse = Coarse::new(solid.tree.bounds(), count, |point, hint| {
+        let coarse = CoarseField::new(solid.tree.bounds(), count, |point, hint| {
             let nearest = solid.nearest_from(point, f32::INFINITY, Some(hint));
             let sample = |nearest: Nearest| (solid.signed(&nearest).distance as f32, nearest.place as u32);
             nearest.map_or((0.0, 0), sample)

@@ -12,7 +12,7 @@ use super::facets::Facets;
 use crate::contact::closest::Closest;
 use crate::geometry::Bounds;
 use crate::geometry::nearest::{Spot, nearest_on_triangle};
-use crate::geometry::tree::Placed;
+use crate::geometry::tree::PlacedTriangle;
 
 /// Edges of a solid that an edge has passed, at most.
 const PASSED: usize = 16;
@@ -39,7 +39,7 @@ pub(crate) enum WayOut {
 
 /// A way out.
 #[derive(Clone, Copy, Debug)]
-struct Way {
+struct Exit {
     /// The point of the feature that goes it.
     weights: [f64; 3],
     depth: f64,
@@ -81,7 +81,7 @@ impl ExactSolid {
     pub fn past_corner(&self, corners: [Vec3; 3]) -> Option<Closest> {
         let [a, b, c] = corners;
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        self.past_corners(corners, f64::from(longest)).map(Way::closest)
+        self.past_corners(corners, f64::from(longest)).map(Exit::closest)
     }
 
     /// The shortest way that takes all of an edge before one of the sides that it passes through, along that side's normal.
@@ -93,7 +93,7 @@ impl ExactSolid {
     /// The same for a face.
     fn past_sides_of_face(&self, corners: [Vec3; 3]) -> Option<f64> {
         let face = corners.map(|corner| corner.as_dvec3());
-        let plane = Placed::new(corners);
+        let plane = PlacedTriangle::new(corners);
         self.past_sides(&corners, |place| {
             !plane.is_beside(&self.tree.placed(place).corners, 0.0) && self.crossed(face, place).is_some()
         })
@@ -116,7 +116,7 @@ impl ExactSolid {
     }
 
     /// The way of an edge out past an edge of the solid, no longer than `within`.
-    fn past_edges(&self, corners: [Vec3; 2], within: f64) -> Option<Way> {
+    fn past_edges(&self, corners: [Vec3; 2], within: f64) -> Option<Exit> {
         let [a, b] = corners.map(|corner| corner.as_dvec3());
         let mut ways = [None; PASSED];
         let mut count = 0;
@@ -130,7 +130,7 @@ impl ExactSolid {
         });
         let ways = ways[..count].iter().flatten();
         // Of several edges on one side the furthest is the last to be passed.
-        let last = |way: &Way| {
+        let last = |way: &Exit| {
             let same = ways.clone().filter(|other| other.normal.dot(way.normal) > SAME_SIDE);
             same.copied()
                 .fold(*way, |last, other| if other.depth > last.depth { other } else { last })
@@ -139,11 +139,11 @@ impl ExactSolid {
     }
 
     /// The way of a face out past a corner of the solid, along its own perpendicular, no longer than `within`.
-    fn past_corners(&self, corners: [Vec3; 3], within: f64) -> Option<Way> {
+    fn past_corners(&self, corners: [Vec3; 3], within: f64) -> Option<Exit> {
         let face = corners.map(|corner| corner.as_dvec3());
         let across = (face[1] - face[0]).cross(face[2] - face[0]).try_normalize()?;
         // To either side of it.
-        let mut ways: [Option<Way>; 2] = [None; 2];
+        let mut ways: [Option<Exit>; 2] = [None; 2];
         self.look_within(&corners, within, |place| {
             for node in self.facets.salient_nodes(place) {
                 let height = (self.facets.position(node) - face[0]).dot(across);
@@ -155,7 +155,7 @@ impl ExactSolid {
                 }
                 let (weights, part) = nearest_on_triangle(self.facets.position(node), face);
                 if part == Spot::Face {
-                    *side = Some(Way { weights, depth, normal });
+                    *side = Some(Exit { weights, depth, normal });
                 }
             }
         });
@@ -173,7 +173,7 @@ impl ExactSolid {
     }
 }
 
-impl Way {
+impl Exit {
     fn closest(self) -> Closest {
         Closest {
             weights: self.weights.map(|weight| weight as f32),
@@ -185,13 +185,13 @@ impl Way {
 }
 
 /// The shortest of several ways, where it is no longer than `within`.
-fn shortest(ways: impl Iterator<Item = Way>, within: f64) -> Option<Way> {
+fn shortest(ways: impl Iterator<Item = Exit>, within: f64) -> Option<Exit> {
     let best = ways.reduce(|best, other| if other.depth < best.depth { other } else { best })?;
     (best.depth <= within * (1.0 + ROUNDING)).then_some(best)
 }
 
 /// The way of an edge from `a` to `b` out past an edge of a solid, where it has passed that.
-fn past_edge(facets: &Facets, [a, b]: [DVec3; 2], edge: u32) -> Option<Way> {
+fn past_edge(facets: &Facets, [a, b]: [DVec3; 2], edge: u32) -> Option<Exit> {
     let [c, d] = facets.ends(edge);
     let (along, other) = (b - a, d - c);
     let across = along.cross(other);
@@ -207,7 +207,7 @@ fn past_edge(facets: &Facets, [a, b]: [DVec3; 2], edge: u32) -> Option<Way> {
     }
     let height = between.dot(across) / square.sqrt();
     let normal = across * (height.signum() / square.sqrt());
-    facets.leads_off_edge(edge, normal).then_some(Way {
+    facets.leads_off_edge(edge, normal).then_some(Exit {
         weights: [1.0 - share, share, 0.0],
         depth: height.abs(),
         normal,

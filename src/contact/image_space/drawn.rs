@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::layers::{Crossing, Layers};
+use super::layers::{Layers, RayCrossing};
 use super::projection::{Frame, LARGEST_IMAGE, Projection};
 use crate::base::{Error, Result};
 use crate::codec::saved;
@@ -25,13 +25,13 @@ const RECENT: usize = 16;
 pub(crate) struct Drawn {
     /// Metres.
     pixel: f64,
-    views: [View; 3],
+    views: [AxisView; 3],
 }
 
-saved!(Drawn { pixel, views });
+saved! { Drawn { pixel, views } }
 
 #[derive(Debug)]
-struct View {
+struct AxisView {
     /// Along which axis it looks.
     axis: usize,
     frame: Frame,
@@ -41,13 +41,7 @@ struct View {
     projection: Option<Projection>,
 }
 
-saved!(View {
-    axis,
-    frame,
-    pixels,
-    layers,
-    projection
-});
+saved! { AxisView { axis, frame, pixels, layers, projection } }
 
 impl Drawn {
     /// Room for a surface like this one, in pixels of `pixel` metres.
@@ -62,7 +56,7 @@ impl Drawn {
             areas += 0.5 * (b - a).cross(c - a).abs();
             count += 1;
         }
-        let view = |axis: usize| -> Result<View> {
+        let view = |axis: usize| -> Result<AxisView> {
             let frame = Frame::AXES[axis];
             let size = frame.coordinates(bounds.max - bounds.min);
             let [columns, rows] = [size.x, size.y].map(|length| (length / pixel).ceil().max(1.0));
@@ -75,7 +69,7 @@ impl Drawn {
             // No image is so small that each triangle could not be seen once.
             let pixels = (STRETCHED * columns * rows) as usize + 1;
             let crossings = (STRETCHED * areas.dot(frame.forward) / (pixel * pixel)) as usize + count;
-            Ok(View {
+            Ok(AxisView {
                 axis,
                 frame,
                 pixels,
@@ -113,7 +107,7 @@ impl Drawn {
     }
 }
 
-impl View {
+impl AxisView {
     fn draw(
         &mut self,
         mut pixel: f64,
@@ -146,7 +140,7 @@ impl View {
         }
     }
 
-    fn near(&self, bounds: &Bounds, reach: f64, mut see: impl FnMut(&Crossing)) {
+    fn near(&self, bounds: &Bounds, reach: f64, mut see: impl FnMut(&RayCrossing)) {
         let Some(projection) = self.projection.as_ref().filter(|_| !self.layers.is_empty()) else {
             return;
         };

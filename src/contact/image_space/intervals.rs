@@ -1,6 +1,6 @@
 //! Where the ray of a pixel is inside a body.
 
-use super::layers::Crossing;
+use super::layers::RayCrossing;
 
 /// A piece of a ray within a body.
 #[derive(Clone, Copy, Debug)]
@@ -26,13 +26,13 @@ impl Interval {
 
 /// The pieces of a ray that lie within a body, each longer by `thickness` at both ends; pieces that then touch are one.
 pub(super) struct Intervals<'a> {
-    crossings: std::slice::Iter<'a, Crossing>,
+    crossings: std::slice::Iter<'a, RayCrossing>,
     thickness: f64,
     ahead: Option<Interval>,
 }
 
 impl<'a> Intervals<'a> {
-    pub fn new(crossings: &'a [Crossing], thickness: f64) -> Self {
+    pub fn new(crossings: &'a [RayCrossing], thickness: f64) -> Self {
         let mut intervals = Self {
             crossings: crossings.iter(),
             thickness,
@@ -45,7 +45,7 @@ impl<'a> Intervals<'a> {
     /// The next piece in which the surface is wound around the ray.
     fn read(&mut self) -> Option<Interval> {
         let mut winding = 0;
-        let mut entry: Option<&Crossing> = None;
+        let mut entry: Option<&RayCrossing> = None;
         for crossing in self.crossings.by_ref() {
             winding += crossing.winding();
             match entry {

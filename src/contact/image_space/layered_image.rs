@@ -3,12 +3,12 @@
 use glam::{DVec3, Vec3};
 
 use super::covered::nearest_covered;
-use super::layers::{Crossing, Layers};
+use super::layers::{Layers, RayCrossing};
 use super::projection::{Frame, Projection};
 use super::surface;
 use crate::base::{Error, Result, above_zero, memory};
 use crate::contact::distance::closest_on_triangle;
-use crate::contact::exact::coarse::{Coarse, Sample};
+use crate::contact::exact::coarse::{CoarseField, Sample};
 use crate::geometry::Bounds;
 use crate::geometry::nearest::nearest_on_triangle;
 use crate::geometry::tree::Tree;
@@ -37,10 +37,10 @@ const EQUAL: f32 = 1e-4;
 /// along two axes, is not seen at all.
 #[derive(Debug)]
 pub struct LayeredImage {
-    triangles: Vec<Triangle>,
-    images: [Image; 3],
+    triangles: Vec<SearchTriangle>,
+    images: [AxisImage; 3],
     /// What is far away is known from here.
-    coarse: Coarse,
+    coarse: CoarseField,
     low: Vec3,
     high: Vec3,
     /// Metres.
@@ -49,7 +49,7 @@ pub struct LayeredImage {
 
 /// All that a search needs of a triangle, side by side.
 #[derive(Clone, Copy, Debug)]
-struct Triangle {
+struct SearchTriangle {
     corners: [Vec3; 3],
     /// Of unit length; zero for a triangle without area.
     normal: Vec3,
@@ -57,7 +57,7 @@ struct Triangle {
 
 /// One of the three images.
 #[derive(Debug)]
-struct Image {
+struct AxisImage {
     projection: Projection,
     layers: Layers,
     /// For each pixel the nearest that shows the solid, marked where that is broken.
@@ -66,7 +66,7 @@ struct Image {
 
 /// A face that a search has met, as the point sees it.
 #[derive(Clone, Copy, Default)]
-struct Face {
+struct FoundFace {
     triangle: u32,
     squared_distance: f32,
     /// From the face's plane to the point.
@@ -80,23 +80,23 @@ struct Face {
     centre: Vec3,
 }
 
-impl Face {
+impl FoundFace {
     /// How far a neighbour's centre stands out of the plane: below 0 where they meet at a ridge.
-    fn bend(&self, neighbour: &Face) -> f32 {
+    fn bend(&self, neighbour: &FoundFace) -> f32 {
         self.normal.dot(neighbour.centre - self.closest)
     }
 }
 
 /// The faces that a search has met.
 struct Faces {
-    met: [Face; MET],
+    met: [FoundFace; MET],
     count: usize,
     /// The closest; of several as close the one that the point is most in front of or behind, which tells the side.
     closest: usize,
 }
 
 impl Faces {
-    fn add(&mut self, face: Face) {
+    fn add(&mut self, face: FoundFace) {
         let Some(place) = self.place_for(&face) else {
             return;
         };
@@ -113,7 +113,7 @@ impl Faces {
     }
 
     /// A free place, or that of the face furthest away where this one is closer.
-    fn place_for(&self, face: &Face) -> Option<usize> {
+    fn place_for(&self, face: &FoundFace) -> Option<usize> {
         if self.count < MET {
             return Some(self.count);
         }
@@ -124,17 +124,17 @@ impl Faces {
         (face.squared_distance < distance(&furthest)).then_some(furthest)
     }
 
-    fn met(&self) -> &[Face] {
+    fn met(&self) -> &[FoundFace] {
         &self.met[..self.count]
     }
 
-    fn closest(&self) -> Option<&Face> {
+    fn closest(&self) -> Option<&FoundFace> {
         self.met().get(self.closest)
     }
 
     /// Where the point is beside the closest face, that face or its neighbours decide: what they have in common if they
     /// meet at a ridge, what either has if they meet in a valley.
-    fn deciding(&self, pixel: f32) -> Option<&Face> {
+    fn deciding(&self, pixel: f32) -> Option<&FoundFace> {
         let closest = self.closest()?;
         if closest.beside == Vec3::ZERO {
             return Some(closest);
@@ -174,15 +174,15 @@ impl LayeredImage {
         drawn.extend(triangles.iter().map(|triangle| {
             let corners = triangle.map(|node| positions[node as usize]);
             let [a, b, c] = corners.map(|corner| corner.as_dvec3());
-            Triangle {
+            SearchTriangle {
                 corners,
                 normal: (b - a).cross(c - a).normalize_or_zero().as_vec3(),
             }
         }));
-        let image = |axis: usize| Image::new(Frame::AXES[axis], positions, triangles, [low, high], pixel);
+        let image = |axis: usize| AxisImage::new(Frame::AXES[axis], positions, triangles, [low, high], pixel);
         let images = [image(0)?, image(1)?, image(2)?];
         let tree = Tree::new(triangles.len(), |triangle| drawn[triangle as usize].corners)?;
-        let mut coarse = Coarse::new(Bounds { min: low, max: high }, triangles.len(), |point, hint| {
+        let mut coarse = CoarseField::new(Bounds { min: low, max: high }, triangles.len(), |point, hint| {
             let (distance, place) = nearest_of(&tree, point, hint);
             let side = if shows_inside(&images, point) { -1.0 } else { 1.0 };
             (side * distance, place)
@@ -234,7 +234,7 @@ impl LayeredImage {
     /// At any distance; `None` only where no image shows anything.
     pub(super) fn signed_distance(&self, point: Vec3) -> Option<(f32, Vec3)> {
         let mut faces = Faces {
-            met: [Face::default(); MET],
+            met: [FoundFace::default(); MET],
             count: 0,
             closest: 0,
         };
@@ -275,14 +275,14 @@ impl LayeredImage {
     }
 
     /// Adds the faces that a ray passes to those met.
-    fn meet(&self, crossings: &[Crossing], point: Vec3, faces: &mut Faces) {
+    fn meet(&self, crossings: &[RayCrossing], point: Vec3, faces: &mut Faces) {
         for crossing in crossings {
             self.meet_face(crossing.triangle(), point, faces);
         }
     }
 
     fn meet_face(&self, triangle: u32, point: Vec3, faces: &mut Faces) {
-        let Triangle { corners, normal } = self.triangles[triangle as usize];
+        let SearchTriangle { corners, normal } = self.triangles[triangle as usize];
         // As seen from the point, so that no digits are lost.
         let [a, b, c] = corners.map(|corner| corner - point);
         let height = -a.dot(normal);
@@ -296,7 +296,7 @@ impl LayeredImage {
         let weights = closest_on_triangle(Vec3::ZERO, a, b, c);
         let closest = a * weights[0] + b * weights[1] + c * weights[2];
         let within = weights.iter().all(|&weight| weight > 0.0);
-        faces.add(Face {
+        faces.add(FoundFace {
             triangle,
             squared_distance: closest.length_squared(),
             height,
@@ -322,7 +322,7 @@ impl LayeredImage {
 }
 
 /// What most of the images say.
-fn shows_inside(images: &[Image; 3], point: Vec3) -> bool {
+fn shows_inside(images: &[AxisImage; 3], point: Vec3) -> bool {
     images.iter().filter(|image| image.shows_inside(point)).count() >= 2
 }
 
@@ -359,7 +359,7 @@ fn around(projection: &Projection, pixel: usize, mut see: impl FnMut(usize)) {
     }
 }
 
-impl Image {
+impl AxisImage {
     fn new(frame: Frame, positions: &[Vec3], triangles: &[[u32; 3]], bounds: [Vec3; 2], pixel: f32) -> Result<Self> {
         let [low, high]: [DVec3; 2] = bounds.map(|corner| frame.coordinates(corner));
         let projection = Projection::new(frame, low, high, pixel.into())?;
@@ -387,7 +387,7 @@ impl Image {
 
     /// Shows of what the ray next to a point passes the last before it and the first behind it, and what the rays around that one pass there
     /// where that differs.
-    fn near(&self, point: Vec3, mut see: impl FnMut(&[Crossing])) {
+    fn near(&self, point: Vec3, mut see: impl FnMut(&[RayCrossing])) {
         let vertex = self.projection.project(point);
         let marked = self.covered[self.projection.pixel_at(&vertex)];
         if marked == u32::MAX {
@@ -407,9 +407,9 @@ impl Image {
 
     fn shows_inside(&self, point: Vec3) -> bool {
         let vertex = self.projection.project(point);
-        let passed = |crossing: &&Crossing| f64::from(crossing.depth) < vertex.depth;
+        let passed = |crossing: &&RayCrossing| f64::from(crossing.depth) < vertex.depth;
         let crossings = self.layers.at(self.projection.pixel_at(&vertex));
-        let windings = crossings.iter().take_while(passed).map(Crossing::winding);
+        let windings = crossings.iter().take_while(passed).map(RayCrossing::winding);
         self.projection.shows(&vertex) && windings.sum::<i32>() > 0
     }
 }

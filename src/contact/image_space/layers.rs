@@ -9,16 +9,16 @@ use crate::codec::saved;
 
 /// Where the ray of a pixel passes a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Crossing {
+pub(super) struct RayCrossing {
     /// Along the view, m.
     pub depth: f32,
     /// The triangle, doubled, and 1 where the ray enters.
     code: u32,
 }
 
-saved!(Crossing { depth, code });
+saved! { RayCrossing { depth, code } }
 
-impl Crossing {
+impl RayCrossing {
     fn new(depth: f32, triangle: usize, enters: bool) -> Self {
         Self {
             depth,
@@ -41,10 +41,10 @@ impl Crossing {
 pub(super) struct Layers {
     /// Where the crossings of each pixel end; those of the next begin there.
     ends: Vec<u32>,
-    crossings: Vec<Crossing>,
+    crossings: Vec<RayCrossing>,
 }
 
-saved!(Layers { ends, crossings });
+saved! { Layers { ends, crossings } }
 
 impl Layers {
     /// Room for so much.
@@ -107,16 +107,16 @@ impl Layers {
         count: usize,
         corners: &impl Fn(usize) -> Option<[Vec3; 3]>,
     ) {
-        self.crossings.resize(crossings, Crossing::default());
+        self.crossings.resize(crossings, RayCrossing::default());
         draw_triangles(projection, count, corners, |triangle, pixel, fragment| {
             let place = &mut self.ends[pixel];
-            self.crossings[*place as usize] = Crossing::new(fragment.depth, triangle, fragment.front);
+            self.crossings[*place as usize] = RayCrossing::new(fragment.depth, triangle, fragment.front);
             *place += 1;
         });
         let mut begin = 0;
         for &end in &self.ends {
             if end > begin + 1 {
-                let by_depth = |a: &Crossing, b: &Crossing| a.depth.total_cmp(&b.depth).then(a.code.cmp(&b.code));
+                let by_depth = |a: &RayCrossing, b: &RayCrossing| a.depth.total_cmp(&b.depth).then(a.code.cmp(&b.code));
                 self.crossings[begin as usize..end as usize].sort_unstable_by(by_depth);
             }
             begin = end;
@@ -129,7 +129,7 @@ impl Layers {
     }
 
     /// What the ray of a pixel passes.
-    pub fn at(&self, pixel: usize) -> &[Crossing] {
+    pub fn at(&self, pixel: usize) -> &[RayCrossing] {
         let begin = pixel.checked_sub(1).map_or(0, |previous| self.ends[previous]);
         &self.crossings[begin as usize..self.ends[pixel] as usize]
     }

@@ -19,7 +19,7 @@ pub(super) struct Frame {
     pub forward: DVec3,
 }
 
-saved!(Frame { right, down, forward });
+saved! { Frame { right, down, forward } }
 
 impl Frame {
     /// Along the axes of space.
@@ -65,14 +65,7 @@ pub(super) struct Projection {
     pub height: u32,
 }
 
-saved!(Projection {
-    frame,
-    low,
-    pixel,
-    per_metre,
-    width,
-    height
-});
+saved! { Projection { frame, low, pixel, per_metre, width, height } }
 
 impl Projection {
     /// An image of what lies between `low` and `high`, in the coordinates of the frame, at least a pixel large.

@@ -37,13 +37,13 @@ const LOOKS: u32 = 1 << 14;
 
 /// What is seen at a point of a feature.
 #[derive(Clone, Copy)]
-struct Sample {
+struct FeatureSample {
     weights: [f32; 3],
     distance: f32,
     normal: Vec3,
 }
 
-impl Sample {
+impl FeatureSample {
     /// This, or the other where it is clearly deeper.
     fn deeper(self, other: Self, pixel: f32) -> Self {
         if other.distance < self.distance - GAIN * pixel {
@@ -58,7 +58,7 @@ impl Sample {
 #[derive(Clone, Copy)]
 struct FacePart {
     corners: [[f32; 3]; 3],
-    middle: Sample,
+    middle: FeatureSample,
     /// From its middle to the furthest corner, at most.
     reach: f32,
     /// How far the normals differ over what it is a part of.
@@ -71,7 +71,7 @@ impl LayeredImage {
         let best = match corners {
             [node] => {
                 let (distance, normal) = self.distance(*node, within)?;
-                Sample {
+                FeatureSample {
                     weights: [1.0, 0.0, 0.0],
                     distance,
                     normal,
@@ -91,7 +91,7 @@ impl LayeredImage {
     }
 
     /// Halves an edge, and what could hold a deeper point again, down to a pixel.
-    fn deepest_of_edge(&self, a: Vec3, b: Vec3, within: f32) -> Option<Sample> {
+    fn deepest_of_edge(&self, a: Vec3, b: Vec3, within: f32) -> Option<FeatureSample> {
         let along = b - a;
         let length = along.length();
         let middle = 0.5 * (a + b);
@@ -108,7 +108,10 @@ impl LayeredImage {
         let mut best = ends[0].deeper(ends[1], self.pixel()).deeper(centre, self.pixel());
         let mut parts = [ends; PARTS];
         let mut count = 0;
-        let halves = |parts: &mut [[Sample; 2]; PARTS], count: &mut usize, [from, to]: [Sample; 2], middle: Sample| {
+        let halves = |parts: &mut [[FeatureSample; 2]; PARTS],
+                      count: &mut usize,
+                      [from, to]: [FeatureSample; 2],
+                      middle: FeatureSample| {
             // The deeper half is seen first.
             let deeper_first = from.distance < to.distance;
             let (last, first) = if deeper_first {
@@ -161,7 +164,7 @@ impl LayeredImage {
     }
 
     /// Halves a face, and what could hold a deeper point again, down to a pixel.
-    fn deepest_of_face(&self, corners: [Vec3; 3], within: f32) -> Option<Sample> {
+    fn deepest_of_face(&self, corners: [Vec3; 3], within: f32) -> Option<FeatureSample> {
         let third = [1.0 / 3.0; 3];
         let centre = mixed(corners, third);
         let radius = corners.map(|corner| corner.distance(centre));
@@ -260,7 +263,12 @@ impl LayeredImage {
 
     /// Follows the slope from the best sample in steps that grow shorter, from a pixel on. `downhill` gives what a metre
     /// down the slope changes of the weights.
-    fn refined(&self, corners: [Vec3; 3], mut best: Sample, downhill: impl Fn(&Sample) -> [f32; 3]) -> Sample {
+    fn refined(
+        &self,
+        corners: [Vec3; 3],
+        mut best: FeatureSample,
+        downhill: impl Fn(&FeatureSample) -> [f32; 3],
+    ) -> FeatureSample {
         let mut step = self.pixel();
         for _ in 0..HALVINGS {
             let change = downhill(&best);
@@ -282,9 +290,9 @@ impl LayeredImage {
         best
     }
 
-    fn sample(&self, corners: [Vec3; 3], weights: [f32; 3]) -> Option<Sample> {
+    fn sample(&self, corners: [Vec3; 3], weights: [f32; 3]) -> Option<FeatureSample> {
         let (distance, normal) = self.signed_distance(mixed(corners, weights))?;
-        Some(Sample {
+        Some(FeatureSample {
             weights,
             distance,
             normal,

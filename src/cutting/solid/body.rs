@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::sever::{Mark, Stroke};
+use super::sever::{Mark, SolidStroke};
 use crate::base::{Result, memory};
 use crate::codec::{saved, saved_enum};
 use crate::cutting::divided::{Cell, Divided, NONE, Node, Simplex, divided, weighed};
@@ -27,13 +27,7 @@ pub struct SolidCell {
     pub(crate) next: [u32; 4],
 }
 
-saved!(SolidCell {
-    nodes,
-    volume,
-    snap,
-    first,
-    next
-});
+saved! { SolidCell { nodes, volume, snap, first, next } }
 
 /// Whether a face of the material with a tetrahedron across was cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +44,7 @@ saved_enum!(Face { 0 => Whole, 1 => Severed, 2 => Opening });
 
 /// A tetrahedron of the material.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tetrahedron {
+pub struct SolidTetrahedron {
     /// Its vertices; seen from the first the others are clockwise, that is, their triple product is above 0.
     pub corners: [u32; 4],
     /// The cell that it lies in.
@@ -69,16 +63,7 @@ pub struct Tetrahedron {
     pub(crate) next: u32,
 }
 
-saved!(Tetrahedron {
-    corners,
-    cell,
-    volume,
-    neighbours,
-    faces,
-    drawn,
-    turned,
-    next
-});
+saved! { SolidTetrahedron { corners, cell, volume, neighbours, faces, drawn, turned, next } }
 
 /// A triangle that is drawn and touched: a face of the material with nothing across.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,12 +78,7 @@ pub struct SolidTriangle {
     pub(crate) tetrahedron: u32,
 }
 
-saved!(SolidTriangle {
-    corners,
-    cell,
-    is_inner,
-    tetrahedron
-});
+saved! { SolidTriangle { corners, cell, is_inner, tetrahedron } }
 
 /// A corner of the material. Those that triangles have are drawn; others lie inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,40 +96,24 @@ pub struct SolidVertex {
     pub(crate) other_mark: Mark,
 }
 
-saved!(SolidVertex {
-    nodes,
-    weights,
-    point,
-    around,
-    mark,
-    other_mark
-});
+saved! { SolidVertex { nodes, weights, point, around, mark, other_mark } }
 
 /// A solid that can be cut.
 #[derive(Clone, Debug)]
 pub struct CutSolid {
     pub(crate) nodes: Tracked<Node>,
     pub(crate) cells: Tracked<SolidCell>,
-    pub(crate) tetrahedra: Tracked<Tetrahedron>,
+    pub(crate) tetrahedra: Tracked<SolidTetrahedron>,
     pub(crate) triangles: Tracked<SolidTriangle>,
     pub(crate) vertices: Tracked<SolidVertex>,
     /// How many strokes there were.
     pub(crate) strokes: u32,
-    pub(crate) stroke: Stroke,
+    pub(crate) stroke: SolidStroke,
     /// Both before the last cut.
-    pub(crate) before: (u32, Stroke),
+    pub(crate) before: (u32, SolidStroke),
 }
 
-saved!(CutSolid {
-    nodes,
-    cells,
-    tetrahedra,
-    triangles,
-    vertices,
-    strokes,
-    stroke,
-    before
-});
+saved! { CutSolid { nodes, cells, tetrahedra, triangles, vertices, strokes, stroke, before } }
 
 divided!(CutSolid, 4, SolidCell { volume }, tetrahedra, {
     const EDGES: &'static [[usize; 2]] = &[[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
@@ -160,7 +124,7 @@ divided!(CutSolid, 4, SolidCell { volume }, tetrahedra, {
     }
 
     fn move_simplex(&mut self, tetrahedron: u32, cell: u32, next: u32) -> Result<()> {
-        let Tetrahedron {
+        let SolidTetrahedron {
             cell: before, drawn, ..
         } = self.tetrahedra[tetrahedron];
         self.tetrahedra
@@ -190,7 +154,7 @@ impl CutSolid {
     }
 
     /// The tetrahedra of the material; none is ever taken away.
-    pub fn tetrahedra(&self) -> &[Tetrahedron] {
+    pub fn tetrahedra(&self) -> &[SolidTetrahedron] {
         self.tetrahedra.values()
     }
 
@@ -212,16 +176,6 @@ impl CutSolid {
     /// How many pieces the material has fallen into, found by going through all.
     pub fn piece_count(&self) -> Result<u32> {
         piece_count(self.tetrahedra().iter().map(|tetrahedron| tetrahedron.neighbours))
-    }
-
-    /// The tetrahedra that fill a cell, in ascending order.
-    pub fn tetrahedra_in(&self, cell: u32, inside: &mut Vec<u32>) -> Result<()> {
-        inside.clear();
-        for tetrahedron in self.simplices_in(cell) {
-            memory::push(inside, tetrahedron)?;
-        }
-        inside.sort_unstable();
-        Ok(())
     }
 
     /// The tetrahedra about a vertex, as far as they hang together by faces at it, each with the vertex's number in it.

@@ -2,8 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::body::{CutSolid, FACES, Face, SolidCell, SolidTriangle, SolidVertex, Tetrahedron};
-use super::sever::{Mark, Stroke};
+use super::body::{CutSolid, FACES, Face, SolidCell, SolidTetrahedron, SolidTriangle, SolidVertex};
+use super::sever::{Mark, SolidStroke};
 use crate::base::{Error, Result, memory};
 use crate::cutting::divided::{NONE, Node, SNAP};
 use crate::cutting::tracked::Tracked;
@@ -62,7 +62,7 @@ impl CutSolid {
                 next,
             });
             let [a, b, c, d] = corners;
-            tetrahedra.push(Tetrahedron {
+            tetrahedra.push(SolidTetrahedron {
                 corners: if volume > 0.0 { corners } else { [a, b, d, c] },
                 cell: number as u32,
                 volume: volume.abs(),
@@ -84,8 +84,8 @@ impl CutSolid {
             triangles: Tracked::new(triangles),
             vertices: Tracked::new(vertices),
             strokes: 0,
-            stroke: Stroke::NONE,
-            before: (0, Stroke::NONE),
+            stroke: SolidStroke::NONE,
+            before: (0, SolidStroke::NONE),
         };
         solid.check_stars()?;
         Ok(solid)
@@ -112,7 +112,7 @@ impl CutSolid {
 }
 
 /// Finds the neighbours of each tetrahedron, and draws the faces that have none.
-fn join_neighbours(tetrahedra: &mut [Tetrahedron]) -> Result<Vec<SolidTriangle>> {
+fn join_neighbours(tetrahedra: &mut [SolidTetrahedron]) -> Result<Vec<SolidTriangle>> {
     let mut sides = memory::reserved(4 * tetrahedra.len())?;
     for (number, tetrahedron) in tetrahedra.iter().enumerate() {
         for (face, corners) in FACES.iter().enumerate() {
@@ -163,7 +163,11 @@ fn join_neighbours(tetrahedra: &mut [Tetrahedron]) -> Result<Vec<SolidTriangle>>
 }
 
 /// Gives triangles the order and the first corners of those given.
-fn put_in_order(triangles: &mut [SolidTriangle], tetrahedra: &mut [Tetrahedron], given: &[[u32; 3]]) -> Result<()> {
+fn put_in_order(
+    triangles: &mut [SolidTriangle],
+    tetrahedra: &mut [SolidTetrahedron],
+    given: &[[u32; 3]],
+) -> Result<()> {
     if given.len() != triangles.len() {
         return Err(Error::invalid(format!(
             "there are {} triangles, and cells have {} outer faces",

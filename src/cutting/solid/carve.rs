@@ -3,13 +3,13 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::crossing::Swept;
-use super::cut::Cut;
+use super::cut::SolidCut;
 use super::sever::Plane;
 use crate::base::{Result, memory};
 use crate::cutting::divided::NONE;
 
 /// An edge that is crossed.
-struct Crossed {
+struct CrossedEdge {
     /// From the lower vertex to the higher.
     edge: [u32; 2],
     /// How far along.
@@ -20,7 +20,7 @@ struct Crossed {
     tetrahedron: u32,
 }
 
-impl Cut<'_> {
+impl SolidCut<'_> {
     /// Splits the edges of the material of cells that a swept triangle crosses, and marks the vertices on it. Its normal is turned by `sign` to the
     /// side that was above before.
     pub(crate) fn carve(&mut self, swept: &Swept, sign: f64, positions: &[Vec3], cells: &[u32]) -> Result<()> {
@@ -28,7 +28,7 @@ impl Cut<'_> {
         let mut on = Vec::new();
         let mut ring = Vec::new();
         for crossed in &crossed {
-            let Crossed {
+            let CrossedEdge {
                 edge,
                 along,
                 is_above,
@@ -56,7 +56,7 @@ impl Cut<'_> {
             }
         }
         memory::sort_once(&mut on);
-        for Crossed {
+        for CrossedEdge {
             edge,
             along,
             tetrahedron,
@@ -77,7 +77,7 @@ impl Cut<'_> {
     }
 
     /// The edges that a swept triangle crosses, in order.
-    fn crossed(&self, swept: &Swept, sign: f64, positions: &[Vec3], cells: &[u32]) -> Result<Vec<Crossed>> {
+    fn crossed(&self, swept: &Swept, sign: f64, positions: &[Vec3], cells: &[u32]) -> Result<Vec<CrossedEdge>> {
         let mut crossed = Vec::new();
         for &cell in cells {
             let mut tetrahedron = self.solid.cells[cell].first;
@@ -97,7 +97,7 @@ impl Cut<'_> {
                         let edge = [it.corners[low], it.corners[high]];
                         memory::push(
                             &mut crossed,
-                            Crossed {
+                            CrossedEdge {
                                 edge,
                                 along: along.clamp(0.0, 1.0),
                                 is_above: above[low] == (sign > 0.0),

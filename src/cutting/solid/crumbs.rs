@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::body::Face;
-use super::cut::Cut;
+use super::cut::SolidCut;
 use crate::base::{Result, memory};
 use crate::cutting::divided::NONE;
 
@@ -13,7 +13,7 @@ const THIN: f64 = 3.0;
 /// A piece of more tetrahedra is none.
 const MOST: usize = 64;
 
-impl Cut<'_> {
+impl SolidCut<'_> {
     /// Takes back the opening faces about each crumb, so that it stays with what it was cut from.
     pub(crate) fn keep_crumbs(&mut self, faces: &mut Vec<(u32, usize)>) -> Result<()> {
         let mut piece = memory::reserved(MOST + 4)?;

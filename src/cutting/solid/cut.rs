@@ -10,7 +10,7 @@ use crate::cutting::cut::{Limits, Sweep};
 use crate::cutting::pieces::Copier;
 
 /// A cut that is being made.
-pub(crate) struct Cut<'a> {
+pub(crate) struct SolidCut<'a> {
     pub(crate) solid: &'a mut CutSolid,
     pub(crate) limits: Limits,
     pub(crate) changes: Changes,
@@ -48,7 +48,7 @@ impl CutSolid {
             self.cells[cell].nodes
         })?;
         self.begin();
-        let changes = Cut::new(self, limits, false).make(sweep, positions, candidates);
+        let changes = SolidCut::new(self, limits, false).make(sweep, positions, candidates);
         if changes.is_err() {
             self.undo();
         }
@@ -81,7 +81,7 @@ impl CutSolid {
     }
 }
 
-impl<'a> Cut<'a> {
+impl<'a> SolidCut<'a> {
     pub(crate) fn new(solid: &'a mut CutSolid, limits: Limits, is_tear: bool) -> Self {
         Self {
             limits,

@@ -4,7 +4,7 @@
 //! gone on.
 
 use super::body::{CutSolid, Face};
-use super::cut::Cut;
+use super::cut::SolidCut;
 use crate::base::{Result, memory};
 use crate::cutting::divided::NONE;
 use crate::cutting::union::Union;
@@ -27,12 +27,12 @@ struct Bare {
 }
 
 /// What hangs together about a vertex once faces are open.
-struct Parts {
+struct VertexParts {
     star: Vec<(u32, usize)>,
     union: Union,
 }
 
-impl Parts {
+impl VertexParts {
     /// The part that a tetrahedron is in.
     fn of(&mut self, tetrahedron: u32) -> Option<usize> {
         let at = self.star.binary_search_by_key(&tetrahedron, |&(of, _)| of).ok()?;
@@ -40,7 +40,7 @@ impl Parts {
     }
 }
 
-impl Cut<'_> {
+impl SolidCut<'_> {
     /// The severed faces that hang together with vertices found on the blade in this step and can open, each by the lower of its tetrahedra, marked
     /// as such.
     pub(crate) fn ready(&mut self) -> Result<Vec<(u32, usize)>> {
@@ -244,7 +244,7 @@ impl Cut<'_> {
     }
 
     /// The bare faces at a vertex, those of a round one after the other.
-    fn bare(&self, vertex: u32, parts: &mut Parts) -> Result<Vec<Bare>> {
+    fn bare(&self, vertex: u32, parts: &mut VertexParts) -> Result<Vec<Bare>> {
         let mut bare = Vec::new();
         for at in 0..parts.star.len() {
             let (tetrahedron, corner) = parts.star[at];
@@ -326,8 +326,8 @@ impl CutSolid {
         it.neighbours[face] == NONE || it.faces[face] == Face::Opening
     }
 
-    fn parts(&self, vertex: u32) -> Result<Parts> {
-        let mut parts = Parts {
+    fn parts(&self, vertex: u32) -> Result<VertexParts> {
+        let mut parts = VertexParts {
             star: Vec::new(),
             union: Union::default(),
         };

@@ -17,7 +17,7 @@ const EVEN: f64 = 1e-9;
 
 /// A corner of what a blade sweeps in a tetrahedron: by weights of its corners, and what part of its way the blade has gone there.
 #[derive(Clone, Copy, Debug, Default)]
-struct Corner {
+struct SweptCorner {
     weights: [f64; 4],
     time: f64,
 }
@@ -25,7 +25,7 @@ struct Corner {
 /// What a swept triangle and a tetrahedron have in common.
 #[derive(Clone, Copy, Debug, Default)]
 struct Polygon {
-    corners: [Corner; MOST_CORNERS],
+    corners: [SweptCorner; MOST_CORNERS],
     count: usize,
 }
 
@@ -109,14 +109,15 @@ impl CutSolid {
     }
 
     /// Whether what is swept in a tetrahedron lies along a face of it that is cut.
-    fn is_along_cut(&self, tetrahedron: u32, corners: &[Corner]) -> bool {
+    fn is_along_cut(&self, tetrahedron: u32, corners: &[SweptCorner]) -> bool {
         let it = self.tetrahedra[tetrahedron];
         let snap = self.cells[it.cell].snap;
         (0..4).any(|face| {
             let drawn = it.drawn[face];
             let is_cut = it.faces[face] == Face::Severed || drawn != NONE && self.triangles[drawn].is_inner;
             // The height of the corner opposite is the volume by the area.
-            let reaches = |corner: &Corner| corner.weights[face] * 3.0 * it.volume / self.rest_area(tetrahedron, face);
+            let reaches =
+                |corner: &SweptCorner| corner.weights[face] * 3.0 * it.volume / self.rest_area(tetrahedron, face);
             is_cut && corners.iter().all(|corner| reaches(corner) <= snap)
         })
     }
@@ -136,7 +137,7 @@ impl Polygon {
             if !weights.iter().all(|weight| weight.is_finite()) {
                 return None;
             }
-            *corner = Corner { weights, time };
+            *corner = SweptCorner { weights, time };
         }
         for side in 0..4 {
             polygon = polygon.beyond(side);
@@ -148,8 +149,8 @@ impl Polygon {
     }
 
     /// Where the blade stands in it at a time.
-    fn chord(&self, time: f64) -> [Corner; 2] {
-        let mut ends = [None::<Corner>; 2];
+    fn chord(&self, time: f64) -> [SweptCorner; 2] {
+        let mut ends = [None::<SweptCorner>; 2];
         for at in 0..self.count {
             let (from, to) = (&self.corners[at], &self.corners[(at + 1) % self.count]);
             let end = if from.time == time {
@@ -167,7 +168,7 @@ impl Polygon {
     /// What of it has a weight of at least 0 there.
     fn beyond(&self, side: usize) -> Self {
         let mut kept = Self::default();
-        let mut keep = |corner: Corner| {
+        let mut keep = |corner: SweptCorner| {
             if kept.count < MOST_CORNERS {
                 kept.corners[kept.count] = corner;
                 kept.count += 1;
@@ -187,7 +188,7 @@ impl Polygon {
     }
 }
 
-impl Corner {
+impl SweptCorner {
     fn towards(&self, other: &Self, part: f64) -> Self {
         Self {
             weights: std::array::from_fn(|k| self.weights[k] + part * (other.weights[k] - self.weights[k])),

@@ -28,5 +28,5 @@ mod sever;
 mod split;
 mod tear;
 
-pub use body::{CutSolid, SolidCell, SolidTriangle, SolidVertex, Tetrahedron};
-pub(crate) use sever::Stroke as SolidStroke;
+pub use body::{CutSolid, SolidCell, SolidTetrahedron, SolidTriangle, SolidVertex};
+pub(crate) use sever::SolidStroke;

@@ -1,13 +1,13 @@
 //! The material opens along severed faces: they are drawn, and vertices are doubled where what lies about them falls apart.
 
 use super::body::{Face, SolidTriangle};
-use super::cut::Cut;
+use super::cut::SolidCut;
 use crate::base::{Result, memory};
 use crate::cutting::changes::{CutFace, NewVertex, RimEdge};
 use crate::cutting::divided::NONE;
 use crate::cutting::union::Union;
 
-impl Cut<'_> {
+impl SolidCut<'_> {
     /// Parts tetrahedra at faces marked as opening, each given by one of its sides. Returns the cells beside them.
     pub(crate) fn open(&mut self, faces: &[(u32, usize)]) -> Result<Vec<u32>> {
         let (mut corners, mut cells) = (Vec::new(), Vec::new());

@@ -1,13 +1,13 @@
 //! Numbers for the material's vertices, drawn or not: of those at a node one has that of the node, any other has one of its own among nodes.
 
 use super::body::SolidVertex;
-use super::cut::Cut;
+use super::cut::SolidCut;
 use crate::base::{Result, memory};
 use crate::cutting::changes::BoundPoint;
 use crate::cutting::divided::{NONE, Node};
 use crate::cutting::numbers::FreeNodes;
 
-impl Cut<'_> {
+impl SolidCut<'_> {
     /// Numbers what is new, and lists it.
     pub(crate) fn number_points(&mut self) -> Result<()> {
         let before = self.solid.vertices.before()?;

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::body::{CutSolid, Face, SolidVertex};
-use super::cut::Cut;
+use super::cut::SolidCut;
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{saved, saved_enum};
 use crate::cutting::cut::Sweep;
@@ -11,7 +11,7 @@ use crate::cutting::divided::NONE;
 
 /// Steps of the blade that go on from each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Stroke {
+pub(crate) struct SolidStroke {
     /// Its number, from 1 on.
     pub(crate) number: u32,
     /// The blade's edge at the end of the last step.
@@ -22,14 +22,9 @@ pub(crate) struct Stroke {
     turns_up: bool,
 }
 
-saved!(Stroke {
-    number,
-    end,
-    normal,
-    turns_up
-});
+saved! { SolidStroke { number, end, normal, turns_up } }
 
-impl Stroke {
+impl SolidStroke {
     /// Before the first.
     pub(crate) const NONE: Self = Self {
         number: 0,
@@ -94,7 +89,7 @@ pub(crate) struct Plane {
     pub(crate) offset: f64,
 }
 
-saved!(Plane { normal, offset });
+saved! { Plane { normal, offset } }
 
 impl Plane {
     pub(crate) const NONE: Self = Self {
@@ -132,7 +127,7 @@ pub(crate) struct Mark {
     plane: Plane,
 }
 
-saved!(Mark { stroke, side, plane });
+saved! { Mark { stroke, side, plane } }
 
 impl Mark {
     pub(crate) const NONE: Self = Self {
@@ -209,7 +204,7 @@ const SAME: f64 = 0.7;
 /// The cosine of the angle beyond which a blade that turns goes back the way that it came.
 const BACK: f64 = -0.9;
 
-impl Cut<'_> {
+impl SolidCut<'_> {
     /// Whether a vertex was found on the blade in this stroke.
     pub(crate) fn is_on(&self, vertex: u32) -> bool {
         let mark = self.solid.mark_of(vertex);

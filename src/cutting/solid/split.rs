@@ -1,13 +1,13 @@
 //! Splitting an edge of the material: each tetrahedron about it is halved.
 
-use super::body::{Face, SolidTriangle, SolidVertex, Tetrahedron};
-use super::cut::Cut;
+use super::body::{Face, SolidTetrahedron, SolidTriangle, SolidVertex};
+use super::cut::SolidCut;
 use super::sever::Mark;
 use crate::base::{Result, memory};
 use crate::cutting::changes::NewVertex;
 use crate::cutting::divided::NONE;
 
-impl Cut<'_> {
+impl SolidCut<'_> {
     /// Splits an edge of a tetrahedron `along` of the way from its first end to its second. Each tetrahedron about it keeps the half at the first.
     pub(crate) fn split_edge(&mut self, tetrahedron: u32, edge: [u32; 2], along: f64) -> Result<u32> {
         let [from, to] = edge;
@@ -21,7 +21,7 @@ impl Cut<'_> {
             let old = self.solid.tetrahedra[near];
             let [at_from, at_to] = edge.map(|end| self.solid.corner(near, end));
             let far_volume = old.volume * (1.0 - along);
-            let mut far = Tetrahedron {
+            let mut far = SolidTetrahedron {
                 volume: far_volume,
                 ..old
             };
@@ -126,11 +126,11 @@ impl Cut<'_> {
     }
 
     /// Adds a tetrahedron to the cell that it names.
-    fn add_tetrahedron(&mut self, tetrahedron: Tetrahedron) -> Result<u32> {
+    fn add_tetrahedron(&mut self, tetrahedron: SolidTetrahedron) -> Result<u32> {
         let number = self.solid.tetrahedra.count();
         self.limits.check("tetrahedra", number, u32::MAX)?;
         let next = self.solid.cells[tetrahedron.cell].first;
-        self.solid.tetrahedra.push(Tetrahedron { next, ..tetrahedron })?;
+        self.solid.tetrahedra.push(SolidTetrahedron { next, ..tetrahedron })?;
         self.solid.cells.edit(tetrahedron.cell, |cell| cell.first = number)?;
         Ok(number)
     }

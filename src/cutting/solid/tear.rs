@@ -3,13 +3,13 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::body::{CutSolid, Face};
-use super::cut::Cut;
-use super::sever::Stroke;
+use super::cut::SolidCut;
+use super::sever::SolidStroke;
 use crate::base::{Result, memory};
 use crate::cutting::changes::Changes;
 use crate::cutting::cut::{Limits, Sweep};
 use crate::cutting::divided::{Divided, NONE};
-use crate::cutting::tear::Load;
+use crate::cutting::tear::VertexLoad;
 use crate::strain::eigenvalues;
 
 /// A tetrahedron of which the middle lies no higher above a plane than this part of how far it reaches off it is not above: rounding does not tell.
@@ -45,7 +45,7 @@ impl CutSolid {
 
     /// What the cells at a node are stretched by, in the mean over their material: the largest principal value of (F Fᵀ - 1) / 2 with the gradient F of
     /// the deformation (Finger 1894), without unit, and the direction of it as the normal of a tear; `None`: nothing stretches it.
-    pub(crate) fn load_at(&self, node: u32, positions: &[Vec3]) -> Option<Load> {
+    pub(crate) fn load_at(&self, node: u32, positions: &[Vec3]) -> Option<VertexLoad> {
         let (mut sum, mut volume) = (DMat3::ZERO, 0.0);
         for cell in self.cells_at(node) {
             let cell = &self.cells[cell];
@@ -75,7 +75,7 @@ impl CutSolid {
             .reduce(|a, b| if b.length() > a.length() { b } else { a })?;
         let normal = longest.try_normalize().unwrap_or(DVec3::X);
         let along = normal.any_orthonormal_vector();
-        Some(Load { tension, along, normal })
+        Some(VertexLoad { tension, along, normal })
     }
 
     /// Parts the tetrahedra about a vertex whose middles lie on the two sides of the plane across a load while nodes are at `positions`, as far as what is
@@ -86,7 +86,7 @@ impl CutSolid {
     pub(crate) fn tear(
         &mut self,
         vertex: u32,
-        load: &Load,
+        load: &VertexLoad,
         positions: &[Vec3],
         limits: Limits,
     ) -> Result<Option<Changes>> {
@@ -94,9 +94,9 @@ impl CutSolid {
         self.begin();
         let strokes = self.strokes + 1;
         // The stroke of a blade goes on after it.
-        let of_blade = std::mem::replace(&mut self.stroke, Stroke::of_tear(strokes));
+        let of_blade = std::mem::replace(&mut self.stroke, SolidStroke::of_tear(strokes));
         self.strokes = strokes;
-        let changes = Cut::new(self, limits, true).tear(&faces);
+        let changes = SolidCut::new(self, limits, true).tear(&faces);
         self.stroke = of_blade;
         match changes {
             Ok(changes) if !changes.faces.is_empty() => Ok(Some(changes)),
@@ -131,7 +131,7 @@ impl CutSolid {
     }
 
     /// A square about a vertex across a load that reaches as far as what would part there, with nodes at `positions`.
-    pub(crate) fn way_of(&self, vertex: u32, load: &Load, positions: &[Vec3]) -> Result<Sweep> {
+    pub(crate) fn way_of(&self, vertex: u32, load: &VertexLoad, positions: &[Vec3]) -> Result<Sweep> {
         let place = |vertex: u32| self.place(vertex, positions).as_dvec3();
         let from = place(vertex);
         let faces = self.faces_across(vertex, load.normal, positions)?;
@@ -148,7 +148,7 @@ impl CutSolid {
     }
 }
 
-impl Cut<'_> {
+impl SolidCut<'_> {
     fn tear(mut self, faces: &[(u32, usize)]) -> Result<Changes> {
         let mut torn = Vec::new();
         for &(tetrahedron, face) in faces {

@@ -13,7 +13,7 @@ pub(super) use mooney_rivlin::MooneyRivlin;
 pub(super) use neo_hookean::NeoHookean;
 #[cfg(test)]
 use strained::inner;
-pub(super) use strained::{Columns, Strained, product_of};
+pub(super) use strained::{MatrixColumns, Strained, product_of};
 
 use crate::simd::Real;
 

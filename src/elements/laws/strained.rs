@@ -12,14 +12,14 @@ use super::Hyperelastic;
 use crate::simd::Real;
 
 /// The columns of a matrix.
-pub(crate) type Columns<R> = [[R; 3]; 3];
+pub(crate) type MatrixColumns<R> = [[R; 3]; 3];
 
 /// A tetrahedron as it is deformed, with what its law has there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Strained<R> {
     /// F.
-    pub gradient: Columns<R>,
-    pub cofactors: Columns<R>,
+    pub gradient: MatrixColumns<R>,
+    pub cofactors: MatrixColumns<R>,
     pub i1: R,
     /// J - 1.
     pub growth: R,
@@ -51,7 +51,7 @@ fn scaled<R: Real>([x, y, z]: [R; 3], factor: R) -> [R; 3] {
 
 /// `sum + matrix * factor`
 #[inline(always)]
-fn add<R: Real>([x, y, z]: Columns<R>, [a, b, c]: Columns<R>, factor: R) -> Columns<R> {
+fn add<R: Real>([x, y, z]: MatrixColumns<R>, [a, b, c]: MatrixColumns<R>, factor: R) -> MatrixColumns<R> {
     [
         sum(x, scaled(a, factor)),
         sum(y, scaled(b, factor)),
@@ -61,18 +61,18 @@ fn add<R: Real>([x, y, z]: Columns<R>, [a, b, c]: Columns<R>, factor: R) -> Colu
 
 /// The sum of the products of entries.
 #[inline(always)]
-pub(crate) fn inner<R: Real>([a, b, c]: Columns<R>, [x, y, z]: Columns<R>) -> R {
+pub(crate) fn inner<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: MatrixColumns<R>) -> R {
     dot(a, x) + dot(b, y) + dot(c, z)
 }
 
 #[inline(always)]
-pub(crate) fn cofactors_of<R: Real>([a, b, c]: Columns<R>) -> Columns<R> {
+pub(crate) fn cofactors_of<R: Real>([a, b, c]: MatrixColumns<R>) -> MatrixColumns<R> {
     [cross(b, c), cross(c, a), cross(a, b)]
 }
 
 /// A x B.
 #[inline(always)]
-pub(crate) fn product_of<R: Real>([a, b, c]: Columns<R>, [x, y, z]: Columns<R>) -> Columns<R> {
+pub(crate) fn product_of<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: MatrixColumns<R>) -> MatrixColumns<R> {
     [
         sum(cross(b, z), cross(y, c)),
         sum(cross(c, x), cross(z, a)),
@@ -82,7 +82,7 @@ pub(crate) fn product_of<R: Real>([a, b, c]: Columns<R>, [x, y, z]: Columns<R>) 
 
 /// No less than the largest eigenvalue of the products of the columns (Gershgorin).
 #[inline(always)]
-fn largest<R: Real>([a, b, c]: Columns<R>) -> R {
+fn largest<R: Real>([a, b, c]: MatrixColumns<R>) -> R {
     let (ab, ac, bc) = (dot(a, b).size(), dot(a, c).size(), dot(b, c).size());
     let rows = [dot(a, a) + ab + ac, dot(b, b) + ab + bc, dot(c, c) + ac + bc];
     rows[0].greater(rows[1]).greater(rows[2])
@@ -103,7 +103,7 @@ fn relative<R: Real>(shear: R, volume: R, [least, most]: [R; 2]) -> R {
 }
 
 /// Bounds on the stretches.
-struct Bounds<R> {
+struct StretchBounds<R> {
     /// The largest, and its square.
     stretch: R,
     square: R,
@@ -127,7 +127,7 @@ struct Bounds<R> {
 impl<R: Real> Strained<R> {
     /// Of a law beside `kappa/2 (J - 1)²` with the pressure that this has now.
     #[inline(always)]
-    pub fn new(law: impl Hyperelastic, gradient: Columns<R>, kappa: R) -> Self {
+    pub fn new(law: impl Hyperelastic, gradient: MatrixColumns<R>, kappa: R) -> Self {
         let cofactors = cofactors_of(gradient);
         let i1 = inner(gradient, gradient);
         let growth = dot(gradient[0], cofactors[0]) - R::of(1.0);
@@ -159,13 +159,13 @@ impl<R: Real> Strained<R> {
 
     /// A change of the stress with that of a pressure on top, Pa.
     #[inline(always)]
-    pub fn with_pressure_change(&self, changed: Columns<R>, pressure: R) -> Columns<R> {
+    pub fn with_pressure_change(&self, changed: MatrixColumns<R>, pressure: R) -> MatrixColumns<R> {
         add(changed, self.cofactors, pressure)
     }
 
     /// P, the first stress of Piola and Kirchhoff, Pa.
     #[inline(always)]
-    pub fn stress(&self) -> Columns<R> {
+    pub fn stress(&self) -> MatrixColumns<R> {
         let [w1, w2, wj] = self.slopes;
         let (two, zero) = (R::of(2.0), [[R::of(0.0); 3]; 3]);
         let stress = add(zero, self.gradient, two * w1);
@@ -175,7 +175,7 @@ impl<R: Real> Strained<R> {
 
     /// How the stress changes with the deformation, to first order, Pa, and with this `lift` on top.
     #[inline(always)]
-    pub fn stress_change(&self, change: Columns<R>, lift: R) -> Columns<R> {
+    pub fn stress_change(&self, change: MatrixColumns<R>, lift: R) -> MatrixColumns<R> {
         let ([w1, w2, wj], [w11, wjj]) = (self.slopes, self.curvatures);
         let (two, zero) = (R::of(2.0), [[R::of(0.0); 3]; 3]);
         let turns = add(add(zero, self.cofactors, two * w2), self.gradient, wj);
@@ -188,7 +188,7 @@ impl<R: Real> Strained<R> {
     }
 
     #[inline(always)]
-    fn bounds(&self) -> Bounds<R> {
+    fn bounds(&self) -> StretchBounds<R> {
         let (zero, least) = (R::of(0.0), R::of(1e-3));
         let square = largest(self.gradient).greater(R::of(1e-12));
         let stretch = root(square);
@@ -198,7 +198,7 @@ impl<R: Real> Strained<R> {
         let i2 = inner(self.cofactors, self.cofactors);
         // The sum of the squares of s_k - c_k, by 4/3.
         let apart = (self.i1 + i2 - R::of(6.0) * volume) * R::of(4.0 / 3.0);
-        Bounds {
+        StretchBounds {
             stretch,
             square,
             area: largest(self.cofactors),

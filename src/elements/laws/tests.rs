@@ -1,18 +1,18 @@
 use super::*;
 use crate::random::Random;
 
-fn matrix(random: &mut Random, size: f64) -> Columns<f64> {
+fn matrix(random: &mut Random, size: f64) -> MatrixColumns<f64> {
     [[0; 3]; 3].map(|column| column.map(|_| size * (2.0 * f64::from(random.unit()) - 1.0)))
 }
 
-fn sum(a: Columns<f64>, b: Columns<f64>, factor: f64) -> Columns<f64> {
+fn sum(a: MatrixColumns<f64>, b: MatrixColumns<f64>, factor: f64) -> MatrixColumns<f64> {
     std::array::from_fn(|column| std::array::from_fn(|row| a[column][row] + factor * b[column][row]))
 }
 
-const IDENTITY: Columns<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+const IDENTITY: MatrixColumns<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Near rest, large deformations, flat ones, and what is inverted.
-fn deformations(random: &mut Random) -> Vec<Columns<f64>> {
+fn deformations(random: &mut Random) -> Vec<MatrixColumns<f64>> {
     let mut all = Vec::new();
     for size in [0.0, 1e-3, 0.1, 0.5, 1.0, 2.0] {
         for _ in 0..100 {
@@ -26,13 +26,13 @@ fn deformations(random: &mut Random) -> Vec<Columns<f64>> {
     all
 }
 
-fn invariants(gradient: Columns<f64>) -> [f64; 3] {
+fn invariants(gradient: MatrixColumns<f64>) -> [f64; 3] {
     let strained = Strained::new(NeoHookean::new(1.0), gradient, 0.0);
     let i2 = inner(strained.cofactors, strained.cofactors);
     [strained.i1, i2, strained.growth]
 }
 
-fn density(law: impl Hyperelastic, gradient: Columns<f64>, kappa: f64) -> f64 {
+fn density(law: impl Hyperelastic, gradient: MatrixColumns<f64>, kappa: f64) -> f64 {
     let [i1, i2, growth] = invariants(gradient);
     law.energy([i1, i2, growth]) + 0.5 * kappa * growth * growth
 }

@@ -2,18 +2,18 @@
 
 use super::{GROUP, Law, Tetrahedra, turns};
 use crate::elements::LEAST_SHEAR;
-use crate::elements::laws::{Columns, Hyperelastic, Strained};
-use crate::simd::algebra::{Matrix, scaled_matrix, times_upper};
+use crate::elements::laws::{Hyperelastic, MatrixColumns, Strained};
+use crate::simd::algebra::{Matrix3, scaled_matrix, times_upper};
 use crate::simd::{InLanes, Lanes, Record, WithLanes};
 
 /// With the pressures that their nodes have beside their places, or none.
-pub(super) struct Forces<'a, H, const RINGS: bool> {
+pub(super) struct HyperelasticForces<'a, H, const RINGS: bool> {
     pub law: Law,
     pub form: H,
     pub of: Tetrahedra<'a>,
 }
 
-pub(super) struct Changes<'a, H, const RINGS: bool> {
+pub(super) struct HyperelasticChanges<'a, H, const RINGS: bool> {
     pub law: Law,
     pub form: H,
     pub ways: *const Record,
@@ -23,7 +23,7 @@ pub(super) struct Changes<'a, H, const RINGS: bool> {
 /// # Safety
 /// As [`InLanes::new`].
 #[inline(always)]
-unsafe fn numbers<L: Lanes>([a, b, c]: Matrix<L>) -> Columns<InLanes<L>> {
+unsafe fn numbers<L: Lanes>([a, b, c]: Matrix3<L>) -> MatrixColumns<InLanes<L>> {
     // SAFETY: the caller's promise.
     unsafe {
         [
@@ -35,7 +35,7 @@ unsafe fn numbers<L: Lanes>([a, b, c]: Matrix<L>) -> Columns<InLanes<L>> {
 }
 
 #[inline(always)]
-fn lanes<L: Lanes>([a, b, c]: Columns<InLanes<L>>) -> Matrix<L> {
+fn lanes<L: Lanes>([a, b, c]: MatrixColumns<InLanes<L>>) -> Matrix3<L> {
     [
         [a[0].lanes(), a[1].lanes(), a[2].lanes()],
         [b[0].lanes(), b[1].lanes(), b[2].lanes()],
@@ -43,7 +43,7 @@ fn lanes<L: Lanes>([a, b, c]: Columns<InLanes<L>>) -> Matrix<L> {
     ]
 }
 
-impl<H: Hyperelastic, const RINGS: bool> WithLanes for Forces<'_, H, RINGS> {
+impl<H: Hyperelastic, const RINGS: bool> WithLanes for HyperelasticForces<'_, H, RINGS> {
     type Output = f32;
 
     #[inline(always)]
@@ -81,7 +81,7 @@ impl<H: Hyperelastic, const RINGS: bool> WithLanes for Forces<'_, H, RINGS> {
     }
 }
 
-impl<H: Hyperelastic, const RINGS: bool> WithLanes for Changes<'_, H, RINGS> {
+impl<H: Hyperelastic, const RINGS: bool> WithLanes for HyperelasticChanges<'_, H, RINGS> {
     type Output = ();
 
     #[inline(always)]

@@ -45,11 +45,11 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
         } else if is(section, "POINTS") && raw.vertices.is_empty() {
             raw.vertices = read_points(scanner)?;
         } else if grid && is(section, "CELLS") && grid_cells.is_none() {
-            grid_cells = Some(Cells::read(scanner, version, raw.vertices.len())?);
+            grid_cells = Some(Connectivity::read(scanner, version, raw.vertices.len())?);
         } else if grid && is(section, "CELL_TYPES") && grid_kinds.is_none() {
             grid_kinds = Some(read_kinds(scanner)?);
         } else if !grid && let Some(kind) = kind_of_section(section) {
-            let cells = Cells::read(scanner, version, raw.vertices.len())?;
+            let cells = Connectivity::read(scanner, version, raw.vertices.len())?;
             for i in 0..cells.ends.len() {
                 add_cell(&mut raw, scanner, kind, cells.corners(i))?;
             }
@@ -132,13 +132,13 @@ fn add_cell(raw: &mut RawMesh, scanner: &Scanner, kind: u64, corners: &[u32]) ->
 }
 
 /// The points of all cells, one cell after another.
-struct Cells {
+struct Connectivity {
     points: Vec<u32>,
     /// Where each cell ends; the next begins there.
     ends: Vec<usize>,
 }
 
-impl Cells {
+impl Connectivity {
     /// The points of a cell.
     fn corners(&self, cell: usize) -> &[u32] {
         let start = match cell {
@@ -148,8 +148,8 @@ impl Cells {
         &self.points[start..self.ends[cell]]
     }
 
-    fn read(scanner: &mut Scanner, version: f64, vertex_count: usize) -> Result<Cells> {
-        let mut cells = Cells {
+    fn read(scanner: &mut Scanner, version: f64, vertex_count: usize) -> Result<Connectivity> {
+        let mut cells = Connectivity {
             points: Vec::new(),
             ends: Vec::new(),
         };

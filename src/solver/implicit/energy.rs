@@ -118,7 +118,7 @@ impl Substep<'_> {
         // Rounding of velocities, a part of what they are in all, and of coordinates.
         let speed = mean(body, body.state.newest().1).length() * f64::from(f32::EPSILON);
         let reach = body.local_bounds().magnitudes().max_element();
-        let speed = speed + f64::EPSILON * f64::from(reach) / f64::from(self.step);
+        let speed = speed + f64::EPSILON * f64::from(reach) / self.step;
         let noise = mass * speed * speed + NOISY * implicit.noise(reach).energy;
         let size = after.size + work.abs();
         let rounding = ROUNDING * (before.total.size + size) + noise + 2.0 * (noise * size).sqrt();

@@ -8,6 +8,10 @@
 
 use std::ops::Range;
 
+use super::layout::{
+    Column, ColumnEnds, FarIndices, GatherColumn, Line, LinkPlace, NearIndices, Neighbours, OWN, OwnRun, Parameters,
+    RunColumn, SpringMaterial,
+};
 use super::strays::Strays;
 use crate::base::{Result, memory};
 use crate::codec::saved;
@@ -21,154 +25,6 @@ const WINDOW: usize = 1 << 16;
 /// How many links of a node are looked for at a time.
 const AT_ONCE: usize = 16;
 
-/// Of a column whose springs bring their own parameters.
-const OWN: u16 = u16::MAX;
-
-/// Parameters that many springs of a body share.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Material {
-    /// N/m
-    pub stiffness: f32,
-    /// m
-    pub rest_length: f32,
-    /// N s/m
-    pub damping: f32,
-}
-
-saved!(Material {
-    stiffness,
-    rest_length,
-    damping
-});
-
-impl Material {
-    /// Half the force with which a spring would be pressed to length 0, N.
-    #[inline(always)]
-    pub fn half_tension(&self) -> f32 {
-        0.5 * self.stiffness * self.rest_length
-    }
-}
-
-/// Sixteen numbers in a cache line of their own.
-#[repr(C, align(64))]
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Line(pub [f32; LANES]);
-
-saved!(Line { 0 });
-
-impl Line {
-    pub const ZERO: Self = Self([0.0; LANES]);
-}
-
-/// What the springs of a column are like.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Parameters {
-    /// All like this entry of the body's table.
-    Shared(u16),
-    /// Each its own; 0 in lanes without a link.
-    Own {
-        stiffnesses: Line,
-        rest_lengths: Line,
-        dampings: Line,
-    },
-}
-
-/// Where the other ends of a column's links are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Neighbours {
-    /// As far from each node as this.
-    Run(i32),
-    /// These; any node in lanes without a link.
-    Gather([u32; LANES]),
-}
-
-/// A column to be put in.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Column {
-    pub neighbours: Neighbours,
-    /// Bit i: whether the node in lane i has a link here.
-    pub lanes: u16,
-    pub parameters: Parameters,
-}
-
-/// A column of neighbours that lie side by side, of springs that share their parameters.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
-    pub offset: i32,
-    pub lanes: u16,
-    /// Its place in the table of materials: what follows is a copy from there.
-    pub material: u16,
-    pub stiffness: f32,
-    pub half_tension: f32,
-}
-
-saved!(Run {
-    offset,
-    lanes,
-    material,
-    stiffness,
-    half_tension
-});
-
-/// A column of neighbours that lie side by side, of springs that bring their own parameters.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OwnRun {
-    pub offset: i32,
-    pub lanes: u16,
-}
-
-saved!(OwnRun { offset, lanes });
-
-/// What there is to know of a gather beside its neighbours.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Gather {
-    pub lanes: u16,
-    /// Its place in the table of materials; [`OWN`].
-    material: u16,
-}
-
-saved!(Gather { lanes, material });
-
-impl Gather {
-    /// Its place in the table of materials, where its springs share their parameters.
-    #[inline(always)]
-    pub fn material(self) -> Option<usize> {
-        (self.material != OWN).then_some(usize::from(self.material))
-    }
-}
-
-/// Where the columns of sixteen nodes end in each list.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Ends {
-    pub runs: u32,
-    pub own_runs: u32,
-    pub near: u32,
-    pub far: u32,
-    pub own: u32,
-}
-
-saved!(Ends {
-    runs,
-    own_runs,
-    near,
-    far,
-    own
-});
-
-/// Small indices of a column.
-#[repr(C, align(32))]
-#[derive(Clone, Copy, Debug)]
-pub(super) struct NearIndices(pub [u16; LANES]);
-
-saved!(NearIndices { 0 });
-
-/// Indices of a column.
-#[repr(C, align(64))]
-#[derive(Clone, Copy, Debug)]
-pub(super) struct FarIndices(pub [u32; LANES]);
-
-saved!(FarIndices { 0 });
-
 /// The links of the nodes of one tile.
 #[derive(Debug)]
 pub(crate) struct Columns {
@@ -181,12 +37,12 @@ pub(crate) struct Columns {
     pub(super) reads: Range<isize>,
     /// What small indices count from.
     pub(super) window: usize,
-    pub(super) blocks: Vec<Ends>,
-    pub(super) runs: Vec<Run>,
+    pub(super) blocks: Vec<ColumnEnds>,
+    pub(super) runs: Vec<RunColumn>,
     pub(super) own_runs: Vec<OwnRun>,
-    pub(super) near: Vec<Gather>,
+    pub(super) near: Vec<GatherColumn>,
     pub(super) near_indices: Vec<NearIndices>,
-    pub(super) far: Vec<Gather>,
+    pub(super) far: Vec<GatherColumn>,
     pub(super) far_indices: Vec<FarIndices>,
     /// The parameters of columns that bring their own, in the order of the blocks, and in a block runs first, then near and
     /// far gathers.
@@ -200,35 +56,10 @@ pub(crate) struct Columns {
     pub(super) strays: Strays,
 }
 
-saved!(Columns {
-    first,
-    count,
-    node_count,
-    reads,
-    window,
-    blocks,
-    runs,
-    own_runs,
-    near,
-    near_indices,
-    far,
-    far_indices,
-    own_rest_lengths,
-    own_stiffnesses,
-    own_stiffness,
-    own_dampings,
-    damped,
-    strays
-});
-
-/// A link's place.
-#[derive(Clone, Copy)]
-enum LinkPlace {
-    Run(usize),
-    OwnRun(usize),
-    Near(usize),
-    Far(usize),
-}
+saved! { Columns {
+    first, count, node_count, reads, window, blocks, runs, own_runs, near, near_indices, far, far_indices,
+    own_rest_lengths, own_stiffnesses, own_stiffness, own_dampings, damped, strays,
+} }
 
 impl Columns {
     /// No links yet of `nodes`, of a body of `node_count`. Springs that bring their own parameters have this stiffness;
@@ -261,7 +92,7 @@ impl Columns {
     }
 
     /// The columns of the next sixteen nodes; those that are shared are of `materials`.
-    pub fn push_block(&mut self, columns: &[Column], materials: &[Material]) -> Result<()> {
+    pub fn push_block(&mut self, columns: &[Column], materials: &[SpringMaterial]) -> Result<()> {
         let first = self.first + self.blocks.len() * LANES;
         let nodes = (self.first + self.count).saturating_sub(first).min(LANES);
         assert!(nodes > 0, "a block beyond the tile's last node");
@@ -280,7 +111,7 @@ impl Columns {
         }
         memory::push(
             &mut self.blocks,
-            Ends {
+            ColumnEnds {
                 runs: self.runs.len() as u32,
                 own_runs: self.own_runs.len() as u32,
                 near: self.near.len() as u32,
@@ -359,7 +190,7 @@ impl Columns {
     }
 
     /// A column of the sixteen nodes from `first` on.
-    fn push_column(&mut self, first: usize, column: &Column, materials: &[Material]) -> Result<()> {
+    fn push_column(&mut self, first: usize, column: &Column, materials: &[SpringMaterial]) -> Result<()> {
         let Column { lanes, .. } = *column;
         let material = self.push_parameters(&column.parameters)?;
         match column.neighbours {
@@ -376,7 +207,7 @@ impl Columns {
                     return memory::push(&mut self.own_runs, OwnRun { offset, lanes });
                 }
                 let shared = &materials[usize::from(material)];
-                let run = Run {
+                let run = RunColumn {
                     offset,
                     lanes,
                     material,
@@ -394,7 +225,7 @@ impl Columns {
                 for node in neighbours {
                     self.reads_also(node as isize..node as isize + 1);
                 }
-                let gather = Gather { lanes, material };
+                let gather = GatherColumn { lanes, material };
                 if self.is_near(&column.neighbours) {
                     let indices = neighbours.map(|neighbour| (neighbour as usize - self.window) as u16);
                     memory::push(&mut self.near, gather)?;
@@ -511,13 +342,13 @@ impl Columns {
     }
 
     /// Shows the links of `node`.
-    pub fn visit(&self, node: usize, materials: &[Material], see: &mut dyn FnMut(Link)) {
+    pub fn visit(&self, node: usize, materials: &[SpringMaterial], see: &mut dyn FnMut(Link)) {
         self.visit_columns(node, materials, see);
         self.strays.visit(node, see);
     }
 
     /// Shows the links of `node` that are in columns.
-    pub(super) fn visit_columns(&self, node: usize, materials: &[Material], see: &mut dyn FnMut(Link)) {
+    pub(super) fn visit_columns(&self, node: usize, materials: &[SpringMaterial], see: &mut dyn FnMut(Link)) {
         let lane = (node - self.first) % LANES;
         self.columns_of(node, &mut |_, material, own, neighbour| {
             let material = match material {
@@ -662,8 +493,8 @@ impl Columns {
         }
     }
 
-    fn own_parameters(&self, own: usize, lane: usize) -> Material {
-        Material {
+    fn own_parameters(&self, own: usize, lane: usize) -> SpringMaterial {
+        SpringMaterial {
             stiffness: self
                 .own_stiffnesses
                 .get(own)
@@ -675,9 +506,9 @@ impl Columns {
 
     /// Where the columns of a block start and end.
     #[inline(always)]
-    pub(super) fn ends(&self, block: usize) -> (Ends, Ends) {
+    pub(super) fn ends(&self, block: usize) -> (ColumnEnds, ColumnEnds) {
         let start = if block == 0 {
-            Ends::default()
+            ColumnEnds::default()
         } else {
             self.blocks[block - 1]
         };

@@ -8,8 +8,9 @@ use std::marker::PhantomData;
 
 use glam::Vec3;
 
-use super::columns::{Columns, Ends, Material, Run};
-use super::quantities::{Change, Force, HalfEnergy, Quantity, Spring, Ways, difference};
+use super::columns::Columns;
+use super::layout::{ColumnEnds, RunColumn, SpringMaterial};
+use super::quantities::{Change, Force, HalfEnergy, Quantity, SpringLanes, Ways, difference};
 use crate::order::LANES;
 use crate::simd::{ChosenKernel, Lanes, WithLanes, prefetch};
 use crate::soa::{Places, TileForces, Vectors, View};
@@ -17,7 +18,7 @@ use crate::springs::{Course, Link, Motion, Tangent};
 
 impl Columns {
     /// Writes the forces on the nodes of the tile, N.
-    pub fn forces(&self, kernel: ChosenKernel, materials: &[Material], motion: &Motion, forces: &mut TileForces) {
+    pub fn forces(&self, kernel: ChosenKernel, materials: &[SpringMaterial], motion: &Motion, forces: &mut TileForces) {
         let &Motion {
             positions,
             velocities,
@@ -32,7 +33,13 @@ impl Columns {
     }
 
     /// Writes how the forces on the nodes of the tile change, N, in the first order.
-    pub fn changes(&self, kernel: ChosenKernel, materials: &[Material], course: &Course, changes: &mut TileForces) {
+    pub fn changes(
+        &self,
+        kernel: ChosenKernel,
+        materials: &[SpringMaterial],
+        course: &Course,
+        changes: &mut TileForces,
+    ) {
         let tangent = course.tangent;
         let tile = self.tile(materials, course.positions, Some(course.ways), [&[]; 6], tangent);
         if self.damped && tangent.rate > 0.0 {
@@ -43,7 +50,7 @@ impl Columns {
     }
 
     /// Half the energy of all links of the tile, J.
-    pub fn half_energy(&self, kernel: ChosenKernel, materials: &[Material], positions: View) -> f64 {
+    pub fn half_energy(&self, kernel: ChosenKernel, materials: &[SpringMaterial], positions: View) -> f64 {
         let mut energies = TileForces::ZERO;
         let tile = self.tile(materials, positions, None, [&[]; 6], Tangent::NONE);
         tile.add_up::<HalfEnergy>(kernel, &mut energies);
@@ -53,16 +60,16 @@ impl Columns {
 
     fn tile<'a>(
         &'a self,
-        materials: &'a [Material],
+        materials: &'a [SpringMaterial],
         positions: View<'a>,
         seconds: Option<View<'a>>,
         soon: [&'a [f32]; 6],
         tangent: Tangent,
-    ) -> Tile<'a> {
+    ) -> KernelTile<'a> {
         // What the kernel reads without a check was checked against this.
         assert!(positions.covers(&self.reads, self.node_count));
         assert!(seconds.is_none_or(|seconds| seconds.covers(&self.reads, self.node_count)));
-        Tile {
+        KernelTile {
             columns: self,
             materials,
             positions: positions.places(),
@@ -86,15 +93,15 @@ const GROUP: usize = 4;
 
 /// The sums of a tile's nodes, for a kernel to add up.
 struct TileLinks<'a, Q> {
-    tile: Tile<'a>,
+    tile: KernelTile<'a>,
     sums: &'a mut TileForces,
     quantity: PhantomData<Q>,
 }
 
 /// What the kernel reads.
-struct Tile<'a> {
+struct KernelTile<'a> {
     columns: &'a Columns,
-    materials: &'a [Material],
+    materials: &'a [SpringMaterial],
     /// What the columns read is there.
     positions: Places,
     seconds: Option<Places>,
@@ -104,7 +111,7 @@ struct Tile<'a> {
     careful: Careful<'a>,
 }
 
-impl Tile<'_> {
+impl KernelTile<'_> {
     fn add_up<Q: Quantity>(self, kernel: ChosenKernel, sums: &mut TileForces) {
         kernel.run_with_lanes(TileLinks::<Q> {
             tile: self,
@@ -128,7 +135,7 @@ impl<Q: Quantity> WithLanes for TileLinks<'_, Q> {
         let mut axes = forces.axes_mut().map(|axis| axis.as_mut_ptr());
         // SAFETY: the same contract; a tile has no more blocks than forces have room for.
         unsafe {
-            let mut start = Ends::default();
+            let mut start = ColumnEnds::default();
             for (block, &end) in columns.blocks.iter().enumerate() {
                 for wanted in tile.soon {
                     prefetch(wanted.wrapping_add(block * LANES));
@@ -144,11 +151,11 @@ impl<Q: Quantity> WithLanes for TileLinks<'_, Q> {
                 start = end;
             }
             if !runs_alone {
-                start = Ends::default();
+                start = ColumnEnds::default();
                 for (block, &end) in columns.blocks.iter().enumerate() {
                     for part in 0..parts {
                         let place = block * LANES + part * L::COUNT;
-                        let sums = tile.others::<L, Q>(start, end, place, Sums::load(axes, place));
+                        let sums = tile.others::<L, Q>(start, end, place, ForceLanes::load(axes, place));
                         sums.store(axes, place);
                         if sums.any_nan() {
                             axes = careful.nodes::<Q>(place, L::COUNT, forces);
@@ -166,16 +173,16 @@ impl<Q: Quantity> WithLanes for TileLinks<'_, Q> {
 
 /// The forces on some nodes side by side; NaN where a spring's ends coincide.
 #[derive(Clone, Copy)]
-struct Sums<L>([L; 3]);
+struct ForceLanes<L>([L; 3]);
 
 /// Where some nodes are, and their second vectors, side by side.
 #[derive(Clone, Copy)]
-struct Place<L> {
+struct NodePlaces<L> {
     position: [L; 3],
     second: [L; 3],
 }
 
-impl<L: Copy> Place<L> {
+impl<L: Copy> NodePlaces<L> {
     /// Second vectors are not asked for.
     #[inline(always)]
     fn still(position: [L; 3]) -> Self {
@@ -188,23 +195,23 @@ impl<L: Copy> Place<L> {
 
 /// A column of springs: what they are like, where they lead, and which lanes have one.
 #[derive(Clone, Copy)]
-struct Links<L> {
-    spring: Spring<L>,
-    there: Place<L>,
+struct LinkColumn<L> {
+    spring: SpringLanes<L>,
+    there: NodePlaces<L>,
     lanes: u32,
 }
 
-impl Tile<'_> {
+impl KernelTile<'_> {
     /// The runs of the nodes of a block, or of a part of it, as wide as `L`, whose springs share their parameters.
     #[inline(always)]
-    unsafe fn runs<L: Lanes, Q: Quantity>(&self, start: Ends, end: Ends, place: usize) -> Sums<L> {
+    unsafe fn runs<L: Lanes, Q: Quantity>(&self, start: ColumnEnds, end: ColumnEnds, place: usize) -> ForceLanes<L> {
         let columns = self.columns;
         let (node, lane) = (columns.first + place, place % LANES);
         // SAFETY: blocks end within the margins; columns were checked to lead to nodes of the body where their lanes are
         // set, and within the margins elsewhere.
         unsafe {
             let here = self.at::<L, Q>(node as isize);
-            let mut sums = Sums([L::splat(0.0); 3]);
+            let mut sums = ForceLanes([L::splat(0.0); 3]);
             let runs = columns.runs.get_unchecked(start.runs as usize..end.runs as usize);
             let (groups, rest) = runs.as_chunks::<GROUP>();
             for group in groups {
@@ -224,16 +231,16 @@ impl Tile<'_> {
 
     /// A run from the nodes from `node` on.
     #[inline(always)]
-    unsafe fn run<L: Lanes, Q: Quantity>(&self, run: &Run, node: usize, lane: usize) -> Links<L> {
+    unsafe fn run<L: Lanes, Q: Quantity>(&self, run: &RunColumn, node: usize, lane: usize) -> LinkColumn<L> {
         let material = if Q::DAMPED || Q::RESTING {
             self.materials[usize::from(run.material)]
         } else {
-            Material::default()
+            SpringMaterial::default()
         };
         // SAFETY: as in `runs`.
         unsafe {
-            Links {
-                spring: Spring {
+            LinkColumn {
+                spring: SpringLanes {
                     stiffness: L::splat(run.stiffness),
                     half_tension: L::splat(run.half_tension),
                     rest_length: L::splat(material.rest_length),
@@ -247,7 +254,13 @@ impl Tile<'_> {
 
     /// All other columns of the same nodes, added to `sums`.
     #[inline(always)]
-    unsafe fn others<L: Lanes, Q: Quantity>(&self, start: Ends, end: Ends, place: usize, mut sums: Sums<L>) -> Sums<L> {
+    unsafe fn others<L: Lanes, Q: Quantity>(
+        &self,
+        start: ColumnEnds,
+        end: ColumnEnds,
+        place: usize,
+        mut sums: ForceLanes<L>,
+    ) -> ForceLanes<L> {
         let columns = self.columns;
         let (node, lane) = (columns.first + place, place % LANES);
         let mut own = start.own as usize;
@@ -258,7 +271,7 @@ impl Tile<'_> {
                 .own_runs
                 .get_unchecked(start.own_runs as usize..end.own_runs as usize)
             {
-                let links = Links {
+                let links = LinkColumn {
                     spring: self.spring::<L, Q>(None, &mut own, lane),
                     there: self.at::<L, Q>(node as isize + run.offset as isize),
                     lanes: u32::from(run.lanes) >> lane,
@@ -291,13 +304,13 @@ impl Tile<'_> {
 
     /// A gather with small indices.
     #[inline(always)]
-    unsafe fn near<L: Lanes, Q: Quantity>(&self, near: usize, own: &mut usize, lane: usize) -> Links<L> {
+    unsafe fn near<L: Lanes, Q: Quantity>(&self, near: usize, own: &mut usize, lane: usize) -> LinkColumn<L> {
         let columns = self.columns;
         // SAFETY: as in `others`.
         unsafe {
             let header = columns.near.get_unchecked(near);
             let indices = columns.near_indices.get_unchecked(near).0.as_ptr().add(lane);
-            Links {
+            LinkColumn {
                 spring: self.spring::<L, Q>(header.material(), own, lane),
                 there: self.gathered_near::<L, Q>(indices),
                 lanes: u32::from(header.lanes) >> lane,
@@ -307,13 +320,13 @@ impl Tile<'_> {
 
     /// A gather with indices of any size.
     #[inline(always)]
-    unsafe fn far<L: Lanes, Q: Quantity>(&self, far: usize, own: &mut usize, lane: usize) -> Links<L> {
+    unsafe fn far<L: Lanes, Q: Quantity>(&self, far: usize, own: &mut usize, lane: usize) -> LinkColumn<L> {
         let columns = self.columns;
         // SAFETY: as in `others`.
         unsafe {
             let header = columns.far.get_unchecked(far);
             let indices = columns.far_indices.get_unchecked(far).0.as_ptr().add(lane);
-            Links {
+            LinkColumn {
                 spring: self.spring::<L, Q>(header.material(), own, lane),
                 there: self.gathered::<L, Q>(indices),
                 lanes: u32::from(header.lanes) >> lane,
@@ -335,14 +348,14 @@ impl Tile<'_> {
                 let there = self.gathered::<L, Q>(batch.neighbours.as_ptr().add(lane));
                 let stiffness = L::load(batch.stiffnesses.0.as_ptr().add(lane));
                 let rest_length = L::load(batch.rest_lengths.0.as_ptr().add(lane));
-                let spring = Spring {
+                let spring = SpringLanes {
                     stiffness,
                     half_tension: half_tension(stiffness, rest_length),
                     rest_length,
                     damping: L::load(batch.dampings.0.as_ptr().add(lane)),
                 };
-                let mut sums = Sums([L::splat(0.0); 3]);
-                let links = Links {
+                let mut sums = ForceLanes([L::splat(0.0); 3]);
+                let links = LinkColumn {
                     spring,
                     there,
                     lanes: u32::MAX,
@@ -372,7 +385,7 @@ impl Tile<'_> {
 
     /// Sixteen nodes, or as many as `L` has lanes, from `node` on.
     #[inline(always)]
-    unsafe fn at<L: Lanes, Q: Quantity>(&self, node: isize) -> Place<L> {
+    unsafe fn at<L: Lanes, Q: Quantity>(&self, node: isize) -> NodePlaces<L> {
         // Written out here and below: a closure may be compiled on its own, without the kernel's instructions.
         // SAFETY: where a lane is set there is a node, and within the margins elsewhere.
         unsafe {
@@ -383,7 +396,7 @@ impl Tile<'_> {
                 L::load(z.wrapping_offset(node)),
             ];
             match self.seconds {
-                Some(Places { axes: [x, y, z], .. }) if Q::SECOND => Place {
+                Some(Places { axes: [x, y, z], .. }) if Q::SECOND => NodePlaces {
                     position,
                     second: [
                         L::load(x.wrapping_offset(node)),
@@ -391,52 +404,57 @@ impl Tile<'_> {
                         L::load(z.wrapping_offset(node)),
                     ],
                 },
-                _ => Place::still(position),
+                _ => NodePlaces::still(position),
             }
         }
     }
 
     /// The nodes with these numbers.
     #[inline(always)]
-    unsafe fn gathered<L: Lanes, Q: Quantity>(&self, indices: *const u32) -> Place<L> {
+    unsafe fn gathered<L: Lanes, Q: Quantity>(&self, indices: *const u32) -> NodePlaces<L> {
         // SAFETY: the numbers were checked to be those of nodes.
         unsafe {
             let position = gather(self.positions, indices);
             match self.seconds {
-                Some(seconds) if Q::SECOND => Place {
+                Some(seconds) if Q::SECOND => NodePlaces {
                     position,
                     second: gather(seconds, indices),
                 },
-                _ => Place::still(position),
+                _ => NodePlaces::still(position),
             }
         }
     }
 
     /// The nodes with these numbers, counted from the window.
     #[inline(always)]
-    unsafe fn gathered_near<L: Lanes, Q: Quantity>(&self, indices: *const u16) -> Place<L> {
+    unsafe fn gathered_near<L: Lanes, Q: Quantity>(&self, indices: *const u16) -> NodePlaces<L> {
         let window = self.columns.window;
         // SAFETY: as in `gathered`.
         unsafe {
             let position = gather_near(self.positions, window, indices);
             match self.seconds {
-                Some(seconds) if Q::SECOND => Place {
+                Some(seconds) if Q::SECOND => NodePlaces {
                     position,
                     second: gather_near(seconds, window, indices),
                 },
-                _ => Place::still(position),
+                _ => NodePlaces::still(position),
             }
         }
     }
 
     /// The parameters of a column; `own` counts those that bring their own.
     #[inline(always)]
-    unsafe fn spring<L: Lanes, Q: Quantity>(&self, material: Option<usize>, own: &mut usize, lane: usize) -> Spring<L> {
+    unsafe fn spring<L: Lanes, Q: Quantity>(
+        &self,
+        material: Option<usize>,
+        own: &mut usize,
+        lane: usize,
+    ) -> SpringLanes<L> {
         // SAFETY: every column that brings its own parameters has a place in their lists.
         unsafe {
             if let Some(material) = material {
                 let material = &self.materials[material];
-                return Spring {
+                return SpringLanes {
                     stiffness: L::splat(material.stiffness),
                     half_tension: L::splat(material.half_tension()),
                     rest_length: L::splat(material.rest_length),
@@ -450,7 +468,7 @@ impl Tile<'_> {
             } else {
                 L::load(columns.own_stiffnesses.get_unchecked(*own).0.as_ptr().add(lane))
             };
-            let spring = Spring {
+            let spring = SpringLanes {
                 stiffness,
                 half_tension: half_tension(stiffness, rest_length),
                 rest_length,
@@ -466,7 +484,7 @@ impl Tile<'_> {
     }
 }
 
-impl<L: Lanes> Sums<L> {
+impl<L: Lanes> ForceLanes<L> {
     /// From and to three lists that have these lanes.
     #[inline(always)]
     unsafe fn load(axes: [*mut f32; 3], place: usize) -> Self {
@@ -491,7 +509,12 @@ impl<L: Lanes> Sums<L> {
 
     /// Adds what `N` columns of springs add up to from `here` on.
     #[inline(always)]
-    unsafe fn add<const N: usize, Q: Quantity>(&mut self, here: Place<L>, links: [Links<L>; N], tangent: &Tangent) {
+    unsafe fn add<const N: usize, Q: Quantity>(
+        &mut self,
+        here: NodePlaces<L>,
+        links: [LinkColumn<L>; N],
+        tangent: &Tangent,
+    ) {
         // SAFETY: the same contract.
         unsafe {
             let ways = Ways {
@@ -548,7 +571,7 @@ unsafe fn half_tension<L: Lanes>(stiffness: L, rest_length: L) -> L {
 /// The same sums where nodes coincide, and a spring between them has no direction of its own.
 struct Careful<'a> {
     columns: &'a Columns,
-    materials: &'a [Material],
+    materials: &'a [SpringMaterial],
     positions: View<'a>,
     seconds: Option<View<'a>>,
     tangent: Tangent,

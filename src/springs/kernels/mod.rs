@@ -3,8 +3,10 @@
 
 mod columns;
 mod forces;
+mod layout;
 mod quantities;
 mod sound;
 mod strays;
 
-pub(super) use columns::{Column, Columns, Line, Material, Neighbours, Parameters};
+pub(super) use columns::Columns;
+pub(super) use layout::{Column, Line, Neighbours, Parameters, SpringMaterial};

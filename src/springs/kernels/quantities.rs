@@ -8,7 +8,7 @@ use glam::Vec3;
 
 /// Parameters of some springs side by side.
 #[derive(Clone, Copy)]
-pub(super) struct Spring<L> {
+pub(super) struct SpringLanes<L> {
     pub stiffness: L,
     /// Half the stiffness times the rest length.
     pub half_tension: L,
@@ -21,7 +21,7 @@ pub(super) struct Spring<L> {
 pub(super) struct Ways<L, const N: usize> {
     pub ways: [[L; 3]; N],
     pub differences: [[L; 3]; N],
-    pub springs: [Spring<L>; N],
+    pub springs: [SpringLanes<L>; N],
     pub lanes: [u32; N],
 }
 

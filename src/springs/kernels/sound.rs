@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::columns::{Columns, Gather};
+use super::columns::Columns;
+use super::layout::GatherColumn;
 use crate::order::LANES;
 use crate::soa::{MARGIN, TILE};
 
@@ -69,8 +70,9 @@ impl Columns {
                 && (0..LANES).all(|lane| lanes >> lane & 1 == 0 || is_node(lane))
         };
         let is_there = |node: usize| node < self.node_count && self.reads_all(node as isize..node as isize + 1);
-        let gather_is_sound =
-            |gather: &Gather| fits(gather.lanes) && gather.material().is_none_or(|material| material < material_count);
+        let gather_is_sound = |gather: &GatherColumn| {
+            fits(gather.lanes) && gather.material().is_none_or(|material| material < material_count)
+        };
         let own = own_runs.len()
             + near
                 .iter()

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::columns::Line;
+use super::layout::Line;
 use crate::base::Result;
 use crate::codec::saved;
 use crate::order::LANES;
@@ -24,16 +24,7 @@ pub(crate) struct Strays {
     dampings: Vec<f32>,
 }
 
-saved!(Strays {
-    first,
-    node_count,
-    damped,
-    places,
-    neighbours,
-    stiffnesses,
-    rest_lengths,
-    dampings
-});
+saved! { Strays { first, node_count, damped, places, neighbours, stiffnesses, rest_lengths, dampings } }
 
 /// Sixteen strays, or fewer at the end, as the kernel takes them.
 pub(super) struct Batch {

@@ -3,7 +3,7 @@
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::def::{Rounding, Spring};
-use crate::springs::kernels::Material;
+use crate::springs::kernels::SpringMaterial;
 
 /// How many springs are looked at to find the kinds.
 const SAMPLE: usize = 4096;
@@ -13,25 +13,21 @@ const SHARE: usize = 50;
 
 /// A kind, and the rest lengths that are its own.
 #[derive(Clone, Copy, Debug)]
-struct Kind {
-    material: Material,
+struct MaterialKind {
+    material: SpringMaterial,
     shortest: f32,
     longest: f32,
 }
 
-saved!(Kind {
-    material,
-    shortest,
-    longest
-});
+saved! { MaterialKind { material, shortest, longest } }
 
 /// The kinds of spring in a body.
 #[derive(Debug, Default)]
 pub(super) struct Kinds {
-    kinds: Vec<Kind>,
+    kinds: Vec<MaterialKind>,
 }
 
-saved!(Kinds { kinds });
+saved! { Kinds { kinds } }
 
 impl Kinds {
     /// The kinds that are common among `springs`.
@@ -62,8 +58,8 @@ impl Kinds {
                 let (shortest, longest) = (first.rest_length, rest[count - 1].rest_length);
                 let middle = 0.5 * (shortest + longest);
                 // The sample may have missed the shortest and the longest.
-                found.kinds.push(Kind {
-                    material: Material {
+                found.kinds.push(MaterialKind {
+                    material: SpringMaterial {
                         stiffness: first.stiffness,
                         rest_length: middle,
                         damping: first.damping,
@@ -84,7 +80,7 @@ impl Kinds {
     }
 
     /// The table that a spring's kind is a place in.
-    pub fn materials(&self) -> Result<Vec<Material>> {
+    pub fn materials(&self) -> Result<Vec<SpringMaterial>> {
         let mut materials = memory::reserved(self.kinds.len())?;
         materials.extend(self.kinds.iter().map(|kind| kind.material));
         Ok(materials)
@@ -92,12 +88,12 @@ impl Kinds {
 
     /// Bytes held from the allocator.
     pub fn bytes(&self) -> usize {
-        self.kinds.capacity() * size_of::<Kind>()
+        self.kinds.capacity() * size_of::<MaterialKind>()
     }
 
     /// The place of the kind that a spring is of by its definition; `None`: it is one of its own.
     #[inline]
-    pub fn find(&self, own: &Material) -> Option<u16> {
+    pub fn find(&self, own: &SpringMaterial) -> Option<u16> {
         self.place(|kind| {
             kind.material.stiffness == own.stiffness
                 && kind.material.damping == own.damping
@@ -107,11 +103,11 @@ impl Kinds {
 
     /// The place of the kind that has just these parameters.
     #[inline]
-    pub fn find_exactly(&self, material: &Material) -> Option<u16> {
+    pub fn find_exactly(&self, material: &SpringMaterial) -> Option<u16> {
         self.place(|kind| kind.material == *material)
     }
 
-    fn place(&self, is: impl FnMut(&Kind) -> bool) -> Option<u16> {
+    fn place(&self, is: impl FnMut(&MaterialKind) -> bool) -> Option<u16> {
         self.kinds.iter().position(is).map(|place| place as u16)
     }
 }

@@ -19,8 +19,8 @@ use materials::Kinds;
 use pack::{Loose, NO_KIND, pack};
 
 use super::ends::Ends;
-use super::kernels::{Columns, Material};
-use super::{Change, Course, Link, Motion, Rewiring, Springs, already_joined, not_joined, rewire_by};
+use super::kernels::{Columns, SpringMaterial};
+use super::{Course, Link, Motion, Rewiring, SpringChange, Springs, already_joined, not_joined, rewire_by};
 use crate::base::{Result, memory};
 use crate::codec::{Saved, Writer, saved};
 use crate::simd::ChosenKernel;
@@ -31,7 +31,7 @@ const ADDED: usize = 256;
 
 /// A tile's links, and how much they have changed since they were packed.
 #[derive(Debug)]
-struct Tile {
+struct PackedTile {
     columns: Columns,
     /// Links when it was packed.
     links: usize,
@@ -40,14 +40,9 @@ struct Tile {
     removed: usize,
 }
 
-saved!(Tile {
-    columns,
-    links,
-    strays,
-    removed
-});
+saved! { PackedTile { columns, links, strays, removed } }
 
-impl Tile {
+impl PackedTile {
     fn new(columns: Columns, links: usize) -> Self {
         Self {
             links,
@@ -63,7 +58,7 @@ impl Tile {
     }
 }
 
-impl Material {
+impl SpringMaterial {
     fn of(link: &Link) -> Self {
         Self {
             stiffness: link.stiffness,
@@ -81,19 +76,11 @@ pub(crate) struct Packed {
     spring_count: usize,
     damped: bool,
     kinds: Kinds,
-    materials: Vec<Material>,
-    tiles: Vec<Tile>,
+    materials: Vec<SpringMaterial>,
+    tiles: Vec<PackedTile>,
 }
 
-saved!(Packed {
-    kernel,
-    node_count,
-    spring_count,
-    damped,
-    kinds,
-    materials,
-    tiles
-} where Self::is_sound);
+saved! { Packed { kernel, node_count, spring_count, damped, kinds, materials, tiles } where Self::is_sound }
 
 /// What columns of these springs cost, the most of them.
 pub(crate) fn costs(springs: &[Spring], rounding: Rounding) -> Result<Costs> {
@@ -123,7 +110,7 @@ impl Packed {
                 let of_node = ends.links(node);
                 links.try_reserve(of_node.len())?;
                 links.extend(of_node.map(|link| {
-                    let kind = packed.kinds.find(&Material::of(&link));
+                    let kind = packed.kinds.find(&SpringMaterial::of(&link));
                     packed.loose(node, &link, kind)
                 }));
             }
@@ -138,22 +125,22 @@ impl Packed {
             node: node as u32,
             neighbour: link.neighbour,
             kind: kind.unwrap_or(NO_KIND),
-            own: kind.map_or(Material::of(link), |kind| self.materials[usize::from(kind)]),
+            own: kind.map_or(SpringMaterial::of(link), |kind| self.materials[usize::from(kind)]),
         }
     }
 
     /// A tile of these links, whose order is lost.
-    fn packed(&self, nodes: Range<usize>, links: &mut [Loose]) -> Result<Tile> {
+    fn packed(&self, nodes: Range<usize>, links: &mut [Loose]) -> Result<PackedTile> {
         let count = links.len();
         let columns = pack(nodes, self.node_count, self.damped, &self.materials, links)?;
-        Ok(Tile::new(columns, count))
+        Ok(PackedTile::new(columns, count))
     }
 
-    fn tile(&self, node: u32) -> &Tile {
+    fn tile(&self, node: u32) -> &PackedTile {
         &self.tiles[node as usize / TILE]
     }
 
-    fn tile_mut(&mut self, node: u32) -> &mut Tile {
+    fn tile_mut(&mut self, node: u32) -> &mut PackedTile {
         &mut self.tiles[node as usize / TILE]
     }
 
@@ -222,7 +209,7 @@ impl Packed {
     }
 
     /// A tile packed again, with these of its links changed, in the order of their nodes and neighbours.
-    fn repacked(&self, tile: usize, changed: &[(u32, Link)]) -> Result<Tile> {
+    fn repacked(&self, tile: usize, changed: &[(u32, Link)]) -> Result<PackedTile> {
         let nodes = tile_nodes(tile, self.node_count);
         let mut links = Vec::new();
         for node in nodes.clone() {
@@ -233,7 +220,7 @@ impl Packed {
                     link = changed[place].1;
                 }
                 if room.is_ok() {
-                    let kind = self.kinds.find_exactly(&Material::of(&link));
+                    let kind = self.kinds.find_exactly(&SpringMaterial::of(&link));
                     room = memory::push(&mut links, self.loose(node, &link, kind));
                 }
             });
@@ -269,7 +256,7 @@ impl Springs for Packed {
     fn bytes(&self) -> (usize, usize) {
         let tables = size_of_val(&*self.materials);
         let mut used = size_of_val(&*self.tiles) + tables;
-        let mut held = self.tiles.capacity() * size_of::<Tile>() + tables + self.kinds.bytes();
+        let mut held = self.tiles.capacity() * size_of::<PackedTile>() + tables + self.kinds.bytes();
         for tile in &self.tiles {
             let (tile_used, tile_held) = tile.columns.bytes();
             used += tile_used;
@@ -325,7 +312,7 @@ impl Springs for Packed {
             let nodes = tile_nodes(tile, node_count);
             let mut columns = Columns::new(nodes.clone(), node_count, None, self.damped);
             columns.grow(nodes.end)?;
-            more.push(Tile::new(columns, 0));
+            more.push(PackedTile::new(columns, 0));
         }
         if let Some(last) = self.tiles.last_mut() {
             last.columns.grow(tile_nodes(known - 1, node_count).end)?;
@@ -364,9 +351,9 @@ impl Springs for Packed {
         Ok(())
     }
 
-    fn set(&mut self, changes: &[Change]) -> Result<()> {
+    fn set(&mut self, changes: &[SpringChange]) -> Result<()> {
         let mut ends = memory::reserved(2 * changes.len())?;
-        ends.extend(changes.iter().flat_map(Change::ends));
+        ends.extend(changes.iter().flat_map(SpringChange::ends));
         ends.sort_unstable_by_key(|(node, link)| (*node, link.neighbour));
         let same_node = |(a, _): &(u32, Link), (b, _): &(u32, Link)| a == b;
         let same_tile = |(a, _): &(u32, Link), (b, _): &(u32, Link)| *a as usize / TILE == *b as usize / TILE;

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use crate::base::{Result, memory};
-use crate::order::{Costs, GATHER, LANES, Row, Split, cheapest};
+use crate::order::{BlockSplit, Costs, GATHER, LANES, Row, cheapest};
 use crate::springs::Link;
-use crate::springs::kernels::{Column, Columns, Line, Material, Neighbours, Parameters};
+use crate::springs::kernels::{Column, Columns, Line, Neighbours, Parameters, SpringMaterial};
 
 /// Marks a link that is of no kind in the table of materials.
 pub(super) const NO_KIND: u16 = u16::MAX;
@@ -17,7 +17,7 @@ pub(super) struct Loose {
     pub neighbour: u32,
     /// Its place in the table of materials; [`NO_KIND`].
     pub kind: u16,
-    pub own: Material,
+    pub own: SpringMaterial,
 }
 
 impl Loose {
@@ -31,7 +31,7 @@ pub(super) fn pack(
     nodes: Range<usize>,
     node_count: usize,
     damped: bool,
-    materials: &[Material],
+    materials: &[SpringMaterial],
     links: &mut [Loose],
 ) -> Result<Columns> {
     let stiffness = links.first().map_or(0.0, |link| link.own.stiffness);
@@ -83,7 +83,7 @@ impl Packer {
         self.columns.try_reserve(links.len() / GATHER + 1)?;
         links.sort_unstable_by_key(|link| (link.kind, link.offset(), link.node));
         self.see_rows(first, links)?;
-        let Split { run, mixed, .. } = cheapest(&self.rows, &mut self.levels)?;
+        let BlockSplit { run, mixed, .. } = cheapest(&self.rows, &mut self.levels)?;
         let mut left = self.take_runs(first, links, run);
         if !mixed {
             left = self.take_gathers(first, &mut links[..left])?;

@@ -8,14 +8,14 @@ use crate::def::{Rounding, Spring};
 use crate::random::Random;
 use crate::simd::Kernel;
 use crate::soa::{Records, TileForces, Vectors, WriteRecords, tile_count, tile_nodes};
-use crate::springs::{Change, Course, Link, Motion, Rewiring, Springs, Tangent};
+use crate::springs::{Course, Link, Motion, Rewiring, SpringChange, Springs, Tangent};
 
 const KERNELS: [Kernel; 4] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512, Kernel::Neon];
 
 /// Springs between nodes, by their lower and their higher node.
-type Pairs = BTreeMap<[u32; 2], Spring>;
+type TestPairs = BTreeMap<[u32; 2], Spring>;
 
-fn join(pairs: &mut Pairs, a: usize, b: usize, [stiffness, rest_length, damping]: [f32; 3]) {
+fn join(pairs: &mut TestPairs, a: usize, b: usize, [stiffness, rest_length, damping]: [f32; 3]) {
     if a != b {
         let nodes = [a.min(b) as u32, a.max(b) as u32];
         let spring = Spring {
@@ -29,8 +29,8 @@ fn join(pairs: &mut Pairs, a: usize, b: usize, [stiffness, rest_length, damping]
 }
 
 /// A band of neighbours at even distances, each spring as `of` says.
-fn band(count: usize, offsets: &[usize], mut of: impl FnMut(usize) -> [f32; 3]) -> Pairs {
-    let mut pairs = Pairs::new();
+fn band(count: usize, offsets: &[usize], mut of: impl FnMut(usize) -> [f32; 3]) -> TestPairs {
+    let mut pairs = TestPairs::new();
     for (kind, &offset) in offsets.iter().enumerate() {
         for node in 0..count.saturating_sub(offset) {
             join(&mut pairs, node, node + offset, of(kind));
@@ -40,7 +40,7 @@ fn band(count: usize, offsets: &[usize], mut of: impl FnMut(usize) -> [f32; 3]) 
 }
 
 /// All the ways in which springs lie: how many nodes, and what joins them.
-fn bodies(damped: bool) -> Vec<(&'static str, usize, Pairs)> {
+fn bodies(damped: bool) -> Vec<(&'static str, usize, TestPairs)> {
     let mut random = Random(7);
     let damping = if damped { 0.5 } else { 0.0 };
     let shared = |kind: usize| [10.0 + kind as f32, 0.1 * (1 + kind) as f32, damping];
@@ -52,7 +52,7 @@ fn bodies(damped: bool) -> Vec<(&'static str, usize, Pairs)> {
             77,
             band(77, &[1, 40, 76], shared),
         ),
-        ("no springs", 20, Pairs::new()),
+        ("no springs", 20, TestPairs::new()),
     ];
     let mut own = Random(8);
     let each = |_| [own.unit(), own.unit(), damping * own.unit()];
@@ -61,7 +61,7 @@ fn bodies(damped: bool) -> Vec<(&'static str, usize, Pairs)> {
     let uniform = |_| [25.0, lengths.unit(), damping];
     bodies.push(("runs of one stiffness", 700, band(700, &[1, 2, 50], uniform)));
     for (name, count, links) in [("gathers", 3000, 12_000), ("far gathers", 150_000, 400_000)] {
-        let mut pairs = Pairs::new();
+        let mut pairs = TestPairs::new();
         for _ in 0..links {
             let (a, b) = (random.below(count), random.below(count));
             join(
@@ -89,7 +89,7 @@ fn vectors(count: usize, random: &mut Random) -> Vectors {
     vectors
 }
 
-fn packed(kernel: Kernel, count: usize, pairs: &Pairs) -> Option<Packed> {
+fn packed(kernel: Kernel, count: usize, pairs: &TestPairs) -> Option<Packed> {
     let springs: Vec<Spring> = pairs.values().copied().collect();
     let packed = Packed::new(kernel.choose().ok()?, count, &springs, Rounding { reach: 0.0 });
     Some(packed.expect("memory"))
@@ -125,7 +125,7 @@ fn forces(packed: &dyn Springs, positions: &Vectors, velocities: Option<&Vectors
 }
 
 /// The same in `f64`, and how large the terms of each sum are.
-fn reference(pairs: &Pairs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<(DVec3, f64)> {
+fn reference(pairs: &TestPairs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<(DVec3, f64)> {
     let mut forces = vec![(DVec3::ZERO, 0.0); positions.len()];
     for spring in pairs.values() {
         let [a, b] = spring.nodes.map(|node| node as usize);
@@ -185,7 +185,12 @@ fn every_kernel_computes_the_forces() {
 }
 
 /// How the forces change in `f64`, with how large the terms are, and the energy.
-fn reference_change(pairs: &Pairs, positions: &Vectors, ways: &Vectors, tangent: Tangent) -> (Vec<(DVec3, f64)>, f64) {
+fn reference_change(
+    pairs: &TestPairs,
+    positions: &Vectors,
+    ways: &Vectors,
+    tangent: Tangent,
+) -> (Vec<(DVec3, f64)>, f64) {
     let mut changes = vec![(DVec3::ZERO, 0.0); positions.len()];
     let mut energy = 0.0;
     for spring in pairs.values() {
@@ -284,7 +289,7 @@ fn springs_come_back_as_they_were_given() {
 }
 
 /// The springs, as both of their nodes see them.
-fn links(packed: &dyn Springs, count: usize) -> Pairs {
+fn links(packed: &dyn Springs, count: usize) -> TestPairs {
     let mut ends: BTreeMap<[u32; 2], Vec<Link>> = BTreeMap::new();
     for node in 0..count as u32 {
         packed.visit(node as usize, &mut |link| {
@@ -421,7 +426,7 @@ fn springs_that_are_changed_have_what_they_were_given_at_both_ends() {
                     spring.damping *= 0.25;
                     let after = Link::ends(spring)[0];
                     assert_eq!([a, b], spring.nodes);
-                    changes.push(Change { node: a, before, after });
+                    changes.push(SpringChange { node: a, before, after });
                 }
                 packed.set(&changes).expect("memory");
                 assert_eq!(links(&packed, count), pairs, "{name}");

@@ -11,6 +11,7 @@
 //!
 //! Where there is a thread between the points the impulse is its own (`thread.rs`): one number along a line, never a push.
 
+mod bond;
 mod substep;
 mod thread;
 
@@ -18,154 +19,15 @@ use glam::{DVec3, Vec3};
 
 use crate::base::{Result, SlotId, StateHasher, memory};
 use crate::codec::saved;
-use crate::def::Anchor;
 use crate::geometry::Bounds;
 use crate::solver::{Outcome, System, Systems};
 
+use self::bond::{Bond, BondCorner, BondEnd, CORNERS, OF_POINT, corners_of, place, place_of};
+pub(crate) use self::bond::{BondPoint, distance};
 pub(crate) use self::thread::{Lead, Thread};
-
-/// Nodes of a point: corners of a triangle, or of a tetrahedron.
-const OF_POINT: usize = 4;
-
-/// Corners of both points of a bond.
-const CORNERS: usize = 2 * OF_POINT;
 
 /// What is apart comes together no faster than this, m/s, so that bodies that are far apart follow their points.
 const CLOSING_SPEED: f64 = 0.25;
-
-/// One of the points of a bond, as the caller knows it and as the solvers do.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Bound {
-    /// By the body's place in the world.
-    pub body: usize,
-    /// In the caller's numbers; `None`: what a blade stands in inside of a solid.
-    pub anchor: Option<Anchor>,
-    /// Nodes in the body's own numbers, with their parts in the point, 1 in sum; 0 where there is none.
-    pub nodes: [(u32, f32); OF_POINT],
-}
-
-saved!(Bound { body, anchor, nodes });
-
-impl Bound {
-    /// The sum of the parts of its nodes: 1, but for rounding; 0 of what is no point of tissue.
-    fn weight(&self) -> f64 {
-        self.nodes.iter().map(|&(_, weight)| f64::from(weight)).sum()
-    }
-}
-
-/// A corner of one of the points of a bond.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Corner {
-    /// By its place in the world.
-    pub body: usize,
-    pub node: u32,
-    /// Its part of the point; below 0 where it is one of the second point's, 0 where there is none.
-    pub weight: f32,
-    /// Which of the ends it is; the bonds see to that.
-    pub end: usize,
-}
-
-saved!(Corner {
-    body,
-    node,
-    weight,
-    end
-});
-
-/// Two points that are kept together.
-#[derive(Clone, Copy, Debug)]
-struct Bond {
-    /// Its name among the world's attachments.
-    id: SlotId,
-    /// The first point and the second.
-    points: [Bound; 2],
-    corners: [Corner; CORNERS],
-    /// What is between them; else they are one.
-    thread: Option<Thread>,
-    /// The mean force over a step with which it just holds, N.
-    limit: f32,
-    /// The force on the first point that the next step foresees, N.
-    foreseen: Vec3,
-    /// The mean force on it over the last step, N.
-    mean: Vec3,
-    // The step in progress.
-    /// Whether it is the turn of the group of its bodies.
-    is_in_turn: bool,
-    /// The force that this substep foresees, N; none where a body is not moved by VERLET.
-    load: Vec3,
-    /// What was given beside that in this substep, N s, and all in the step.
-    impulse: Vec3,
-    sum: DVec3,
-    /// What closing the gap has put in, J.
-    work: f64,
-    /// How much impulse makes the points faster against each other, along each axis, kg; 0 where neither moves.
-    masses: Vec3,
-    /// How far the points are to be apart at the end of the substep, and how far they may miss that, m.
-    gap: DVec3,
-    miss: f64,
-    /// Whether it acts in this moment.
-    acts: bool,
-    /// Whether a body at it is not moved by VERLET.
-    has_equation: bool,
-}
-
-saved!(Bond {
-    id,
-    points,
-    corners,
-    thread,
-    limit,
-    foreseen,
-    mean,
-    is_in_turn,
-    load,
-    impulse,
-    sum,
-    work,
-    masses,
-    gap,
-    miss,
-    acts,
-    has_equation
-});
-
-/// A node at which bonds are.
-#[derive(Clone, Copy, Debug)]
-struct End {
-    body: usize,
-    node: u32,
-    /// Whether a bond is there still.
-    is_used: bool,
-    /// Whether its velocity is that of a skin.
-    is_on_skin: bool,
-    /// Whether it is the turn of the group of its body.
-    is_in_turn: bool,
-    velocity: Vec3,
-    /// 1/kg; 0 along axes along which it is held.
-    answer: Vec3,
-    /// What was given to it in this substep, N s, or what is foreseen, N.
-    given: Vec3,
-    place: DVec3,
-    shift: DVec3,
-    /// What acts on it from outside in this step, N, and whether anything does on its body.
-    pending: Vec3,
-    is_pending: bool,
-}
-
-saved!(End {
-    body,
-    node,
-    is_used,
-    is_on_skin,
-    is_in_turn,
-    velocity,
-    answer,
-    given,
-    place,
-    shift,
-    pending,
-    is_pending
-});
 
 /// All bonds of a world.
 #[derive(Debug, Default)]
@@ -173,61 +35,15 @@ pub(crate) struct Bonds {
     /// In the order in which they came.
     bonds: Vec<Bond>,
     /// In the order of their bodies and nodes.
-    ends: Vec<End>,
+    ends: Vec<BondEnd>,
     /// Whether the first substep is to come, which VERLET begins with half a kick.
     is_opening: bool,
 }
 
-saved!(Bonds {
-    bonds,
-    ends,
-    is_opening
-});
-
-impl Bond {
-    fn used(&self) -> impl Iterator<Item = Corner> + use<> {
-        self.corners.into_iter().filter(|corner| corner.weight != 0.0)
-    }
-
-    fn concerns(&self, body: usize) -> bool {
-        self.points.iter().any(|point| point.body == body)
-    }
-}
-
-/// Where a point that is bound is now, m.
-fn place(point: &Bound, bodies: &impl Systems) -> Option<DVec3> {
-    let body = bodies.at(point.body)?;
-    let positions = body.state.positions();
-    let place = |(node, weight): (u32, f32)| positions.get(node as usize).as_dvec3() * f64::from(weight);
-    Some(point.nodes.into_iter().map(place).sum::<DVec3>() / point.weight() + body.origin)
-}
-
-/// The corners of two points: a node that has a part in both has the difference.
-fn corners_of(points: &[Bound; 2]) -> [Corner; CORNERS] {
-    let mut corners = [Corner::default(); CORNERS];
-    let mut count = 0;
-    for (point, sign) in points.iter().zip([1.0, -1.0]) {
-        for &(node, weight) in point.nodes.iter().filter(|(_, weight)| *weight != 0.0) {
-            let is_known = |corner: &&mut Corner| (corner.body, corner.node) == (point.body, node);
-            match corners[..count].iter_mut().find(is_known) {
-                Some(corner) => corner.weight += sign * weight,
-                None => {
-                    corners[count] = Corner {
-                        body: point.body,
-                        node,
-                        weight: sign * weight,
-                        end: 0,
-                    };
-                    count += 1;
-                }
-            }
-        }
-    }
-    corners
-}
+saved! { Bonds { bonds, ends, is_opening } }
 
 /// Whether two points are one, of one body.
-pub(crate) fn are_one(points: &[Bound; 2]) -> bool {
+pub(crate) fn are_one(points: &[BondPoint; 2]) -> bool {
     corners_of(points).iter().all(|corner| corner.weight == 0.0)
 }
 
@@ -258,7 +74,7 @@ impl Bonds {
     }
 
     /// Keeps two points together, for which there is room, or a thread between them, once [`Self::settle`] has seen to all that were added.
-    pub fn add(&mut self, id: SlotId, points: [Bound; 2], limit: f32, thread: Option<Thread>) -> Result<()> {
+    pub fn add(&mut self, id: SlotId, points: [BondPoint; 2], limit: f32, thread: Option<Thread>) -> Result<()> {
         let bond = Bond {
             id,
             points,
@@ -283,8 +99,8 @@ impl Bonds {
 
     /// Has a thread to a blade begin at a point from now on, for which there is room: that of this name, which goes on with what it did, or a new
     /// one. To be followed by [`Self::pull`] and [`Self::settle`].
-    pub fn hold(&mut self, id: SlotId, point: Bound) -> Result<()> {
-        let nowhere = Bound {
+    pub fn hold(&mut self, id: SlotId, point: BondPoint) -> Result<()> {
+        let nowhere = BondPoint {
             nodes: [(0, 0.0); OF_POINT],
             ..point
         };
@@ -344,16 +160,16 @@ impl Bonds {
     }
 
     /// The points of a body.
-    pub fn points_of(&self, body: usize) -> impl Iterator<Item = &Bound> {
+    pub fn points_of(&self, body: usize) -> impl Iterator<Item = &BondPoint> {
         let points = self.bonds.iter().flat_map(|bond| &bond.points);
         points.filter(move |point| point.body == body && point.weight() > 0.0)
     }
 
     /// Has points of a body that `carried` knows be bound to what it says from now on: their triangles were cut, or copied. No point
     /// moves with that, as far as the new nodes are where they should be. There is room for it.
-    pub fn rebind(&mut self, body: usize, mut carried: impl FnMut(&Bound) -> Option<Bound>) {
+    pub fn rebind(&mut self, body: usize, mut carried: impl FnMut(&BondPoint) -> Option<BondPoint>) {
         for bond in &mut self.bonds {
-            let is_its = |point: &&mut Bound| point.body == body && point.weight() > 0.0;
+            let is_its = |point: &&mut BondPoint| point.body == body && point.weight() > 0.0;
             for point in bond.points.iter_mut().filter(is_its) {
                 *point = carried(point).unwrap_or(*point);
             }
@@ -386,7 +202,7 @@ impl Bonds {
         for corner in bonds.iter().flat_map(Bond::used) {
             match place_of(ends, corner.body, corner.node) {
                 Ok(place) => ends[place].is_used = true,
-                Err(place) => ends.insert(place, End::new(&corner)),
+                Err(place) => ends.insert(place, BondEnd::new(&corner)),
             }
         }
         ends.retain(|end| end.is_used);
@@ -504,58 +320,21 @@ impl Bonds {
     }
 }
 
-/// How far two points are apart now, m.
-pub(crate) fn distance(bodies: &impl Systems, points: &[Bound; 2]) -> f64 {
-    let apart: DVec3 = corners_of(points)
-        .iter()
-        .filter(|corner| corner.weight != 0.0)
-        .filter_map(|corner| {
-            let body = bodies.at(corner.body)?;
-            let place = body.state.positions().get(corner.node as usize).as_dvec3() + body.origin;
-            Some(place * f64::from(corner.weight))
-        })
-        .sum();
-    apart.length()
-}
-
-/// Where a node is among ends, or would be.
-fn place_of(ends: &[End], body: usize, node: u32) -> std::result::Result<usize, usize> {
-    ends.binary_search_by_key(&(body, node), |end| (end.body, end.node))
-}
-
-impl End {
-    fn new(corner: &Corner) -> Self {
-        Self {
-            body: corner.body,
-            node: corner.node,
-            is_used: true,
-            is_on_skin: false,
-            is_in_turn: false,
-            velocity: Vec3::ZERO,
-            answer: Vec3::ZERO,
-            given: Vec3::ZERO,
-            place: DVec3::ZERO,
-            shift: DVec3::ZERO,
-            pending: Vec3::ZERO,
-            is_pending: false,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::def::Anchor;
     use crate::def::SurfacePoint;
     use crate::slots::Slots;
 
-    fn bound(body: usize, triangle: u32, nodes: &[(u32, f32)]) -> Bound {
+    fn bound(body: usize, triangle: u32, nodes: &[(u32, f32)]) -> BondPoint {
         let mut all = [(0, 0.0); OF_POINT];
         all[..nodes.len()].copy_from_slice(nodes);
         let anchor = Some(Anchor::Point(SurfacePoint {
             triangle,
             weights: [0.5, 0.25, 0.25],
         }));
-        Bound {
+        BondPoint {
             body,
             anchor,
             nodes: all,
@@ -599,7 +378,7 @@ mod tests {
         assert_eq!(corners(&bonds, 1), [(2, 10, 0.5), (2, 11, -0.25), (2, 13, -0.25)]);
         // The cell of triangle 4 is a copy now, of which a triangle has another number; the point lies in a tetrahedron.
         let cut = bound(2, 40, &[(30, 0.5), (11, 0.25), (31, 0.125), (1, 0.125)]);
-        let is_cut = |point: &Bound| matches!(point.anchor, Some(Anchor::Point(SurfacePoint { triangle: 4, .. })));
+        let is_cut = |point: &BondPoint| matches!(point.anchor, Some(Anchor::Point(SurfacePoint { triangle: 4, .. })));
         bonds.reserve_rebinding(2).expect("memory");
         bonds.rebind(5, |point| is_cut(point).then_some(cut));
         assert_eq!(

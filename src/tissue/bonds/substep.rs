@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::super::link::Link;
 use super::super::skin::Skin;
-use super::{Bond, Bonds, CLOSING_SPEED, Corner, End};
+use super::{Bond, BondCorner, BondEnd, Bonds, CLOSING_SPEED};
 use crate::solver::{Span, Systems};
 
 /// What is apart comes together within so many seconds, but for an e-th; at most by `LARGEST_PART` in a substep.
@@ -42,7 +42,7 @@ impl Bonds {
             }
         }
         for bond in &mut self.bonds {
-            let has_equation = |corner: Corner| bodies.at(corner.body).is_some_and(|body| !body.is_explicit());
+            let has_equation = |corner: BondCorner| bodies.at(corner.body).is_some_and(|body| !body.is_explicit());
             bond.has_equation = bond.used().any(has_equation);
             bond.is_in_turn = bond.used().all(|corner| is_of_group(corner.body));
         }
@@ -279,8 +279,8 @@ impl Bonds {
 
 impl Bond {
     /// How far its points are apart as ends are placed, m.
-    fn apart(&self, ends: &[End]) -> DVec3 {
-        let place = |end: &End| end.place + end.shift;
+    fn apart(&self, ends: &[BondEnd]) -> DVec3 {
+        let place = |end: &BondEnd| end.place + end.shift;
         let parts = self
             .used()
             .map(|corner| place(&ends[corner.end]) * f64::from(corner.weight));
@@ -288,7 +288,7 @@ impl Bond {
     }
 
     /// The velocity of its first point against the second, and the largest that a corner adds to it along each axis, m/s.
-    fn velocity(&self, ends: &[End], skins: &[Option<Skin>]) -> [Vec3; 2] {
+    fn velocity(&self, ends: &[BondEnd], skins: &[Option<Skin>]) -> [Vec3; 2] {
         let (mut velocity, mut size) = (Vec3::ZERO, Vec3::ZERO);
         for corner in self.used() {
             let part = ends[corner.end].velocity(skins) * corner.weight;
@@ -309,7 +309,7 @@ impl Bond {
     }
 }
 
-impl End {
+impl BondEnd {
     fn velocity(&self, skins: &[Option<Skin>]) -> Vec3 {
         match skins.get(self.body) {
             Some(Some(skin)) if self.is_on_skin => skin.velocities.get(self.node as usize),

@@ -56,26 +56,10 @@ pub(crate) struct Thread {
     gave: f64,
 }
 
-saved!(Thread {
-    length,
-    target,
-    compliance,
-    most,
-    lead,
-    pace,
-    current,
-    reach,
-    gentle,
-    led,
-    speed,
-    apart,
-    line,
-    drift,
-    duration,
-    give,
-    answer,
-    gave
-});
+saved! { Thread {
+    length, target, compliance, most, lead, pace, current, reach, gentle, led, speed, apart, line, drift, duration,
+    give, answer, gave,
+} }
 
 /// A place that goes straight and evenly from one to another over the next step, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,7 +68,7 @@ pub(crate) struct Lead {
     pub to: DVec3,
 }
 
-saved!(Lead { from, to });
+saved! { Lead { from, to } }
 
 impl Lead {
     /// The same way beside it.

@@ -44,14 +44,14 @@ struct Beginning {
 }
 
 /// The file, as far as it was read.
-struct Frames {
+struct FrameReader {
     file: BufReader<File>,
     name: String,
     /// Bytes that are left.
     left: u64,
 }
 
-impl Frames {
+impl FrameReader {
     fn open(path: &Path) -> Result<Self> {
         let name = path.display().to_string();
         let failed = |error| Error::Io(format!("{name}: {error}"));
@@ -148,7 +148,7 @@ impl World {
     /// [`Error::Io`]: the file cannot be read. [`Error::InvalidArgument`]: it is no recording or damaged, or there are too many threads.
     /// [`Error::Unsupported`]: it is of another version of the library, or this processor does not offer its kernel. [`Error::OutOfMemory`].
     pub fn replay(path: &Path, thread_count: u32) -> Result<ReplayReport> {
-        let mut frames = Frames::open(path)?;
+        let mut frames = FrameReader::open(path)?;
         let mut report = ReplayReport::default();
         let mut world: Option<World> = None;
         let mut before = Vec::new();

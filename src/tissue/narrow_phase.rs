@@ -1,0 +1,242 @@
+//! Finds the contacts of bodies that take a substep together.
+
+use super::Tissue;
+use super::bonds::Bonds;
+use super::entangled::Entangled;
+use super::link::{ContactSide, Link};
+use super::plan::FASTER;
+use super::search::{Measure, PairSearch, Party, shift};
+use super::skin::Skin;
+use super::{join_movers, meet_each_other};
+use crate::geometry::Bounds;
+use crate::solver::{Span, System, Systems};
+
+/// What keeps off a surface without thickness, as a part of its short edges: in `f32` something must.
+pub(super) const LEAST_THICKNESS: f32 = 1e-3;
+
+impl Tissue {
+    /// Draws what of each surface is near others that it is found by in images, as the substep begins.
+    pub(super) fn draw(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
+        for member in 0..self.islands.members(island).len() {
+            let a = self.islands.members(island)[member] as usize;
+            // It is written to while others are read.
+            let Some(mut first) = self.skins.get_mut(a).and_then(Option::take) else {
+                continue;
+            };
+            if let Some(body) = bodies.at(a)
+                && first.images.is_some()
+                && moment.concerns(body)
+            {
+                let mut part = Bounds::EMPTY;
+                for &b in self.islands.members(island) {
+                    let b = b as usize;
+                    if let (Some(Some(other)), Some(other_body)) = (self.skins.get(b), bodies.at(b))
+                        && moment.concerns(other_body)
+                        && meet_in_images(&first, other)
+                    {
+                        let parties = [(a, &first), (b, other)].map(|(place, skin)| Party { place, skin });
+                        if let Some(radius) = radius(&parties[0], &parties[1], [body, other_body]) {
+                            part = part.and(&near(&first, other, radius));
+                        }
+                    }
+                }
+                first.draw(&part);
+            }
+            self.skins[a] = Some(first);
+        }
+    }
+
+    /// Whether what may meet where impulses have led nodes was found before they acted.
+    pub(super) fn has_foreseen(&self, island: usize, bodies: &impl Systems, moment: &Span) -> bool {
+        let of_one = self.islands.members(island).iter().map(|&place| [place as usize; 2]);
+        let mut all = of_one.chain(self.islands.pairs(island));
+        all.all(|pair| {
+            let search = Self::search((&self.skins, &self.entangled), pair, bodies, moment);
+            search.is_none_or(|search| search.has_foreseen())
+        })
+    }
+
+    /// The search of one of the near pairs of bodies, or of one body, in a substep, if they meet then.
+    fn search<'a>(
+        (skins, entangled): (&'a [Option<Skin>], &Entangled),
+        [a, b]: [usize; 2],
+        bodies: &impl Systems,
+        moment: &Span,
+    ) -> Option<PairSearch<'a>> {
+        let party = |place: usize| {
+            let skin = skins.get(place)?.as_ref()?;
+            Some(Party { place, skin })
+        };
+        let both = [bodies.at(a)?, bodies.at(b)?];
+        let (mut first, mut second) = (party(a)?, party(b)?);
+        let radius = radius(&first, &second, both)?;
+        // Each edge of the first meets one edge of the second: of a long edge across short ones, that would be one of many.
+        if second.skin.short < first.skin.short {
+            std::mem::swap(&mut first, &mut second);
+        }
+        let is_looked_at = both.into_iter().all(|body| moment.concerns(body));
+        let [own, others] = [first.skin, second.skin];
+        (is_looked_at && !entangled.has([a, b])).then(|| PairSearch {
+            parties: [first, second],
+            dt: moment.duration,
+            radius,
+            ahead: own.ahead().min(others.ahead()),
+            motion: own.spread + others.spread + (own.drift - others.drift).length() * moment.duration,
+            in_images: a != b && meet_in_images(own, others),
+            measures: Measure::Nothing,
+        })
+    }
+
+    /// The same of a pair that is not found in images.
+    fn search_by_distance<'a>(
+        skins: (&'a [Option<Skin>], &Entangled),
+        pair: [usize; 2],
+        bodies: &impl Systems,
+        moment: &Span,
+    ) -> Option<PairSearch<'a>> {
+        Self::search(skins, pair, bodies, moment).filter(|search| !search.in_images)
+    }
+
+    /// Has what is near be known of the pairs of an island, or trees be where surfaces are.
+    fn know_pairs(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
+        let Self {
+            skins,
+            entangled,
+            pairs,
+            islands,
+            ..
+        } = self;
+        let mut all = islands.pairs(island).enumerate();
+        let holds = all.all(|(number, pair)| {
+            let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
+            search.is_none_or(|search| pairs.holds(number, &search))
+        });
+        if holds {
+            return;
+        }
+        for &place in islands.members(island) {
+            if let Some(Some(skin)) = skins.get_mut(place as usize) {
+                skin.fit();
+            }
+        }
+        if pairs.can_be_found() {
+            pairs.begin();
+            let added = islands.pairs(island).try_for_each(|pair| {
+                let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
+                pairs.add(search.as_ref())
+            });
+            if added.is_none() {
+                pairs.fail();
+            }
+        }
+    }
+
+    /// Adds the contacts that are not known yet, of those that meet; again in the same substep: where impulses have led further than was looked.
+    pub(super) fn find(&mut self, island: usize, bodies: &impl Systems, moment: &Span, again: bool) {
+        let measures = moment.begins && !again;
+        self.know_pairs(island, bodies, moment);
+        let Self {
+            skins,
+            clearances,
+            entangled,
+            links,
+            known,
+            pushes,
+            pairs,
+            bonds,
+            islands,
+            ..
+        } = self;
+        let key = Link::key;
+        known.clear();
+        known.extend(0..links.len() as u32);
+        known.sort_unstable_by_key(|&link| key(&links[link as usize]));
+        let of_one = islands.members(island).iter().map(|&place| (None, [place as usize; 2]));
+        let of_two = islands.pairs(island).enumerate();
+        for (number, [a, b]) in of_one.chain(of_two.map(|(number, pair)| (Some(number), pair))) {
+            let Some(mut search) = Self::search((skins, entangled), [a, b], bodies, moment) else {
+                continue;
+            };
+            if again && search.has_foreseen() {
+                continue;
+            }
+            let [a, b] = search.parties.map(|party| party.place);
+            let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {
+                continue;
+            };
+            let friction = body_a.contact.friction.max(body_b.contact.friction);
+            let number = number.filter(|_| !search.in_images);
+            // A place is lent to neither where it is its own partner.
+            let mut none = [None, None];
+            let [kept_a, kept_b] = match clearances.get_disjoint_mut([a, b]) {
+                Ok(both) => both,
+                Err(_) => none.each_mut(),
+            };
+            if measures && [&*kept_a, &*kept_b].into_iter().flatten().any(|kept| kept.is_new) {
+                search.measures = Measure::Reductions;
+                let known = number.and_then(|number| pairs.of(number));
+                search.run([&mut *kept_a, &mut *kept_b], known, |_| {});
+            }
+            search.measures = if measures { Measure::Distances } else { Measure::Nothing };
+            let near = number.and_then(|number| pairs.of(number));
+            search.run([kept_a, kept_b], near, |touch| {
+                let sides = touch.sides.map(|side| side.key());
+                let is_known = known
+                    .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
+                    .is_ok();
+                if is_known || links.len() == links.capacity() || are_joined(bonds, bodies, &touch.sides) {
+                    return;
+                }
+                let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });
+                if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides) {
+                    link.friction = friction;
+                    link.is_parted = touch.is_parted;
+                    link.allow_gap(touch.gap, moment.duration);
+                    pushes.recall(&mut link);
+                    links.push(link);
+                }
+            });
+        }
+        if measures {
+            for &place in islands.members(island) {
+                if let Some(Some(kept)) = clearances.get_mut(place as usize) {
+                    let skin = skins.get(place as usize).and_then(Option::as_ref);
+                    kept.settle(skin.map_or(&[], |skin| &skin.pierces));
+                }
+            }
+        }
+    }
+}
+
+/// Whether a bond makes one point of nodes of both sides.
+fn are_joined(bonds: &Bonds, bodies: &impl Systems, sides: &[ContactSide; 2]) -> bool {
+    let [a, b] = sides;
+    !bonds.are_none() && join_movers(bonds, bodies, [a.body, b.body], [&a.nodes, &b.nodes])
+}
+
+/// How far two bodies, or one with itself, keep apart, m; `None` where they do not meet.
+fn radius(first: &Party, second: &Party, bodies: [&System; 2]) -> Option<f32> {
+    let [a, b] = bodies.map(|body| &body.contact);
+    if first.place == second.place {
+        return first.skin.radius_with_itself(a);
+    }
+    let shortest = first.skin.short.min(second.skin.short);
+    let apart = (a.thickness + b.thickness).max(LEAST_THICKNESS * shortest);
+    meet_each_other(bodies[0], bodies[1]).then_some(apart)
+}
+
+/// Whether two bodies that meet are found in images.
+fn meet_in_images(first: &Skin, second: &Skin) -> bool {
+    first.asks_for_images || second.asks_for_images
+}
+
+/// A box about what of a surface another may meet that it keeps `radius` away from.
+fn near(skin: &Skin, other: &Skin, radius: f32) -> Bounds {
+    let margin = radius + skin.short + FASTER * (skin.travel + other.travel);
+    let shift = shift(other, skin);
+    let (own, others) = (skin.forest.bounds(), other.forest.bounds());
+    Bounds {
+        min: (others.min + shift - margin).max(own.min),
+        max: (others.max + shift + margin).min(own.max),
+    }
+}
