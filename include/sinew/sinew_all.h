@@ -572,8 +572,8 @@ typedef struct sinew_body_def {
   /// enough. See sinew_body_cut.
   uint32_t spare_nodes;
   /// Fracture energy of a blade's cut, at least 0: [J/m] for a surface, [J/m^2] for a solid. For a
-  /// surface it is the toughness times the thickness. Default 0: no resistance.
-  /// SINEW_STATUS_UNSUPPORTED for a body of springs alone.
+  /// surface it is the toughness times the thickness. Default 0: no resistance. Above 0 it needs
+  /// spare_nodes. SINEW_STATUS_UNSUPPORTED for a body of springs alone.
   float toughness;
   /// Strain above which a spring or an element edge tears, at least 0; 0 (default): never. A
   /// surface tears at the end node with the larger separating force, across that force, to the next

@@ -254,7 +254,7 @@ pub struct sinew_body_def {
     pub spare_nodes: u32,
     /// Fracture energy of a blade's cut, at least 0: [J/m] for a surface, [J/m^2] for a solid.
     ///
-    /// For a surface it is the toughness times the thickness. Default 0: no resistance. SINEW_STATUS_UNSUPPORTED
+    /// For a surface it is the toughness times the thickness. Default 0: no resistance. Above 0 it needs spare_nodes. SINEW_STATUS_UNSUPPORTED
     /// for a body of springs alone.
     pub toughness: f32,
     /// Strain above which a spring or an element edge tears, at least 0; 0 (default): never.

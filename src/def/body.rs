@@ -209,7 +209,7 @@ pub struct BodyDefinition<'a> {
     pub tearing: Tearing,
     /// What a blade ([`World::create_blade`](crate::World::create_blade)) spends to cut it, J for each m of the cut in the rest shape: the
     /// fracture toughness of the material, J/m², times the thickness of the surface; of tetrahedra that itself, for each m² of their faces that opens.
-    /// Springs alone have none. At least 0; 0: it is cut for nothing.
+    /// Springs alone have none. At least 0; 0: it is cut for nothing. Above 0 it needs `spare_nodes`.
     pub toughness: f32,
 }
 
