@@ -2,6 +2,8 @@
 
 use super::attachments::Which;
 use super::{FRAME, World, make_walks};
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{BodyId, Result, SlotId, memory};
 use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
 use crate::cutting::Sweep;

@@ -3,6 +3,8 @@
 use glam::{Quat, Vec3};
 
 use super::World;
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{BodyId, Result, ToolId};
 use crate::contact::{Contact, ContactChange, Contacts, Pose, Tool, ToolDefinition, ToolPath};
 use crate::def::CollisionFilter;

@@ -280,3 +280,57 @@ fn what_spins_while_it_falls_keeps_its_spin() {
         }
     }
 }
+
+/// Gaps between attached points that rounding opens and closes are no work: stiff blocks swing as one does.
+#[test]
+fn stiff_blocks_that_are_attached_swing_on() {
+    let mesh = Mesh::block([0.1, 0.05, 0.05], [4, 2, 2]).expect("a block");
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let [first, second] = [0.0, 0.1].map(|offset| {
+        let positions: Vec<Vec3> = mesh.positions.iter().map(|place| *place + Vec3::X * offset).collect();
+        let body = world.create_body(&BodyDefinition {
+            positions: &positions,
+            tetrahedra: &mesh.tetrahedra,
+            material: Some(Material {
+                model: Model::Springs,
+                young_modulus: 3e6,
+                density: 1060.0,
+                ..Material::default()
+            }),
+            solver: Solver::Verlet,
+            ..Default::default()
+        });
+        body.expect("a body")
+    });
+    let side = |x: f32| -> Vec<u32> {
+        let nodes = 0..mesh.positions.len() as u32;
+        nodes
+            .filter(|&node| (mesh.positions[node as usize].x - x).abs() < 1e-4)
+            .collect()
+    };
+    let [low, high] = [f32::min, f32::max].map(|of| mesh.positions.iter().map(|place| place.x).reduce(of));
+    let [low, high] = [low, high].map(|x| side(x.expect("nodes")));
+    let anchors = [&high, &low].map(|nodes| nodes.iter().copied().map(Anchor::Node).collect::<Vec<_>>());
+    for node in low {
+        world.body_mut(first).expect("a body").pin(node).expect("a pin");
+    }
+    world
+        .attach_to_body(first, &anchors[0], second, &anchors[1], 0.0)
+        .expect("attachments");
+    let substeps = world.step(DT).expect("a step").substeps;
+    let (mut most, mut least) = (f64::MIN, f64::MAX);
+    let mut inner = 0.0_f64;
+    for _ in 0..900 {
+        let report = world.step(DT).expect("a step");
+        assert!(
+            report.substeps <= substeps + substeps / 4,
+            "{} of {substeps}",
+            report.substeps
+        );
+        let all = [first, second].map(|body| world.body(body).expect("a body").energy(world.gravity()));
+        let own: f64 = all.iter().map(|energy| energy.kinetic + energy.elastic).sum();
+        let total = own + all.iter().map(|energy| energy.gravitational).sum::<f64>();
+        (most, least, inner) = (most.max(total), least.min(total), inner.max(own));
+    }
+    assert!(most - least < 0.01 * inner, "{:.2} %", 100.0 * (most - least) / inner);
+}

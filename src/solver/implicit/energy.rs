@@ -114,7 +114,7 @@ impl Substep<'_> {
         let has = before.total.energy + work;
         let mass = total_mass(body);
         let fall = mean(body, &implicit.histories[next].ways).dot(self.request.gravity.as_dvec3());
-        let has = has + f64::from(implicit.accuracy).max(SOLVED).powi(2) * mass * fall.abs();
+        let has = has + SOLVED * SOLVED * mass * fall.abs();
         // Rounding of velocities, a part of what they are in all, and of coordinates.
         let speed = mean(body, body.state.newest().1).length() * f64::from(f32::EPSILON);
         let reach = body.local_bounds().magnitudes().max_element();

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use super::super::link::Link;
 use super::super::skin::Skin;
 use super::{Bond, BondCorner, BondEnd, Bonds, CLOSING_SPEED};
-use crate::solver::{Span, Systems};
+use crate::solver::{Span, System, Systems};
 
 /// What is apart comes together within so many seconds, but for an e-th; at most by `LARGEST_PART` in a substep.
 const CLOSING_TIME: f64 = 0.02;
@@ -13,6 +13,9 @@ const LARGEST_PART: f64 = 0.2;
 
 /// The part of the way by which points may miss where they are to be, after `SWEEPS`.
 const MISSED: f64 = 0.2;
+
+/// What is apart by more than this part of the smaller body's extent takes work to close.
+const SEEN: f64 = 1e-4;
 
 /// Sweeps over what is apart.
 const SWEEPS: u32 = 8;
@@ -248,7 +251,15 @@ impl Bonds {
             let apart = bond.apart(ends);
             let way = (apart * closed).clamp_length_max(CLOSING_SPEED * duration);
             bond.gap = apart - way;
-            bond.work -= bond.load.as_dvec3().dot(way);
+            // Gaps that rounding opens and closes take no work.
+            let extents = bond
+                .points
+                .iter()
+                .filter_map(|point| bodies.at(point.body))
+                .map(System::extent);
+            if apart.length() > SEEN * f64::from(extents.fold(f32::INFINITY, f32::min)) {
+                bond.work -= bond.load.as_dvec3().dot(way);
+            }
             bond.miss = MISSED * way.abs().max_element();
         }
         for _ in 0..SWEEPS {
