@@ -163,8 +163,8 @@ impl CoupledGroup<'_> {
         found.all += stored;
         let excess = common.compare(&found);
         let mut removed = 0.0;
-        for &place in members {
-            if let (Some(walk), Some(body)) = (&mut walks[place as usize], bodies.at_mut(place as usize)) {
+        for &place in members.iter().filter(|_| excess > 0.0) {
+            if let (Some(walk), Some(body)) = (&walks[place as usize], bodies.at_mut(place as usize)) {
                 removed += slow_down(body, excess * walk.own / found.own, false);
             }
         }
