@@ -28,6 +28,7 @@ const SLOWER: f64 = 0.5;
 
 /// How many times shorter substeps may be than stability asks for.
 const FINEST: u32 = 8;
+
 /// What is known of the energy that a body may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EnergyAccount {

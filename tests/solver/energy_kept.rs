@@ -17,22 +17,33 @@ fn organ() -> (World, BodyId, Vec<u32>, u32) {
     (world, body, end, tip)
 }
 
-/// The same, moved by this.
-fn organ_at(world: &mut World, offset: Vec3) -> (BodyId, Vec<u32>, u32) {
-    let mesh = Mesh::organ(0.15, 0.012).expect("an organ");
-    let positions: Vec<Vec3> = mesh.positions.iter().map(|position| *position + offset).collect();
+/// A body of a mesh that is moved by this, of tissue of this Young's modulus, Pa.
+fn body_of(
+    world: &mut World,
+    mesh: &Mesh,
+    offset: Vec3,
+    (solver, model, young_modulus): (Solver, Model, f32),
+) -> BodyId {
+    let positions: Vec<Vec3> = mesh.positions.iter().map(|place| *place + offset).collect();
     let body = world.create_body(&BodyDefinition {
         positions: &positions,
         tetrahedra: &mesh.tetrahedra,
         material: Some(Material {
-            model: Model::Springs,
-            young_modulus: 5400.0,
+            model,
+            young_modulus,
             density: 1060.0,
             ..Material::default()
         }),
-        solver: Solver::Verlet,
+        solver,
         ..Default::default()
     });
+    body.expect("a body")
+}
+
+/// The same organ, moved by this.
+fn organ_at(world: &mut World, offset: Vec3) -> (BodyId, Vec<u32>, u32) {
+    let mesh = Mesh::organ(0.15, 0.012).expect("an organ");
+    let body = body_of(world, &mesh, offset, (Solver::Verlet, Model::Springs, 5400.0));
     let along = |node: &u32| mesh.positions[*node as usize].x;
     let nodes = 0..mesh.positions.len() as u32;
     let [low, high] = [f32::min, f32::max].map(|of| nodes.clone().map(|node| along(&node)).reduce(of).expect("nodes"));
@@ -41,7 +52,7 @@ fn organ_at(world: &mut World, offset: Vec3) -> (BodyId, Vec<u32>, u32) {
         .filter(|node| along(node) < low + 0.1 * (high - low))
         .collect();
     let tip = nodes.max_by(|a, b| along(a).total_cmp(&along(b))).expect("nodes");
-    (body.expect("a body"), end, tip)
+    (body, end, tip)
 }
 
 /// The same, pinned at that end, with its furthest node.
@@ -59,19 +70,21 @@ fn gain((world, body): (&mut World, BodyId), frames: usize, step: impl FnMut(&mu
     gain_of_all((world, &[body]), frames, step)
 }
 
+/// Kinetic and elastic energy of bodies, and all of theirs, J.
+fn energy_of(world: &World, bodies: &[BodyId]) -> (f64, f64) {
+    bodies.iter().fold((0.0, 0.0), |(inner, all), &body| {
+        let energy = world.body(body).expect("a body").energy(world.gravity());
+        let own = energy.kinetic + energy.elastic;
+        (inner + own, all + own + energy.gravitational)
+    })
+}
+
 fn gain_of_all((world, bodies): (&mut World, &[BodyId]), frames: usize, mut step: impl FnMut(&mut World)) -> f64 {
-    let energy = |world: &World| {
-        bodies.iter().fold((0.0, 0.0), |(inner, all), &body| {
-            let energy = world.body(body).expect("a body").energy(world.gravity());
-            let own = energy.kinetic + energy.elastic;
-            (inner + own, all + own + energy.gravitational)
-        })
-    };
-    let (_, start) = energy(world);
+    let (_, start) = energy_of(world, bodies);
     let (mut most, mut gained) = (0.0_f64, 0.0_f64);
     for frame in 0..frames {
         step(world);
-        let (inner, all) = energy(world);
+        let (inner, all) = energy_of(world, bodies);
         if frame < 120 {
             most = most.max(inner);
         }
@@ -216,19 +229,7 @@ fn what_spins_while_it_falls_keeps_its_spin() {
     ] {
         let mesh = Mesh::organ(0.15, 0.018).expect("an organ");
         let mut world = World::new(WorldDefinition::default()).expect("a world");
-        let body = world.create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
-            material: Some(Material {
-                model,
-                young_modulus: 20e3,
-                density: 1060.0,
-                ..Material::default()
-            }),
-            solver,
-            ..Default::default()
-        });
-        let body = body.expect("a body");
+        let body = body_of(&mut world, &mesh, Vec3::ZERO, (solver, model, 20e3));
         let masses: Vec<f64> = {
             let body = world.body(body).expect("a body");
             let nodes = 0..body.node_count() as u32;
@@ -287,20 +288,12 @@ fn stiff_blocks_that_are_attached_swing_on() {
     let mesh = Mesh::block([0.1, 0.05, 0.05], [4, 2, 2]).expect("a block");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let [first, second] = [0.0, 0.1].map(|offset| {
-        let positions: Vec<Vec3> = mesh.positions.iter().map(|place| *place + Vec3::X * offset).collect();
-        let body = world.create_body(&BodyDefinition {
-            positions: &positions,
-            tetrahedra: &mesh.tetrahedra,
-            material: Some(Material {
-                model: Model::Springs,
-                young_modulus: 3e6,
-                density: 1060.0,
-                ..Material::default()
-            }),
-            solver: Solver::Verlet,
-            ..Default::default()
-        });
-        body.expect("a body")
+        body_of(
+            &mut world,
+            &mesh,
+            Vec3::X * offset,
+            (Solver::Verlet, Model::Springs, 3e6),
+        )
     });
     let side = |x: f32| -> Vec<u32> {
         let nodes = 0..mesh.positions.len() as u32;
@@ -327,9 +320,7 @@ fn stiff_blocks_that_are_attached_swing_on() {
             "{} of {substeps}",
             report.substeps
         );
-        let all = [first, second].map(|body| world.body(body).expect("a body").energy(world.gravity()));
-        let own: f64 = all.iter().map(|energy| energy.kinetic + energy.elastic).sum();
-        let total = own + all.iter().map(|energy| energy.gravitational).sum::<f64>();
+        let (own, total) = energy_of(&world, &[first, second]);
         (most, least, inner) = (most.max(total), least.min(total), inner.max(own));
     }
     assert!(most - least < 0.01 * inner, "{:.2} %", 100.0 * (most - least) / inner);

@@ -81,7 +81,7 @@ impl Substep<'_> {
         {
             return EnergyBefore { total, credit };
         }
-        let kinetic = kinetic(body, self.is_first);
+        let (kinetic, _) = kinetic(body, self.is_first);
         let from = implicit.place(self.is_first);
         let mut total = implicit.elastic(body, false, from, self.team);
         if travels {
@@ -106,19 +106,18 @@ impl Substep<'_> {
 
     /// Compares the energy after the step with what there was and what was put in.
     pub(super) fn account(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> End {
-        let kinetic = kinetic(body, false);
+        let (kinetic, velocity) = kinetic(body, false);
         let next = 1 - implicit.settled;
         let elastic = implicit.elastic(body, true, next, self.team);
-        let work = self.work(body, &implicit.histories[next]);
+        let (work, way) = self.work(body, &implicit.histories[next]);
         let after = elastic.plus(kinetic);
         let has = before.total.energy + work;
         let mass = total_mass(body);
-        let fall = mean(body, &implicit.histories[next].ways).dot(self.request.gravity.as_dvec3());
+        let fall = way.dot(self.request.gravity.as_dvec3());
         let has = has + SOLVED * SOLVED * mass * fall.abs();
         // Rounding of velocities, a part of what they are in all, and of coordinates.
-        let speed = mean(body, body.state.newest().1).length() * f64::from(f32::EPSILON);
         let reach = body.local_bounds().magnitudes().max_element();
-        let speed = speed + f64::EPSILON * f64::from(reach) / self.step;
+        let speed = velocity.length() * f64::from(f32::EPSILON) + f64::EPSILON * f64::from(reach) / self.step;
         let noise = mass * speed * speed + NOISY * implicit.noise(reach).energy;
         let size = after.size + work.abs();
         let rounding = ROUNDING * (before.total.size + size) + noise + 2.0 * (noise * size).sqrt();
@@ -142,13 +141,12 @@ impl Substep<'_> {
     pub(super) fn slow_down(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) {
         let next = 1 - implicit.settled;
         let known = implicit.histories[next].energy;
-        let work = self.work(body, &implicit.histories[next]);
+        let (work, _) = self.work(body, &implicit.histories[next]);
         let excess = known.map(|total| total.energy - before.total.energy - work);
         let taken = excess
             .filter(|excess| excess.is_finite())
             .map(|excess| slow_down(body, excess, true));
-        let kinetic = kinetic(body, false);
-        let mean = mean(body, body.state.newest().1);
+        let (kinetic, mean) = kinetic(body, false);
         let state = body.state.substep();
         let history = &mut implicit.histories[next];
         if let (Some(total), Some(excess), Some(taken)) = (known, excess, taken)
@@ -208,8 +206,8 @@ impl Substep<'_> {
             });
     }
 
-    /// What gravity, forces from outside, tools and other tissue did on these ways, J.
-    fn work(&self, body: &System, history: &History) -> f64 {
+    /// What gravity, forces from outside, tools and other tissue did on these ways, J, but for the way of the body as a whole, which is told too, m.
+    fn work(&self, body: &System, history: &History) -> (f64, DVec3) {
         let ways = &history.ways;
         let mean = mean(body, ways);
         let pressed = history.pressing();
@@ -243,7 +241,7 @@ impl Substep<'_> {
             let (mass, way) = (f64::from(body.masses[pin.node as usize]), ways.get(pin.node as usize));
             work -= mass * pin.held(way).as_dvec3().dot(self.request.gravity.as_dvec3());
         }
-        work
+        (work, mean)
     }
 }
 
@@ -338,8 +336,8 @@ fn mean(body: &System, vectors: &Vectors) -> DVec3 {
 }
 
 /// The kinetic energy of what is free to move, J, before the first substep or now: not of what is led, though it be along some axes alone, nor
-/// that of the motion as a whole.
-fn kinetic(body: &System, is_first: bool) -> f64 {
+/// that of the motion as a whole, whose velocity is told too, m/s.
+fn kinetic(body: &System, is_first: bool) -> (f64, DVec3) {
     let velocities = if is_first {
         body.state.velocities()
     } else {
@@ -362,7 +360,7 @@ fn kinetic(body: &System, is_first: bool) -> f64 {
             })
         })
         .sum();
-    moving - led.sum::<f64>()
+    (moving - led.sum::<f64>(), mean)
 }
 
 struct Kinetic<'a> {
