@@ -9,7 +9,7 @@
 // lists only errors that are special. Every call may return
 //   SINEW_STATUS_INVALID_ARGUMENT for NULL where a comment does not say "nullable", NaN or infinity
 //     where a comment does not allow it, an index out of range, an unknown enum value, a negative
-//     mass or stiffness, a reserved field that is not 0, or an unknown struct_size;
+//     mass or stiffness, a field `reserved` that is not 0, or an unknown struct_size;
 //   SINEW_STATUS_STALE_ID for the id of a destroyed object;
 //   SINEW_STATUS_OUT_OF_MEMORY if it allocates;
 //   SINEW_STATUS_INTERNAL after a fault inside the library.

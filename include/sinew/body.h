@@ -17,10 +17,8 @@ extern "C" {
 /// Memory layout of the springs of a body.
 typedef enum sinew_storage {
   SINEW_STORAGE_PACKED = 0,       ///< Layout optimized for the processor; default.
-  /// Linked list per node, one allocation per link; for comparison.
-  SINEW_STORAGE_EFFICIENT = 1,
-  /// One array with springs_per_node slots per node; for comparison.
-  SINEW_STORAGE_FAST_LINK = 2,
+  SINEW_STORAGE_EFFICIENT = 1,  ///< Linked list per node, one allocation per link; for comparison.
+  SINEW_STORAGE_FAST_LINK = 2,  ///< One array with springs_per_node slots per node; for comparison.
   /// Chain of arrays of springs_per_node slots per node; for comparison.
   SINEW_STORAGE_DYNAMIC_BULK = 3
 } sinew_storage;
@@ -77,8 +75,7 @@ typedef struct sinew_body_def {
   const float *node_dampings;
   /// [kg] Mass of each node, at least 1e-37; no default. Must be 0 if density is set.
   float node_mass;
-  /// [N s/m] Drag on each node: force = -node_damping * velocity; default 0.
-  float node_damping;
+  float node_damping;  ///< [N s/m] Drag on each node: force = -node_damping * velocity; default 0.
   /// 2 * spring_count node indices, each pair once; nullable: the element edges, each once. NULL
   /// excludes the arrays with one value per spring. A pointer with spring_count 0 means no springs.
   const uint32_t *springs;
@@ -139,16 +136,14 @@ typedef struct sinew_body_def {
   /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
   /// Every node must then belong to an element, masses must be NULL and node_mass 0.
   float density;
-  /// [m] Thickness of a material that fills triangles, above 0; else 0.
-  float thickness;
+  float thickness;  ///< [m] Thickness of a material that fills triangles, above 0; else 0.
   /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0. 0.3
   /// to 0.6 of Young's modulus lets a body of springs recover from inversion. 0 with TETRAHEDRA.
   float volume_stiffness;
   /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness. An
   /// anchor spring pulls a node to its rest position in the world.
   const float *home_stiffnesses;
-  /// [N/m] Stiffness of each anchor spring; default 0: no anchor springs.
-  float home_stiffness;
+  float home_stiffness;  ///< [N/m] Stiffness of each anchor spring; default 0: no anchor springs.
   /// [N m] Flexural rigidity of the triangles, at least 0; default 0. A sheet of thickness t has E
   /// t^3 / (12 (1 - nu^2)). The rest angle of each edge may be any. An edge of more than two
   /// triangles is refused. Exact for equilateral triangles. sinew_body_remove_spring removes the
@@ -161,8 +156,7 @@ typedef struct sinew_body_def {
   float spring_cubic;              ///< CUBIC: cubic coefficient, at least 0; else 0.
   /// EXPONENTIAL, CUBIC: strain beyond which the law is linear, above 0; else 0.
   float spring_limit;
-  /// [Pa] Fiber stiffness of each tetrahedron, at least 0; default 0.
-  float fibre_stiffness;
+  float fibre_stiffness;  ///< [Pa] Fiber stiffness of each tetrahedron, at least 0; default 0.
   /// 3 * tetrahedron_count floats: unit fiber directions at rest, or 0 for no fibers; nullable.
   /// Fibers pull in proportion to their extension, over the cross section at rest. They never push.
   const float *fibre_directions;
@@ -249,12 +243,10 @@ typedef struct sinew_body_def {
   /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
   uint32_t element_law;
   float mooney_ratio;              ///< MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
-  /// [m] Translation of all positions, after the rotation; default 0 0 0.
-  float position[3];
+  float position[3];  ///< [m] Translation of all positions, after the rotation; default 0 0 0.
   /// Rotation of all positions and fibers about the origin, x y z w, not zero; default 0 0 0 1.
   float orientation[4];
-  /// Factor of the world's gravity on this body, finite; default 1.
-  float gravity_scale;
+  float gravity_scale;  ///< Factor of the world's gravity on this body, finite; default 1.
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
@@ -271,32 +263,32 @@ sinew_status sinew_body_destroy(sinew_world *world, sinew_body_id body);
 
 /// Writes a view of the node positions [m] without copying.
 /// Lifetime: until the next step, sinew_body_set_positions, sinew_body_set_velocities,
-/// sinew_body_rest_state or topology change of the body, or its destruction.
+/// sinew_body_solve_equilibrium or topology change of the body, or its destruction.
 sinew_status sinew_body_get_positions(const sinew_world *world, sinew_body_id body,
-                                      sinew_vec3_view *out);
+    sinew_vec3_view *out);
 
 /// Writes a view of the node velocities [m/s] at the time of the positions.
 /// A pinned node has the velocity of its pin in the last step. The first call after a step computes
 /// the velocities, at the cost of about one substep. Lifetime: as for sinew_body_get_positions.
 sinew_status sinew_body_get_velocities(const sinew_world *world, sinew_body_id body,
-                                       sinew_vec3_view *out);
+    sinew_vec3_view *out);
 
 /// Moves all nodes to new positions without a sweep.
 /// `positions` [m] holds 3 * node_count floats. Velocities stay. Pinned nodes move too, and
 /// attached nodes stay attached at their new positions. `node_count` must be the body's.
 sinew_status sinew_body_set_positions(sinew_world *world, sinew_body_id body,
-                                      const float *positions, size_t node_count);
+    const float *positions, size_t node_count);
 
 /// Sets the velocities of all nodes.
 /// `velocities` [m/s] holds 3 * node_count floats. Pinned nodes and pinned axes keep theirs.
 /// `node_count` must be the body's number of nodes.
 sinew_status sinew_body_set_velocities(sinew_world *world, sinew_body_id body,
-                                       const float *velocities, size_t node_count);
+    const float *velocities, size_t node_count);
 
 /// Writes a view of the render and contact surface: the triangles of a body after all cuts.
 /// Lifetime: until the next topology change of the body, or its destruction.
 sinew_status sinew_body_get_triangles(const sinew_world *world, sinew_body_id body,
-                                      sinew_triangle_view *out);
+    sinew_triangle_view *out);
 
 /// Writes 1 if the surface of a body is closed, else 0.
 /// Only a closed body pushes out what is inside it. Removing a spring on its surface opens it.
@@ -304,7 +296,7 @@ sinew_status sinew_body_is_closed(const sinew_world *world, sinew_body_id body, 
 
 /// Writes the mass of a node [kg]; 0 for a permanent pin or a node bound to others.
 sinew_status sinew_body_get_node_mass(const sinew_world *world, sinew_body_id body, uint32_t node,
-                                      float *out);
+    float *out);
 
 // ---- Forces -------------------------------------------------------------------------------------
 
@@ -312,13 +304,13 @@ sinew_status sinew_body_get_node_mass(const sinew_world *world, sinew_body_id bo
 /// `force` [N] points to 3 floats. Forces are constant during the step and cleared when it
 /// succeeds. They have no effect on a pinned or attached node, nor along a pinned axis.
 sinew_status sinew_body_apply_force(sinew_world *world, sinew_body_id body, uint32_t node,
-                                    const float *force);
+    const float *force);
 
 /// Adds a force to each of many nodes for the whole next step.
 /// `nodes` holds `count` indices, which may repeat; `forces` [N] holds 3 * count floats. See
 /// sinew_body_apply_force. On failure no force is added.
 sinew_status sinew_body_apply_forces(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     const float *forces, size_t count);
+    const float *forces, size_t count);
 
 // ---- Pins ---------------------------------------------------------------------------------------
 
@@ -335,7 +327,7 @@ sinew_status sinew_body_pin(sinew_world *world, sinew_body_id body, uint32_t nod
 /// keeps the velocity of its pin. Changing the axes cancels a pending sinew_body_move_pin.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds it, or a node of mass 0 would be free.
 sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_t node,
-                                 uint32_t axes);
+    uint32_t axes);
 
 /// Unpins a node along all axes; no effect on a free node.
 /// The node keeps the velocity of its pin in the last step.
@@ -347,20 +339,20 @@ sinew_status sinew_body_unpin(sinew_world *world, sinew_body_id body, uint32_t n
 /// floats.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_move_pin(sinew_world *world, sinew_body_id body, uint32_t node,
-                                 const float *position);
+    const float *position);
 
 /// Writes the reaction force on a pinned node, averaged over the last step.
 /// `force` [N] receives 3 floats, 0 along free axes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_get_pin_force(const sinew_world *world, sinew_body_id body, uint32_t node,
-                                      float *force);
+    float *force);
 
 // ---- Collision and sleep ------------------------------------------------------------------------
 
 /// Sets the collision category and mask of a body from the next step on.
 /// See sinew_body_def. Tools and bodies inside it are pushed out once they collide with it.
 sinew_status sinew_body_set_collision(sinew_world *world, sinew_body_id body, uint32_t category,
-                                      uint32_t mask);
+    uint32_t mask);
 
 /// Wakes all nodes of a body until they come to rest again.
 /// Forces, contacts, cuts and property changes wake a body automatically.

@@ -22,21 +22,20 @@ typedef struct sinew_cut_report {
   /// Number of springs removed by the blade or replaced by springs of copies.
   uint32_t springs_removed;
   uint32_t pieces_parted;    ///< Increase of the number of connected surface components.
-  /// [m] Length of the cut in the rest shape; for a solid on its surface.
-  double length;
+  double length;  ///< [m] Length of the cut in the rest shape; for a solid on its surface.
   /// [m^2] Area of the opened faces of a solid in the rest shape, counted on one side. A cell in
   /// which the cut ends stays whole, so the area can be less than the blade swept.
   double area;
 } sinew_cut_report;
 
 /// Cuts a body along the surface that a blade's edge swept, at the current positions.
-/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `report` is nullable. A
-/// sweep that starts where the body's last one ended continues it. New nodes are appended; mass,
-/// momentum and energy are conserved. The call ends views of positions and triangles; see
-/// sinew_body_get_topology_changes. On failure nothing changes.
+/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `out_report` is
+/// nullable. A sweep that starts where the body's last one ended continues it. New nodes are
+/// appended; mass, momentum and energy are conserved. The call ends views of positions and
+/// triangles; see sinew_body_get_topology_changes. On failure nothing changes.
 /// Errors: SINEW_STATUS_UNSUPPORTED without spare_nodes; SINEW_STATUS_CAPACITY if too few are left.
 sinew_status sinew_body_cut(sinew_world *world, sinew_body_id body, const float *start,
-                            const float *end, sinew_cut_report *report);
+    const float *end, sinew_cut_report *out_report);
 
 /// Origin of a node that a cut added; vertex attributes interpolate by its weights.
 typedef struct sinew_new_node {
@@ -76,13 +75,14 @@ typedef struct sinew_topology_changes {
 /// again.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the version is in the future.
 sinew_status sinew_body_get_topology_changes(const sinew_world *world, sinew_body_id body,
-                                             uint64_t since_version, sinew_topology_changes *out);
+    uint64_t since_version, sinew_topology_changes *out);
 
 /// Writes the connected component of each node, and the number of components.
-/// Nodes are connected by springs, elements and the surface. `pieces` receives `count` numbers from
-/// 0, where `count` is the number of nodes. `pieces` and `piece_count` are nullable.
-sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body, uint32_t *pieces,
-                                   size_t count, uint32_t *piece_count);
+/// Nodes are connected by springs, elements and the surface. `out_pieces` receives `node_count`
+/// numbers from 0; `node_count` must be the body's number of nodes. `out_pieces` and
+/// `out_piece_count` are nullable.
+sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_pieces, size_t node_count, uint32_t *out_piece_count);
 
 // ---- Blades -------------------------------------------------------------------------------------
 
@@ -98,10 +98,8 @@ typedef struct sinew_blade_def {
   /// Bits of the categories that this blade belongs to; default 1. It cuts a body if each has a
   /// category in the mask of the other.
   uint32_t collision_category;
-  /// Bits of the categories that this blade cuts; default 0xffffffff.
-  uint32_t collision_mask;
-  /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
-  float position[3];
+  uint32_t collision_mask;  ///< Bits of the categories that this blade cuts; default 0xffffffff.
+  float position[3];  ///< [m] Initial position, each coordinate within 1e9; default 0 0 0.
   /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
   float orientation[4];
 } sinew_blade_def;
@@ -115,7 +113,7 @@ sinew_status sinew_blade_def_init(sinew_blade_def *def, size_t struct_size);
 /// onto the edge is cut too. Moving along the edge or back through the cut meets no resistance. A
 /// triangle needs about 10 spare_nodes. A step that cuts may allocate.
 sinew_status sinew_blade_create(sinew_world *world, const sinew_blade_def *def,
-                                sinew_blade_id *out);
+    sinew_blade_id *out);
 
 /// Destroys a blade; its cuts remain.
 sinew_status sinew_blade_destroy(sinew_world *world, sinew_blade_id blade);
@@ -124,7 +122,7 @@ sinew_status sinew_blade_destroy(sinew_world *world, sinew_blade_id blade);
 /// The blade moves along a straight line at constant speed. `position` [m] is 3 floats, each within
 /// 1e9; `orientation` is x y z w, not zero, nullable: unchanged.
 sinew_status sinew_blade_set_pose(sinew_world *world, sinew_blade_id blade, const float *position,
-                                  const float *orientation);
+    const float *orientation);
 
 /// Report of the cuts of a blade and the load on it in the last step.
 typedef struct sinew_blade_report {
@@ -133,11 +131,9 @@ typedef struct sinew_blade_report {
   float torque[3];      ///< [N m] Mean torque on the blade about its position, in world axes.
   double work;          ///< [J] Work that moving the blade did on tissue in the step.
   double length;        ///< [m] Length of the cuts in the rest shape; for solids on their surface.
-  /// [m] Distance of the blade ahead of its cut; 0 without tissue in its path.
-  double lag;
+  double lag;  ///< [m] Distance of the blade ahead of its cut; 0 without tissue in its path.
   /// SINEW_STATUS_OK, or CAPACITY or OUT_OF_MEMORY if a cut failed; the next step retries.
   sinew_status status;
-  uint32_t reserved0;   ///< Reserved; set to 0 by the library.
   /// [m^2] Area of the opened faces of solids in the rest shape. A cell in which the cut ends stays
   /// whole, so the area can be less than the blade swept.
   double area;
@@ -145,7 +141,7 @@ typedef struct sinew_blade_report {
 
 /// Writes the cuts of a blade and the load on it in the last step.
 sinew_status sinew_blade_get_report(const sinew_world *world, sinew_blade_id blade,
-                                    sinew_blade_report *out);
+    sinew_blade_report *out);
 
 // ---- Tears --------------------------------------------------------------------------------------
 
@@ -156,8 +152,7 @@ sinew_status sinew_blade_get_report(const sinew_world *world, sinew_blade_id bla
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a pair without spring and edge;
 /// SINEW_STATUS_UNSUPPORTED if most_tears is 0.
 sinew_status sinew_body_set_tear_limits(sinew_world *world, sinew_body_id body,
-                                        const uint32_t *pairs, size_t count, const float *strains,
-                                        const float *forces);
+    const uint32_t *pairs, const float *strains, const float *forces, size_t count);
 
 /// Report of the tears in the last step; all 0 for a body that does not tear.
 typedef struct sinew_tear_report {
@@ -173,12 +168,11 @@ typedef struct sinew_tear_report {
   /// Overloaded springs without spare nodes, FAST_LINK slots or memory; retried after a topology
   /// change.
   uint32_t no_room;
-  uint32_t reserved;       ///< Reserved; set to 0 by the library.
 } sinew_tear_report;
 
 /// Writes which tears the last step of a body made or refused.
 sinew_status sinew_body_get_tear_report(const sinew_world *world, sinew_body_id body,
-                                        sinew_tear_report *out);
+    sinew_tear_report *out);
 
 #ifdef __cplusplus
 }

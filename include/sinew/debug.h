@@ -22,10 +22,8 @@ typedef struct sinew_profile {
   size_t struct_size;        ///< Set to sizeof(sinew_profile) before the call.
   double step;               ///< [s] Whole step.
   double plan;               ///< [s] Targets and paths of tools and blades.
-  /// [s] VERLET: forces and integration, which are one pass over the nodes.
-  double forces;
-  /// [s] IMPLICIT, NEWTON: equations and their solution, with the forces.
-  double solver;
+  double forces;  ///< [s] VERLET: forces and integration, which are one pass over the nodes.
+  double solver;  ///< [s] IMPLICIT, NEWTON: equations and their solution, with the forces.
   double broad_phase;        ///< [s] Search for what is near a tool or other tissue.
   double narrow_phase;       ///< [s] Search for contacts among what is near.
   double contact_solver;     ///< [s] Impulses of contacts, attachments and sutures.
@@ -105,7 +103,6 @@ typedef struct sinew_replay_report {
   uint64_t recorded_hash;     ///< State hash after that step in the recording; else 0.
   uint64_t replayed_hash;     ///< State hash after that step in the replay; else 0.
   uint32_t cut_short;         ///< 1 if the file ends within a step, else 0.
-  uint32_t reserved;          ///< Reserved; set to 0 by the library.
 } sinew_replay_report;
 
 /// Replays a recording and compares the state hash after each step, up to the first difference.

@@ -45,20 +45,18 @@ typedef struct sinew_solver_report {
   uint32_t auto_substeps;
   /// [s] AUTO: step length of the choice, the mean of the world so far or 1/60 s; else 0.
   float auto_step;
-  uint32_t reserved;       ///< Reserved; set to 0 by the library.
 } sinew_solver_report;
 
 /// Writes how the solver of a body took the last step.
 sinew_status sinew_body_get_solver_report(const sinew_world *world, sinew_body_id body,
-                                          sinew_solver_report *out);
+    sinew_solver_report *out);
 
 /// Limit of the substep of a step that was refused.
 typedef enum sinew_limit {
   SINEW_LIMIT_NONE = 0,      ///< The step was not refused.
   SINEW_LIMIT_SPRING = 1,    ///< Springs of a node; the nodes are the stiffest spring.
   SINEW_LIMIT_ELEMENT = 2,   ///< Elements of a node; the nodes are the stiffest tetrahedron.
-  /// Anchor, bending, fiber, Maxwell or strain-limiting terms of a node.
-  SINEW_LIMIT_TERM = 3,
+  SINEW_LIMIT_TERM = 3,  ///< Anchor, bending, fiber, Maxwell or strain-limiting terms of a node.
   SINEW_LIMIT_CAVITY = 4,    ///< Pressure in a cavity.
   /// Number of parts of a step of IMPLICIT or NEWTON in contact or attached.
   SINEW_LIMIT_PARTS = 5,
@@ -76,17 +74,16 @@ typedef struct sinew_storage_report {
 
 /// Writes the memory use of the springs of a body.
 sinew_status sinew_body_get_storage_report(const sinew_world *world, sinew_body_id body,
-                                           sinew_storage_report *out);
+    sinew_storage_report *out);
 
 // ---- Strain -------------------------------------------------------------------------------------
 
 /// Writes the strain L / L0 - 1 between pairs of nodes; 0 where L0 is 0.
 /// `pairs` holds 2 * count indices. `rest_lengths` [m] holds `count` floats; it is nullable: the
-/// rest lengths of the springs, which takes longer. `strains` receives `count` floats.
+/// rest lengths of the springs, which takes longer. `out_strains` receives `count` floats.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring and `rest_lengths` is NULL.
 sinew_status sinew_body_get_spring_strains(const sinew_world *world, sinew_body_id body,
-                                           const uint32_t *pairs, const float *rest_lengths,
-                                           size_t count, float *strains);
+    const uint32_t *pairs, const float *rest_lengths, size_t count, float *out_strains);
 
 /// Strain of a triangle or tetrahedron; 0 for a rigid motion, or if it has no size at rest.
 typedef struct sinew_strain {
@@ -97,28 +94,26 @@ typedef struct sinew_strain {
 
 /// Writes the strains of any triangles between nodes of a body.
 /// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `triangles` holds 3 *
-/// triangle_count indices; `strains` receives one entry per triangle. `node_count` must be the
+/// triangle_count indices; `out_strains` receives one entry per triangle. `node_count` must be the
 /// body's.
 sinew_status sinew_body_get_triangle_strains(const sinew_world *world, sinew_body_id body,
-                                             const float *rest_positions, size_t node_count,
-                                             const uint32_t *triangles, size_t triangle_count,
-                                             sinew_strain *strains);
+    const float *rest_positions, size_t node_count, const uint32_t *triangles,
+    size_t triangle_count, sinew_strain *out_strains);
 
 /// Writes the strains of any tetrahedra between nodes of a body.
 /// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `tetrahedra` holds 4 *
-/// tetrahedron_count indices; `strains` receives one entry per tetrahedron. `node_count` must be
-/// the body's.
+/// tetrahedron_count indices; `out_strains` receives one entry per tetrahedron. `node_count` must
+/// be the body's.
 sinew_status sinew_body_get_tetrahedron_strains(const sinew_world *world, sinew_body_id body,
-                                                const float *rest_positions, size_t node_count,
-                                                const uint32_t *tetrahedra,
-                                                size_t tetrahedron_count, sinew_strain *strains);
+    const float *rest_positions, size_t node_count, const uint32_t *tetrahedra,
+    size_t tetrahedron_count, sinew_strain *out_strains);
 
 /// Averages values of elements at their nodes; 0 at a node without elements.
 /// `elements` holds corners * element_count node indices, `corners` is 2, 3 or 4, `values` holds
-/// element_count finite floats, and `means` receives node_count floats. Use it to color an image by
-/// strain.
-sinew_status sinew_mean_at_nodes(const uint32_t *elements, uint32_t corners, const float *values,
-                                 size_t element_count, float *means, size_t node_count);
+/// element_count finite floats, and `out_means` receives node_count floats. Use it to color an
+/// image by strain.
+sinew_status sinew_util_average_to_nodes(const uint32_t *elements, uint32_t corners,
+    const float *values, size_t element_count, float *out_means, size_t node_count);
 
 // ---- Images -------------------------------------------------------------------------------------
 
@@ -132,8 +127,7 @@ typedef struct sinew_picture_def {
   /// bodies along `direction`.
   float target[3];
   float up[3];             ///< Up direction of the image; default 0 1 0.
-  /// Fitted view: direction from the scene to the camera; default 1 0.6 1.4.
-  float direction[3];
+  float direction[3];  ///< Fitted view: direction from the scene to the camera; default 1 0.6 1.4.
   float field_of_view;     ///< [rad] Vertical field of view, above 0 and below pi; default 0.6.
   uint32_t show_contacts;  ///< 1: draws contact points and forces on tools; 0 (default): does not.
 } sinew_picture_def;
@@ -146,7 +140,7 @@ sinew_status sinew_picture_def_init(sinew_picture_def *def, size_t struct_size);
 /// existing file is replaced once the image is complete.
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
 sinew_status sinew_world_save_picture(const sinew_world *world, const sinew_picture_def *def,
-                                      const char *path);
+    const char *path);
 
 /// Color map of values.
 typedef enum sinew_colours {
@@ -163,7 +157,6 @@ typedef struct sinew_body_values {
   float low;            ///< Value of the first color; also used below it.
   float high;           ///< Value of the last color, above low; also used above it.
   uint32_t colours;     ///< Color map, a sinew_colours value.
-  uint32_t reserved;    ///< Reserved; must be 0.
 } sinew_body_values;
 
 /// Draws all bodies and tools into a PNG file, with some bodies colored by values.
@@ -171,9 +164,8 @@ typedef struct sinew_body_values {
 /// is as in sinew_world_save_picture.
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
 sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
-                                                const sinew_picture_def *def,
-                                                const sinew_body_values *coloured, size_t count,
-                                                const char *path);
+    const sinew_picture_def *def, const sinew_body_values *coloured, size_t count,
+    const char *path);
 
 #ifdef __cplusplus
 }

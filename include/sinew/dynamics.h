@@ -25,7 +25,7 @@ typedef struct sinew_mass_properties {
 /// `density` [kg/m^3] is above 0. `out` sets struct_size.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane.
 sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool_id tool,
-                                            float density, sinew_mass_properties *out);
+    float density, sinew_mass_properties *out);
 
 /// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
 /// `mass` is nullable: the tool becomes kinematic again, as it is created. A dynamic tool starts at
@@ -35,30 +35,30 @@ sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if attachments or a haptic handle use the
 /// tool.
 sinew_status sinew_tool_set_mass(sinew_world *world, sinew_tool_id tool,
-                                 const sinew_mass_properties *mass);
+    const sinew_mass_properties *mass);
 
 /// Writes the mass properties of a dynamic tool; all zero if the tool is kinematic.
 sinew_status sinew_tool_get_mass(const sinew_world *world, sinew_tool_id tool,
-                                 sinew_mass_properties *out);
+    sinew_mass_properties *out);
 
 /// Sets the velocity of a dynamic tool, in world axes.
 /// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] are 3 floats each.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
 sinew_status sinew_tool_set_velocity(sinew_world *world, sinew_tool_id tool, const float *velocity,
-                                     const float *angular_velocity);
+    const float *angular_velocity);
 
 /// Writes the velocity of a dynamic tool, in world axes.
-/// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] receive 3 floats each;
-/// both are nullable.
+/// `out_velocity` [m/s] of the center of mass and `out_angular_velocity` [rad/s] receive 3 floats
+/// each; both are nullable.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
-sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool, float *velocity,
-                                     float *angular_velocity);
+sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool,
+    float *out_velocity, float *out_angular_velocity);
 
 /// Adds a force and a torque on a dynamic tool throughout the next step, in world axes.
 /// `force` [N] acts at the center of mass, `torque` [N m] about it; they are 3 floats each.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
 sinew_status sinew_tool_apply_wrench(sinew_world *world, sinew_tool_id tool, const float *force,
-                                     const float *torque);
+    const float *torque);
 
 /// Moves a tool to a new pose at once, without a sweep.
 /// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable:
@@ -66,7 +66,7 @@ sinew_status sinew_tool_apply_wrench(sinew_world *world, sinew_tool_id tool, con
 /// pending sinew_tool_set_pose is dropped.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if attachments or a haptic handle use the tool.
 sinew_status sinew_tool_teleport(sinew_world *world, sinew_tool_id tool, const float *position,
-                                 const float *orientation);
+    const float *orientation);
 
 #ifdef __cplusplus
 }

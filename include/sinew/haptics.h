@@ -51,38 +51,35 @@ typedef struct sinew_haptic sinew_haptic;
 /// step moves it to the latest proxy pose. The tool should start at the device's pose.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if another handle drives the tool.
 sinew_status sinew_haptic_create(sinew_world *world, const sinew_haptic_def *def,
-                                 sinew_haptic **out);
+    sinew_haptic **out);
 
 /// Destroys a haptic handle, before or after its world; NULL has no effect.
 /// The tool is then moved by sinew_tool_set_pose again.
 void sinew_haptic_destroy(sinew_haptic *haptic);
 
 /// Result of a haptic tick.
-typedef struct sinew_haptic_result {
-  size_t struct_size;          ///< Set to sizeof(sinew_haptic_result) before the call.
+typedef struct sinew_haptic_report {
+  size_t struct_size;          ///< Set to sizeof(sinew_haptic_report) before the call.
   float force[3];              ///< [N] Force on the device until the next tick, in world axes.
   float torque[3];             ///< [N m] Torque on the device about its position, in world axes.
   /// [m] Position that the tool is driven to: the device minus the coupling extension.
   float proxy_position[3];
   float proxy_orientation[4];  ///< Orientation that the tool is driven to, x y z w.
   uint32_t contact_count;      ///< Number of contacts of the model; see sinew_haptic_get_contacts.
-  /// [s] Age of the model by tick time; infinity before the first model.
-  float age;
+  float age;  ///< [s] Age of the model by tick time; infinity before the first model.
   uint64_t version;            ///< Number of world steps published to this handle.
-  /// Fraction of the model's force that is applied; below 1 if the model is stale.
-  float gain;
+  float gain;  ///< Fraction of the model's force that is applied; below 1 if the model is stale.
   uint32_t is_over;            ///< 1: the tool or its world was destroyed.
-  /// [J] Energy that the coupling dissipated; kept at least 0 as far as damping can.
-  double lost;
-} sinew_haptic_result;
+  double lost;  ///< [J] Energy that the coupling dissipated; kept at least 0 as far as damping can.
+} sinew_haptic_report;
 
 /// Computes the force on the device from its current pose, without waiting, locking or allocating.
 /// `position` [m] is 3 floats; `orientation` is x y z w, nullable: unchanged. `velocity` [m/s] and
 /// `angular_velocity` [rad/s] are 3 floats each in world axes, nullable: estimated. `dt` [s] is the
 /// time since the last tick, above 0, at most 1. After an error apply no force to the device.
 sinew_status sinew_haptic_tick(sinew_haptic *haptic, const float *position,
-                               const float *orientation, const float *velocity,
-                               const float *angular_velocity, float dt, sinew_haptic_result *out);
+    const float *orientation, const float *velocity, const float *angular_velocity, float dt,
+    sinew_haptic_report *out);
 
 /// Contact of the tool in the model of a haptic handle.
 typedef struct sinew_haptic_contact {
@@ -94,10 +91,10 @@ typedef struct sinew_haptic_contact {
 } sinew_haptic_contact;
 
 /// Writes the contacts of the model that the last tick used, without waiting.
-/// `contacts` receives at most `capacity` entries, `count` the number that exist, at most 32; with
-/// more, those with the largest force.
-sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic, sinew_haptic_contact *contacts,
-                                       size_t capacity, size_t *count);
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist, at most
+/// 32; with more, those with the largest force.
+sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic,
+    sinew_haptic_contact *out_contacts, size_t capacity, size_t *out_count);
 
 #ifdef __cplusplus
 }

@@ -22,7 +22,6 @@ typedef struct sinew_material_preset {
   float shear_modulus;  ///< [Pa] Shear modulus as the source gives it.
   float young_modulus;  ///< [Pa] Young's modulus: 3 times the shear modulus (incompressible).
   float density;        ///< [kg/m^3] Mass density.
-  uint32_t reserved;    ///< Reserved; set to 0 by the library.
 } sinew_material_preset;
 
 /// Tissues with values from the literature.
@@ -48,27 +47,26 @@ sinew_status sinew_material_get_preset(uint32_t preset, sinew_material_preset *o
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the pair has a spring; SINEW_STATUS_CAPACITY if a node
 /// has no free slot (FAST_LINK).
 sinew_status sinew_body_add_spring(sinew_world *world, sinew_body_id body, uint32_t a, uint32_t b,
-                                   float stiffness, float rest_length);
+    float stiffness, float rest_length);
 
 /// Removes the spring between two nodes, with the elements and the bending of that edge.
 /// Elements are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the edge.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if there is nothing between the nodes.
 sinew_status sinew_body_remove_spring(sinew_world *world, sinew_body_id body, uint32_t a,
-                                      uint32_t b);
+    uint32_t b);
 
 /// Writes the two nodes of each spring, each spring once, the lower node first.
-/// `pairs` receives 2 * count indices; `count` must be spring_count of
+/// `out_pairs` receives 2 * count indices; `count` must be spring_count of
 /// sinew_body_get_storage_report. The order stays until springs are added or removed.
 sinew_status sinew_body_get_spring_pairs(const sinew_world *world, sinew_body_id body,
-                                         uint32_t *pairs, size_t count);
+    uint32_t *out_pairs, size_t count);
 
 /// Writes the stiffnesses and rest lengths of the springs between pairs of nodes.
-/// `pairs` holds 2 * count indices. `stiffnesses` [N/m] and `rest_lengths` [m] receive `count`
-/// floats each and are nullable. PACKED merges rest lengths that differ only by rounding.
+/// `pairs` holds 2 * count indices. `out_stiffnesses` [N/m] and `out_rest_lengths` [m] receive
+/// `count` floats each and are nullable. PACKED merges rest lengths that differ only by rounding.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 sinew_status sinew_body_get_springs(const sinew_world *world, sinew_body_id body,
-                                    const uint32_t *pairs, size_t count, float *stiffnesses,
-                                    float *rest_lengths);
+    const uint32_t *pairs, size_t count, float *out_stiffnesses, float *out_rest_lengths);
 
 /// Sets stiffnesses, rest lengths or both of the springs between pairs of nodes.
 /// `pairs` holds 2 * count indices, the arrays `count` floats each: `stiffnesses` [N/m],
@@ -76,8 +74,7 @@ sinew_status sinew_body_get_springs(const sinew_world *world, sinew_body_id body
 /// force law, positions and velocities stay. On failure no spring changes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 sinew_status sinew_body_set_springs(sinew_world *world, sinew_body_id body, const uint32_t *pairs,
-                                    size_t count, const float *stiffnesses,
-                                    const float *rest_lengths);
+    const float *stiffnesses, const float *rest_lengths, size_t count);
 
 /// Multiplies the stiffness and the rest length of the material between given nodes.
 /// It changes springs, tetrahedra, bending and fibers whose nodes are all among `nodes`, which may
@@ -85,8 +82,7 @@ sinew_status sinew_body_set_springs(sinew_world *world, sinew_body_id body, cons
 /// permanent; `length_factor` is above 0. Repeated calls multiply. Masses, damping, positions and
 /// velocities stay. On failure nothing changes.
 sinew_status sinew_body_scale_region(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     size_t node_count, float stiffness_factor,
-                                     float length_factor);
+    size_t node_count, float stiffness_factor, float length_factor);
 
 // ---- Cavities -----------------------------------------------------------------------------------
 
@@ -107,24 +103,24 @@ typedef struct sinew_enclosed_report {
 
 /// Writes the volume and the pressure of the cavities of a body.
 sinew_status sinew_body_get_enclosed_report(const sinew_world *world, sinew_body_id body,
-                                            sinew_enclosed_report *out);
+    sinew_enclosed_report *out);
 
 // ---- Static equilibrium -------------------------------------------------------------------------
 
-/// Settings of the search for static equilibrium, filled by sinew_rest_state_def_init.
-typedef struct sinew_rest_state_def {
-  size_t struct_size;   ///< Size of this struct; sinew_rest_state_def_init sets it.
+/// Settings of the search for static equilibrium, filled by sinew_equilibrium_def_init.
+typedef struct sinew_equilibrium_def {
+  size_t struct_size;   ///< Size of this struct; sinew_equilibrium_def_init sets it.
   /// [m] Estimated position error allowed; 0 (default): 1e-6 of the body's extent.
   float tolerance;
   uint32_t iterations;  ///< Largest number of matrix-vector products; 0 (default): 1,000,000.
-} sinew_rest_state_def;
+} sinew_equilibrium_def;
 
-/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_rest_state_def).
-sinew_status sinew_rest_state_def_init(sinew_rest_state_def *def, size_t struct_size);
+/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_equilibrium_def).
+sinew_status sinew_equilibrium_def_init(sinew_equilibrium_def *def, size_t struct_size);
 
 /// Report of the search for static equilibrium.
-typedef struct sinew_rest_state_report {
-  size_t struct_size;    ///< Set to sizeof(sinew_rest_state_report) before the call.
+typedef struct sinew_equilibrium_report {
+  size_t struct_size;    ///< Set to sizeof(sinew_equilibrium_report) before the call.
   uint32_t iterations;   ///< Number of linear systems solved.
   uint32_t products;     ///< Number of matrix-vector products.
   /// [N] Largest force left on a free node, before positions are rounded to float.
@@ -133,18 +129,17 @@ typedef struct sinew_rest_state_report {
   /// [J] Energy of springs, gravity and forces before the search, 0 at the origin.
   double energy_before;
   double energy_after;   ///< [J] Energy of springs, gravity and forces after the search.
-} sinew_rest_state_report;
+} sinew_equilibrium_report;
 
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
 /// It is not a step: it allocates and may take seconds. It ignores tools. Velocities become 0,
 /// pending forces stay. The rigid position of unpinned parts is unspecified. `def` (defaults) and
-/// `report` are nullable. It ends the views of the body's positions and velocities. On failure
+/// `out_report` are nullable. It ends the views of the body's positions and velocities. On failure
 /// nothing changes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part;
 /// SINEW_STATUS_UNSTABLE if not found.
-sinew_status sinew_body_rest_state(sinew_world *world, sinew_body_id body,
-                                   const sinew_rest_state_def *def,
-                                   sinew_rest_state_report *report);
+sinew_status sinew_body_solve_equilibrium(sinew_world *world, sinew_body_id body,
+    const sinew_equilibrium_def *def, sinew_equilibrium_report *out_report);
 
 #ifdef __cplusplus
 }

@@ -25,8 +25,7 @@ typedef enum sinew_mesh_format {
   SINEW_MESH_FORMAT_AUTO = 0,   ///< By file name: .obj .stl .vtk .msh .node .ele.
   SINEW_MESH_FORMAT_OBJ = 1,    ///< Wavefront OBJ.
   SINEW_MESH_FORMAT_STL = 2,    ///< STL, binary or ASCII.
-  /// VTK legacy: unstructured grid or polygonal data, ASCII or binary.
-  SINEW_MESH_FORMAT_VTK = 3,
+  SINEW_MESH_FORMAT_VTK = 3,  ///< VTK legacy: unstructured grid or polygonal data, ASCII or binary.
   SINEW_MESH_FORMAT_GMSH = 4,   ///< Gmsh 1, 2 and 4.1, ASCII.
   SINEW_MESH_FORMAT_TETGEN = 5  ///< TetGen .node and .ele with the same base name; name either.
 } sinew_mesh_format;
@@ -84,11 +83,8 @@ typedef struct sinew_mesh_view {
   size_t dropped_vertices;         ///< Number of unused vertices dropped.
   size_t dropped_triangles;        ///< Number of degenerate or duplicate triangles dropped.
   size_t dropped_tetrahedra;       ///< Number of degenerate or duplicate tetrahedra dropped.
-  /// Number of inverted tetrahedra corrected by swapping two nodes.
-  size_t flipped_tetrahedra;
-  /// 1: every surface edge is used equally often in both directions; 0: open.
-  uint32_t closed;
-  uint32_t reserved;               ///< Reserved; set to 0 by the library.
+  size_t flipped_tetrahedra;  ///< Number of inverted tetrahedra corrected by swapping two nodes.
+  uint32_t closed;  ///< 1: every surface edge is used equally often in both directions; 0: open.
   /// 8 * cell_count node indices of lattice cubes; corner bits: x 1, y 2, z 4.
   const uint32_t *cells;
   size_t cell_count;               ///< Number of cells.

@@ -20,8 +20,7 @@ extern "C" {
 /// tetrahedron_count node indices. node_of_vertex of sinew_mesh_view maps the given nodes to those
 /// of the mesh.
 sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
-                               size_t triangle_count, const uint32_t *tetrahedra,
-                               size_t tetrahedron_count, sinew_mesh **out);
+    size_t triangle_count, const uint32_t *tetrahedra, size_t tetrahedron_count, sinew_mesh **out);
 
 /// Creates a mesh of tetrahedra that fills the closed surface of a mesh.
 /// `spacing` [m] is the mean edge length. Nodes and tetrahedra are those of the body that
@@ -44,30 +43,30 @@ sinew_status sinew_body_def_set_mesh(sinew_body_def *def, const sinew_mesh *mesh
 /// nullable: none, none, and the center of the bounding box. Nothing is swept; otherwise like
 /// sinew_body_set_positions.
 sinew_status sinew_body_transform(sinew_world *world, sinew_body_id body, const float *translation,
-                                  const float *rotation, const float *pivot);
+    const float *rotation, const float *pivot);
 
 /// Writes the bounding box of the nodes of a body.
 /// `out_min` [m] and `out_max` [m] receive 3 floats each.
 sinew_status sinew_body_get_bounds(const sinew_world *world, sinew_body_id body, float *out_min,
-                                   float *out_max);
+    float *out_max);
 
 /// Writes the unit normals of the surface of a body at its nodes.
-/// They are area-weighted and point outward; 0 for a node without a triangle. `normals` receives 3
-/// * node_count floats; `node_count` must be the body's number of nodes.
-sinew_status sinew_body_get_normals(const sinew_world *world, sinew_body_id body, float *normals,
-                                    size_t node_count);
+/// They are area-weighted and point outward; 0 for a node without a triangle. `out_normals`
+/// receives 3 * node_count floats; `node_count` must be the body's number of nodes.
+sinew_status sinew_body_get_normals(const sinew_world *world, sinew_body_id body,
+    float *out_normals, size_t node_count);
 
 /// Writes the masses [kg] of all nodes of a body; see sinew_body_get_node_mass.
-/// `masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
-sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body, float *masses,
-                                   size_t node_count);
+/// `out_masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
+sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body, float *out_masses,
+    size_t node_count);
 
 /// Changes the velocities of nodes at once by impulses.
 /// `nodes` holds `count` indices, which may repeat; `impulses` [N s] holds 3 * count floats. They
 /// have no effect on a pinned or attached node, nor along a pinned axis. On failure no velocity
 /// changes.
 sinew_status sinew_body_apply_impulses(sinew_world *world, sinew_body_id body,
-                                       const uint32_t *nodes, const float *impulses, size_t count);
+    const uint32_t *nodes, const float *impulses, size_t count);
 
 /// Sets the factor of the world's gravity on a body, from the next step on.
 /// `scale` is finite: 0 means no gravity.
@@ -81,60 +80,58 @@ sinew_status sinew_body_get_gravity_scale(const sinew_world *world, sinew_body_i
 /// Pins nodes at their current positions; see sinew_body_pin.
 /// `nodes` holds `count` indices. On failure no node changes.
 sinew_status sinew_body_pin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                  size_t count);
+    size_t count);
 
 /// Unpins nodes along all axes; see sinew_body_unpin.
 /// `nodes` holds `count` indices. On failure no node changes.
 sinew_status sinew_body_unpin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                    size_t count);
+    size_t count);
 
 /// Pins all nodes in a box, and writes how many nodes of the box are pinned.
 /// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
 sinew_status sinew_body_pin_box(sinew_world *world, sinew_body_id body, const float *min,
-                                const float *max, size_t *out_count);
+    const float *max, size_t *out_count);
 
 /// Unpins the pinned nodes in a box, except those of mass 0, and writes how many.
 /// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
 sinew_status sinew_body_unpin_box(sinew_world *world, sinew_body_id body, const float *min,
-                                  const float *max, size_t *out_count);
+    const float *max, size_t *out_count);
 
 /// Writes the reaction forces on all nodes, averaged over the last step.
-/// `forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool
+/// `out_forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool
 /// holds. `node_count` must be the body's number of nodes.
-sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body, float *forces,
-                                       size_t node_count);
+sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body,
+    float *out_forces, size_t node_count);
 
 // ---- Tools --------------------------------------------------------------------------------------
 
 /// Writes the pose that the last step moved a tool to, before the force_limit.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats x y z w; both are nullable.
 /// Replaying these poses with sinew_tool_set_pose reproduces the steps, also those that a haptic
 /// handle drove.
-sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool, float *position,
-                                   float *orientation);
+sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool,
+    float *out_position, float *out_orientation);
 
 /// Writes the total force and torque on several tools, averaged over the last step, in world axes.
-/// `tools` holds `count` different ids. `point` [m] is 3 floats. `force` [N] and `torque` [N m],
-/// about `point`, receive 3 floats each; both are nullable.
-sinew_status sinew_tools_get_wrench(const sinew_world *world, const sinew_tool_id *tools,
-                                    size_t count, const float *point, float *force, float *torque);
+/// `tools` holds `count` different ids. `point` [m] is 3 floats. `out_force` [N] and `out_torque`
+/// [N m], about `point`, receive 3 floats each; both are nullable.
+sinew_status sinew_world_get_total_wrench(const sinew_world *world, const sinew_tool_id *tools,
+    size_t count, const float *point, float *out_force, float *out_torque);
 
 /// Contact between a tool and a body that began or ended in the last step.
 typedef struct sinew_contact_change {
   sinew_tool_id tool;  ///< Tool of the contact.
   sinew_body_id body;  ///< Body of the contact.
   uint32_t begun;      ///< 1: the contact began; 0: it ended.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
 } sinew_contact_change;
 
 /// Writes the contacts that began or ended in the last step.
-/// `changes` receives at most `capacity` entries, `count` the number that exist. Destroying a tool
-/// or body does not report an end.
+/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist. Destroying
+/// a tool or body does not report an end.
 sinew_status sinew_world_get_contact_changes(const sinew_world *world,
-                                             sinew_contact_change *changes, size_t capacity,
-                                             size_t *count);
+    sinew_contact_change *out_changes, size_t capacity, size_t *out_count);
 
 /// First body or tool that a ray hits.
 typedef struct sinew_ray_hit {
@@ -146,15 +143,14 @@ typedef struct sinew_ray_hit {
   float position[3];   ///< [m] Position of the hit.
   float normal[3];     ///< Outward unit normal at the hit.
   float distance;      ///< [m] Distance from the origin.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
 } sinew_ray_hit;
 
 /// Finds the first body or tool that a ray with a collision filter hits.
 /// The ray meets bodies and tools as if it had this category and mask. Otherwise like
 /// sinew_world_cast_ray; without a hit both ids are all zero.
 sinew_status sinew_world_cast_ray_filtered(const sinew_world *world, const float *origin,
-                                           const float *direction, float max_distance,
-                                           uint32_t category, uint32_t mask, sinew_ray_hit *out);
+    const float *direction, float max_distance, uint32_t category, uint32_t mask,
+    sinew_ray_hit *out);
 
 // ---- Settings -----------------------------------------------------------------------------------
 
@@ -167,7 +163,7 @@ sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravit
 
 /// Writes the collision category and mask of a body.
 sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
-                                      uint32_t *out_category, uint32_t *out_mask);
+    uint32_t *out_category, uint32_t *out_mask);
 
 /// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
 sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
@@ -180,17 +176,21 @@ sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id 
 
 /// Writes the collision category and mask of a tool.
 sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
-                                      uint32_t *out_category, uint32_t *out_mask);
+    uint32_t *out_category, uint32_t *out_mask);
 
 /// Writes the current pose of a blade.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
-sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade, float *position,
-                                  float *orientation);
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats x y z w; both are nullable.
+sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade,
+    float *out_position, float *out_orientation);
 
 /// Sets the collision category and mask of a blade, from the next step on.
 /// A body that it no longer meets lets go of the blade.
 sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
-                                       uint32_t mask);
+    uint32_t mask);
+
+/// Writes the collision category and mask of a blade.
+sinew_status sinew_blade_get_collision(const sinew_world *world, sinew_blade_id blade,
+    uint32_t *out_category, uint32_t *out_mask);
 
 /// Sets the number of substeps per step and its limit, from the next step on.
 /// See sinew_world_def.
@@ -198,7 +198,7 @@ sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uin
 
 /// Writes the number of substeps per step and its limit; both outputs are nullable.
 sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
-                                      uint32_t *out_max_substeps);
+    uint32_t *out_max_substeps);
 
 /// Settings of a body that can change after creation; see sinew_body_def.
 typedef struct sinew_body_settings {
@@ -216,19 +216,19 @@ typedef struct sinew_body_settings {
 /// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a body that was cut change, other than both
 /// to 0.
 sinew_status sinew_body_set_settings(sinew_world *world, sinew_body_id body,
-                                     const sinew_body_settings *settings);
+    const sinew_body_settings *settings);
 
 /// Writes the settings of a body that can change.
 sinew_status sinew_body_get_settings(const sinew_world *world, sinew_body_id body,
-                                     sinew_body_settings *out);
+    sinew_body_settings *out);
 
 /// Sets the drag [N s/m] on each node of a body, at least 0, from the next step on.
 sinew_status sinew_body_set_node_damping(sinew_world *world, sinew_body_id body,
-                                         float node_damping);
+    float node_damping);
 
 /// Writes the drag [N s/m] on a node.
 sinew_status sinew_body_get_node_damping(const sinew_world *world, sinew_body_id body,
-                                         uint32_t node, float *out);
+    uint32_t node, float *out);
 
 /// Advances the world by at most `work` units of work.
 /// A unit is one substep of each VERLET body or one matrix-vector product of each other body. The
@@ -238,13 +238,13 @@ sinew_status sinew_body_get_node_damping(const sinew_world *world, sinew_body_id
 /// motion. `report` is nullable.
 /// Errors: SINEW_STATUS_UNSUPPORTED with fixed substeps or a tolerance.
 sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t work,
-                                          sinew_step_report *report);
+    sinew_step_report *report);
 
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
 /// The first calls do little work and measure. A step can be late if the machine or the scene
 /// became slower. For a bitwise replay record `work` of `report`.
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
-                                     sinew_step_report *report);
+    sinew_step_report *report);
 
 // ---- Ids and user data --------------------------------------------------------------------------
 

@@ -21,7 +21,6 @@ typedef struct sinew_surface_point {
   float position[3];   ///< [m] Position of the point.
   float normal[3];     ///< Outward unit normal of the triangle; 0 if it has no area.
   float distance;      ///< [m] Distance from the query point.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
 } sinew_surface_point;
 
 /// Finds the first body surface point that a ray hits.
@@ -30,14 +29,13 @@ typedef struct sinew_surface_point {
 /// the ray is not hit. The first query near a body builds a tree, which may allocate; nodes that
 /// moved refit it.
 sinew_status sinew_world_cast_ray(const sinew_world *world, const float *origin,
-                                  const float *direction, float max_distance,
-                                  sinew_surface_point *out);
+    const float *direction, float max_distance, sinew_surface_point *out);
 
 /// Finds the body surface point that is nearest to a point.
 /// `point` [m] is 3 floats; `max_distance` [m] is at least 0. If no surface is within it out->body
 /// is all zero. It uses the trees of sinew_world_cast_ray.
 sinew_status sinew_world_find_nearest(const sinew_world *world, const float *point,
-                                      float max_distance, sinew_surface_point *out);
+    float max_distance, sinew_surface_point *out);
 
 // ---- Overlap ------------------------------------------------------------------------------------
 
@@ -60,8 +58,7 @@ typedef struct sinew_detector_def {
   /// SINEW_DETECTION_EXACT (default) or IMAGE_SPACE. EXACT ignores the other settings, but
   /// thickness must be 0. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
   uint32_t detection;
-  /// IMAGE_SPACE: a sinew_image_form value; default SINEW_IMAGE_FORM_INTERVALS.
-  uint32_t form;
+  uint32_t form;  ///< IMAGE_SPACE: a sinew_image_form value; default SINEW_IMAGE_FORM_INTERVALS.
   /// [m] IMAGE_SPACE: pixel size, above 0; no default. 1/256 of the body finds 99.9 % of edges.
   float pixel;
   /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes in turn. Depths are
@@ -93,7 +90,7 @@ typedef struct sinew_detector sinew_detector;
 /// are open; with EXACT also if a closed surface is inverted, self-intersecting or degenerate.
 /// SINEW_STATUS_UNSUPPORTED for SINEW_DETECTION_DISTANCE_FIELD.
 sinew_status sinew_detector_create(const sinew_world *world, const sinew_detector_def *def,
-                                   sinew_detector **out);
+    sinew_detector **out);
 
 /// Destroys a detector and ends its lists and views; NULL has no effect.
 void sinew_detector_destroy(sinew_detector *detector);
@@ -109,12 +106,10 @@ typedef struct sinew_detector_report {
   float pixel;               ///< [m] Largest pixel size used; 0 with EXACT.
   uint32_t point_counts[2];  ///< Number of entries of sinew_detector_get_points.
   uint32_t edge_counts[2];   ///< Number of entries of sinew_detector_get_edges.
-  /// Number of edge parts beyond the capacity of four per edge on average.
-  uint32_t unlisted[2];
+  uint32_t unlisted[2];  ///< Number of edge parts beyond the capacity of four per edge on average.
   /// 1: the body is closed; 0: it is open, and nothing is found inside it. A detector made for an
   /// open body does not check again.
   uint32_t closed[2];
-  uint32_t reserved;         ///< Reserved; set to 0 by the library.
 } sinew_detector_report;
 
 /// Finds the overlap of the two bodies at their current positions.
@@ -124,7 +119,7 @@ typedef struct sinew_detector_report {
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface;
 /// SINEW_STATUS_CAPACITY if one ray has more than `crossings`.
 sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,
-                                 sinew_detector_report *report);
+    sinew_detector_report *out_report);
 
 #define SINEW_NO_TRIANGLE UINT32_MAX  ///< Value of `triangle` if there is none.
 
@@ -144,7 +139,7 @@ typedef struct sinew_point_inside {
 /// COUNTED.
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
 sinew_status sinew_detector_get_points(const sinew_detector *detector, uint32_t side,
-                                       const sinew_point_inside **points, size_t *count);
+    const sinew_point_inside **out_points, size_t *out_count);
 
 /// Part of an edge of a body that lies inside the other body.
 typedef struct sinew_edge_inside {
@@ -161,14 +156,14 @@ typedef struct sinew_edge_inside {
 /// before the first search.
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
 sinew_status sinew_detector_get_edges(const sinew_detector *detector, uint32_t side,
-                                      const sinew_edge_inside **edges, size_t *count);
+    const sinew_edge_inside **out_edges, size_t *out_count);
 
 /// Writes a view of the gradient [m^2] of the overlap volume at each node of one body.
 /// `side` 0 is the first body, 1 the second. Moving the nodes against it separates the bodies. It
 /// is empty before the first search, with COUNTED or EXACT, and if a body is open.
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
 sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_t side,
-                                         sinew_dvec3_view *out);
+    sinew_dvec3_view *out);
 
 #ifdef __cplusplus
 }

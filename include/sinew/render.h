@@ -43,7 +43,7 @@ typedef struct sinew_embedding sinew_embedding;
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if no tetrahedron has a volume, or the body has no
 /// surface.
 sinew_status sinew_embedding_create(const sinew_world *world, sinew_body_id body,
-                                    const sinew_embedding_def *def, sinew_embedding **out);
+    const sinew_embedding_def *def, sinew_embedding **out);
 
 /// Destroys an embedding and ends its views; NULL has no effect.
 void sinew_embedding_destroy(sinew_embedding *embedding);
@@ -62,7 +62,7 @@ sinew_status sinew_embedding_update(sinew_embedding *embedding, const sinew_worl
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body had another number of nodes at the last
 /// sinew_embedding_update.
 sinew_status sinew_embedding_update_from(sinew_embedding *embedding, const float *positions,
-                                         size_t node_count);
+    size_t node_count);
 
 /// Writes a view of the vertex positions [m], in the given order.
 /// Lifetime: until the embedding is destroyed; updates change its contents.
@@ -71,7 +71,7 @@ sinew_status sinew_embedding_get_positions(const sinew_embedding *embedding, sin
 /// Writes a view of the triangles, in the given order, without those across a cut.
 /// Lifetime: until the first update after the next cut, or the embedding's destruction.
 sinew_status sinew_embedding_get_triangles(const sinew_embedding *embedding,
-                                           sinew_triangle_view *out);
+    sinew_triangle_view *out);
 
 /// Computes the unit vertex normals if needed, and writes a view of them.
 /// They are area-weighted and point outward; 0 without area. The view is empty without triangles.
@@ -87,8 +87,7 @@ sinew_status sinew_embedding_get_normals(sinew_embedding *embedding, sinew_vec3_
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` is too fine
 /// or too coarse, or elements, springs, rest positions or lists of values are given.
 sinew_status sinew_body_create_from_surface(sinew_world *world, const sinew_body_def *def,
-                                            float spacing, sinew_body_id *out_body,
-                                            sinew_embedding **out_embedding);
+    float spacing, sinew_body_id *out_body, sinew_embedding **out_embedding);
 
 // ---- Readers ------------------------------------------------------------------------------------
 
@@ -114,14 +113,12 @@ typedef struct sinew_frame {
   sinew_vec3_view positions;      ///< [m] Node positions, with the nodes added by cuts.
   /// Triangles of sinew_body_get_triangles; they change only with topology_version.
   sinew_triangle_view triangles;
-  /// Number of the frame; larger than before if the body was moved.
-  uint64_t version;
+  uint64_t version;  ///< Number of the frame; larger than before if the body was moved.
   uint64_t topology_version;      ///< Version of sinew_body_get_topology_changes at that moment.
   uint64_t step;                  ///< Number of steps that the world had taken.
   double time;                    ///< [s] Sum of the lengths of these steps.
   uint32_t is_new;                ///< 1: this reader did not read this frame before.
-  /// 1: the body or its world was destroyed, and this is its last frame.
-  uint32_t is_over;
+  uint32_t is_over;  ///< 1: the body or its world was destroyed, and this is its last frame.
 } sinew_frame;
 
 /// Writes the latest frame of the body without copying, allocating, locking or waiting.

@@ -9,12 +9,12 @@
 #define SINEW_BODY_H
 #define SINEW_TOOL_H
 #define SINEW_MATERIAL_H
+#define SINEW_QUERY_H
 #define SINEW_ATTACHMENT_H
 #define SINEW_CUTTING_H
 #define SINEW_HAPTICS_H
 #define SINEW_DYNAMICS_H
 #define SINEW_RENDER_H
-#define SINEW_QUERY_H
 #define SINEW_MORE_H
 #define SINEW_SNAPSHOT_H
 #define SINEW_DIAGNOSTICS_H
@@ -38,7 +38,7 @@ extern "C" {
 // lists only errors that are special. Every call may return
 //   SINEW_STATUS_INVALID_ARGUMENT for NULL where a comment does not say "nullable", NaN or infinity
 //     where a comment does not allow it, an index out of range, an unknown enum value, a negative
-//     mass or stiffness, a reserved field that is not 0, or an unknown struct_size;
+//     mass or stiffness, a field `reserved` that is not 0, or an unknown struct_size;
 //   SINEW_STATUS_STALE_ID for the id of a destroyed object;
 //   SINEW_STATUS_OUT_OF_MEMORY if it allocates;
 //   SINEW_STATUS_INTERNAL after a fault inside the library.
@@ -210,7 +210,6 @@ typedef struct sinew_world_def {
   sinew_run_tasks run_tasks;
   void *tasks_context;        ///< First argument of run_tasks; nullable.
   uint32_t kernel;            ///< SIMD level, a sinew_kernel value; default SINEW_KERNEL_BEST.
-  uint32_t reserved2;         ///< Reserved; must be 0.
 } sinew_world_def;
 
 /// Fills a world definition with its defaults; `struct_size` is sizeof(sinew_world_def).
@@ -283,8 +282,7 @@ typedef enum sinew_mesh_format {
   SINEW_MESH_FORMAT_AUTO = 0,   ///< By file name: .obj .stl .vtk .msh .node .ele.
   SINEW_MESH_FORMAT_OBJ = 1,    ///< Wavefront OBJ.
   SINEW_MESH_FORMAT_STL = 2,    ///< STL, binary or ASCII.
-  /// VTK legacy: unstructured grid or polygonal data, ASCII or binary.
-  SINEW_MESH_FORMAT_VTK = 3,
+  SINEW_MESH_FORMAT_VTK = 3,  ///< VTK legacy: unstructured grid or polygonal data, ASCII or binary.
   SINEW_MESH_FORMAT_GMSH = 4,   ///< Gmsh 1, 2 and 4.1, ASCII.
   SINEW_MESH_FORMAT_TETGEN = 5  ///< TetGen .node and .ele with the same base name; name either.
 } sinew_mesh_format;
@@ -342,11 +340,8 @@ typedef struct sinew_mesh_view {
   size_t dropped_vertices;         ///< Number of unused vertices dropped.
   size_t dropped_triangles;        ///< Number of degenerate or duplicate triangles dropped.
   size_t dropped_tetrahedra;       ///< Number of degenerate or duplicate tetrahedra dropped.
-  /// Number of inverted tetrahedra corrected by swapping two nodes.
-  size_t flipped_tetrahedra;
-  /// 1: every surface edge is used equally often in both directions; 0: open.
-  uint32_t closed;
-  uint32_t reserved;               ///< Reserved; set to 0 by the library.
+  size_t flipped_tetrahedra;  ///< Number of inverted tetrahedra corrected by swapping two nodes.
+  uint32_t closed;  ///< 1: every surface edge is used equally often in both directions; 0: open.
   /// 8 * cell_count node indices of lattice cubes; corner bits: x 1, y 2, z 4.
   const uint32_t *cells;
   size_t cell_count;               ///< Number of cells.
@@ -365,10 +360,8 @@ sinew_status sinew_mesh_get_view(const sinew_mesh *mesh, sinew_mesh_view *out);
 /// Memory layout of the springs of a body.
 typedef enum sinew_storage {
   SINEW_STORAGE_PACKED = 0,       ///< Layout optimized for the processor; default.
-  /// Linked list per node, one allocation per link; for comparison.
-  SINEW_STORAGE_EFFICIENT = 1,
-  /// One array with springs_per_node slots per node; for comparison.
-  SINEW_STORAGE_FAST_LINK = 2,
+  SINEW_STORAGE_EFFICIENT = 1,  ///< Linked list per node, one allocation per link; for comparison.
+  SINEW_STORAGE_FAST_LINK = 2,  ///< One array with springs_per_node slots per node; for comparison.
   /// Chain of arrays of springs_per_node slots per node; for comparison.
   SINEW_STORAGE_DYNAMIC_BULK = 3
 } sinew_storage;
@@ -425,8 +418,7 @@ typedef struct sinew_body_def {
   const float *node_dampings;
   /// [kg] Mass of each node, at least 1e-37; no default. Must be 0 if density is set.
   float node_mass;
-  /// [N s/m] Drag on each node: force = -node_damping * velocity; default 0.
-  float node_damping;
+  float node_damping;  ///< [N s/m] Drag on each node: force = -node_damping * velocity; default 0.
   /// 2 * spring_count node indices, each pair once; nullable: the element edges, each once. NULL
   /// excludes the arrays with one value per spring. A pointer with spring_count 0 means no springs.
   const uint32_t *springs;
@@ -487,16 +479,14 @@ typedef struct sinew_body_def {
   /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
   /// Every node must then belong to an element, masses must be NULL and node_mass 0.
   float density;
-  /// [m] Thickness of a material that fills triangles, above 0; else 0.
-  float thickness;
+  float thickness;  ///< [m] Thickness of a material that fills triangles, above 0; else 0.
   /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0. 0.3
   /// to 0.6 of Young's modulus lets a body of springs recover from inversion. 0 with TETRAHEDRA.
   float volume_stiffness;
   /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness. An
   /// anchor spring pulls a node to its rest position in the world.
   const float *home_stiffnesses;
-  /// [N/m] Stiffness of each anchor spring; default 0: no anchor springs.
-  float home_stiffness;
+  float home_stiffness;  ///< [N/m] Stiffness of each anchor spring; default 0: no anchor springs.
   /// [N m] Flexural rigidity of the triangles, at least 0; default 0. A sheet of thickness t has E
   /// t^3 / (12 (1 - nu^2)). The rest angle of each edge may be any. An edge of more than two
   /// triangles is refused. Exact for equilateral triangles. sinew_body_remove_spring removes the
@@ -509,8 +499,7 @@ typedef struct sinew_body_def {
   float spring_cubic;              ///< CUBIC: cubic coefficient, at least 0; else 0.
   /// EXPONENTIAL, CUBIC: strain beyond which the law is linear, above 0; else 0.
   float spring_limit;
-  /// [Pa] Fiber stiffness of each tetrahedron, at least 0; default 0.
-  float fibre_stiffness;
+  float fibre_stiffness;  ///< [Pa] Fiber stiffness of each tetrahedron, at least 0; default 0.
   /// 3 * tetrahedron_count floats: unit fiber directions at rest, or 0 for no fibers; nullable.
   /// Fibers pull in proportion to their extension, over the cross section at rest. They never push.
   const float *fibre_directions;
@@ -597,12 +586,10 @@ typedef struct sinew_body_def {
   /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
   uint32_t element_law;
   float mooney_ratio;              ///< MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
-  /// [m] Translation of all positions, after the rotation; default 0 0 0.
-  float position[3];
+  float position[3];  ///< [m] Translation of all positions, after the rotation; default 0 0 0.
   /// Rotation of all positions and fibers about the origin, x y z w, not zero; default 0 0 0 1.
   float orientation[4];
-  /// Factor of the world's gravity on this body, finite; default 1.
-  float gravity_scale;
+  float gravity_scale;  ///< Factor of the world's gravity on this body, finite; default 1.
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
@@ -619,32 +606,32 @@ sinew_status sinew_body_destroy(sinew_world *world, sinew_body_id body);
 
 /// Writes a view of the node positions [m] without copying.
 /// Lifetime: until the next step, sinew_body_set_positions, sinew_body_set_velocities,
-/// sinew_body_rest_state or topology change of the body, or its destruction.
+/// sinew_body_solve_equilibrium or topology change of the body, or its destruction.
 sinew_status sinew_body_get_positions(const sinew_world *world, sinew_body_id body,
-                                      sinew_vec3_view *out);
+    sinew_vec3_view *out);
 
 /// Writes a view of the node velocities [m/s] at the time of the positions.
 /// A pinned node has the velocity of its pin in the last step. The first call after a step computes
 /// the velocities, at the cost of about one substep. Lifetime: as for sinew_body_get_positions.
 sinew_status sinew_body_get_velocities(const sinew_world *world, sinew_body_id body,
-                                       sinew_vec3_view *out);
+    sinew_vec3_view *out);
 
 /// Moves all nodes to new positions without a sweep.
 /// `positions` [m] holds 3 * node_count floats. Velocities stay. Pinned nodes move too, and
 /// attached nodes stay attached at their new positions. `node_count` must be the body's.
 sinew_status sinew_body_set_positions(sinew_world *world, sinew_body_id body,
-                                      const float *positions, size_t node_count);
+    const float *positions, size_t node_count);
 
 /// Sets the velocities of all nodes.
 /// `velocities` [m/s] holds 3 * node_count floats. Pinned nodes and pinned axes keep theirs.
 /// `node_count` must be the body's number of nodes.
 sinew_status sinew_body_set_velocities(sinew_world *world, sinew_body_id body,
-                                       const float *velocities, size_t node_count);
+    const float *velocities, size_t node_count);
 
 /// Writes a view of the render and contact surface: the triangles of a body after all cuts.
 /// Lifetime: until the next topology change of the body, or its destruction.
 sinew_status sinew_body_get_triangles(const sinew_world *world, sinew_body_id body,
-                                      sinew_triangle_view *out);
+    sinew_triangle_view *out);
 
 /// Writes 1 if the surface of a body is closed, else 0.
 /// Only a closed body pushes out what is inside it. Removing a spring on its surface opens it.
@@ -652,7 +639,7 @@ sinew_status sinew_body_is_closed(const sinew_world *world, sinew_body_id body, 
 
 /// Writes the mass of a node [kg]; 0 for a permanent pin or a node bound to others.
 sinew_status sinew_body_get_node_mass(const sinew_world *world, sinew_body_id body, uint32_t node,
-                                      float *out);
+    float *out);
 
 // ---- Forces -------------------------------------------------------------------------------------
 
@@ -660,13 +647,13 @@ sinew_status sinew_body_get_node_mass(const sinew_world *world, sinew_body_id bo
 /// `force` [N] points to 3 floats. Forces are constant during the step and cleared when it
 /// succeeds. They have no effect on a pinned or attached node, nor along a pinned axis.
 sinew_status sinew_body_apply_force(sinew_world *world, sinew_body_id body, uint32_t node,
-                                    const float *force);
+    const float *force);
 
 /// Adds a force to each of many nodes for the whole next step.
 /// `nodes` holds `count` indices, which may repeat; `forces` [N] holds 3 * count floats. See
 /// sinew_body_apply_force. On failure no force is added.
 sinew_status sinew_body_apply_forces(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     const float *forces, size_t count);
+    const float *forces, size_t count);
 
 // ---- Pins ---------------------------------------------------------------------------------------
 
@@ -683,7 +670,7 @@ sinew_status sinew_body_pin(sinew_world *world, sinew_body_id body, uint32_t nod
 /// keeps the velocity of its pin. Changing the axes cancels a pending sinew_body_move_pin.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds it, or a node of mass 0 would be free.
 sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_t node,
-                                 uint32_t axes);
+    uint32_t axes);
 
 /// Unpins a node along all axes; no effect on a free node.
 /// The node keeps the velocity of its pin in the last step.
@@ -695,20 +682,20 @@ sinew_status sinew_body_unpin(sinew_world *world, sinew_body_id body, uint32_t n
 /// floats.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_move_pin(sinew_world *world, sinew_body_id body, uint32_t node,
-                                 const float *position);
+    const float *position);
 
 /// Writes the reaction force on a pinned node, averaged over the last step.
 /// `force` [N] receives 3 floats, 0 along free axes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_get_pin_force(const sinew_world *world, sinew_body_id body, uint32_t node,
-                                      float *force);
+    float *force);
 
 // ---- Collision and sleep ------------------------------------------------------------------------
 
 /// Sets the collision category and mask of a body from the next step on.
 /// See sinew_body_def. Tools and bodies inside it are pushed out once they collide with it.
 sinew_status sinew_body_set_collision(sinew_world *world, sinew_body_id body, uint32_t category,
-                                      uint32_t mask);
+    uint32_t mask);
 
 /// Wakes all nodes of a body until they come to rest again.
 /// Forces, contacts, cuts and property changes wake a body automatically.
@@ -738,8 +725,7 @@ typedef enum sinew_shape {
 typedef struct sinew_tool_def {
   size_t struct_size;           ///< Size of this struct; sinew_tool_def_init sets it.
   uint32_t shape;               ///< Shape of the tool, a sinew_shape value.
-  /// [m] Sphere, capsule: above 0, at most 1e9 with half_length added; no default.
-  float radius;
+  float radius;  ///< [m] Sphere, capsule: above 0, at most 1e9 with half_length added; no default.
   /// [m] Capsule: distance from the center to the center of a cap, at least 0. IMAGE_SPACE allows
   /// at most 10,000 times the radius. Contact points are accurate to 1e-7 of it.
   float half_length;
@@ -752,8 +738,7 @@ typedef struct sinew_tool_def {
   /// Contact detection, a sinew_detection value; default SINEW_DETECTION_EXACT.
   uint32_t detection;
   float friction;               ///< Coulomb coefficient, at least 0; default 0.
-  /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
-  float position[3];
+  float position[3];  ///< [m] Initial position, each coordinate within 1e9; default 0 0 0.
   /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
   float orientation[4];
   uint32_t reserved;            ///< Reserved; must be 0.
@@ -772,7 +757,6 @@ typedef struct sinew_tool_def {
   uint32_t collision_mask;
   /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
   float half_extents[3];
-  uint32_t reserved1;           ///< Reserved; must be 0.
 } sinew_tool_def;
 
 /// Fills a tool definition with its defaults; `struct_size` is sizeof(sinew_tool_def).
@@ -794,13 +778,13 @@ sinew_status sinew_tool_destroy(sinew_world *world, sinew_tool_id tool);
 /// step.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const float *position,
-                                 const float *orientation);
+    const float *orientation);
 
 /// Writes the current pose of a tool.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. A tool
-/// with a force_limit can be short of its commanded pose.
-sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *position,
-                                 float *orientation);
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats x y z w; both are nullable.
+/// A tool with a force_limit can be short of its commanded pose.
+sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *out_position,
+    float *out_orientation);
 
 /// Sets the friction coefficient of a tool, at least 0, from the next step on.
 sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, float friction);
@@ -812,7 +796,7 @@ sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, 
 /// Sets the collision category and mask of a tool from the next step on.
 /// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
 sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, uint32_t category,
-                                      uint32_t mask);
+    uint32_t mask);
 
 // ---- Forces and contacts ------------------------------------------------------------------------
 
@@ -820,7 +804,7 @@ sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, ui
 /// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each; both are
 /// nullable.
 sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool, float *force,
-                                   float *torque);
+    float *torque);
 
 /// Contact between a tool and a body at the end of the last step.
 typedef struct sinew_contact {
@@ -836,9 +820,9 @@ typedef struct sinew_contact {
 } sinew_contact;
 
 /// Writes the contacts of a tool at the end of the last step.
-/// `contacts` receives at most `capacity` entries, `count` the number that exist.
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist.
 sinew_status sinew_tool_get_contacts(const sinew_world *world, sinew_tool_id tool,
-                                     sinew_contact *contacts, size_t capacity, size_t *count);
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
 
 // sinew/material.h: tissue values, springs, pressure and static equilibrium.
 
@@ -853,7 +837,6 @@ typedef struct sinew_material_preset {
   float shear_modulus;  ///< [Pa] Shear modulus as the source gives it.
   float young_modulus;  ///< [Pa] Young's modulus: 3 times the shear modulus (incompressible).
   float density;        ///< [kg/m^3] Mass density.
-  uint32_t reserved;    ///< Reserved; set to 0 by the library.
 } sinew_material_preset;
 
 /// Tissues with values from the literature.
@@ -879,27 +862,26 @@ sinew_status sinew_material_get_preset(uint32_t preset, sinew_material_preset *o
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the pair has a spring; SINEW_STATUS_CAPACITY if a node
 /// has no free slot (FAST_LINK).
 sinew_status sinew_body_add_spring(sinew_world *world, sinew_body_id body, uint32_t a, uint32_t b,
-                                   float stiffness, float rest_length);
+    float stiffness, float rest_length);
 
 /// Removes the spring between two nodes, with the elements and the bending of that edge.
 /// Elements are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the edge.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if there is nothing between the nodes.
 sinew_status sinew_body_remove_spring(sinew_world *world, sinew_body_id body, uint32_t a,
-                                      uint32_t b);
+    uint32_t b);
 
 /// Writes the two nodes of each spring, each spring once, the lower node first.
-/// `pairs` receives 2 * count indices; `count` must be spring_count of
+/// `out_pairs` receives 2 * count indices; `count` must be spring_count of
 /// sinew_body_get_storage_report. The order stays until springs are added or removed.
 sinew_status sinew_body_get_spring_pairs(const sinew_world *world, sinew_body_id body,
-                                         uint32_t *pairs, size_t count);
+    uint32_t *out_pairs, size_t count);
 
 /// Writes the stiffnesses and rest lengths of the springs between pairs of nodes.
-/// `pairs` holds 2 * count indices. `stiffnesses` [N/m] and `rest_lengths` [m] receive `count`
-/// floats each and are nullable. PACKED merges rest lengths that differ only by rounding.
+/// `pairs` holds 2 * count indices. `out_stiffnesses` [N/m] and `out_rest_lengths` [m] receive
+/// `count` floats each and are nullable. PACKED merges rest lengths that differ only by rounding.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 sinew_status sinew_body_get_springs(const sinew_world *world, sinew_body_id body,
-                                    const uint32_t *pairs, size_t count, float *stiffnesses,
-                                    float *rest_lengths);
+    const uint32_t *pairs, size_t count, float *out_stiffnesses, float *out_rest_lengths);
 
 /// Sets stiffnesses, rest lengths or both of the springs between pairs of nodes.
 /// `pairs` holds 2 * count indices, the arrays `count` floats each: `stiffnesses` [N/m],
@@ -907,8 +889,7 @@ sinew_status sinew_body_get_springs(const sinew_world *world, sinew_body_id body
 /// force law, positions and velocities stay. On failure no spring changes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 sinew_status sinew_body_set_springs(sinew_world *world, sinew_body_id body, const uint32_t *pairs,
-                                    size_t count, const float *stiffnesses,
-                                    const float *rest_lengths);
+    const float *stiffnesses, const float *rest_lengths, size_t count);
 
 /// Multiplies the stiffness and the rest length of the material between given nodes.
 /// It changes springs, tetrahedra, bending and fibers whose nodes are all among `nodes`, which may
@@ -916,8 +897,7 @@ sinew_status sinew_body_set_springs(sinew_world *world, sinew_body_id body, cons
 /// permanent; `length_factor` is above 0. Repeated calls multiply. Masses, damping, positions and
 /// velocities stay. On failure nothing changes.
 sinew_status sinew_body_scale_region(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     size_t node_count, float stiffness_factor,
-                                     float length_factor);
+    size_t node_count, float stiffness_factor, float length_factor);
 
 // ---- Cavities -----------------------------------------------------------------------------------
 
@@ -938,24 +918,24 @@ typedef struct sinew_enclosed_report {
 
 /// Writes the volume and the pressure of the cavities of a body.
 sinew_status sinew_body_get_enclosed_report(const sinew_world *world, sinew_body_id body,
-                                            sinew_enclosed_report *out);
+    sinew_enclosed_report *out);
 
 // ---- Static equilibrium -------------------------------------------------------------------------
 
-/// Settings of the search for static equilibrium, filled by sinew_rest_state_def_init.
-typedef struct sinew_rest_state_def {
-  size_t struct_size;   ///< Size of this struct; sinew_rest_state_def_init sets it.
+/// Settings of the search for static equilibrium, filled by sinew_equilibrium_def_init.
+typedef struct sinew_equilibrium_def {
+  size_t struct_size;   ///< Size of this struct; sinew_equilibrium_def_init sets it.
   /// [m] Estimated position error allowed; 0 (default): 1e-6 of the body's extent.
   float tolerance;
   uint32_t iterations;  ///< Largest number of matrix-vector products; 0 (default): 1,000,000.
-} sinew_rest_state_def;
+} sinew_equilibrium_def;
 
-/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_rest_state_def).
-sinew_status sinew_rest_state_def_init(sinew_rest_state_def *def, size_t struct_size);
+/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_equilibrium_def).
+sinew_status sinew_equilibrium_def_init(sinew_equilibrium_def *def, size_t struct_size);
 
 /// Report of the search for static equilibrium.
-typedef struct sinew_rest_state_report {
-  size_t struct_size;    ///< Set to sizeof(sinew_rest_state_report) before the call.
+typedef struct sinew_equilibrium_report {
+  size_t struct_size;    ///< Set to sizeof(sinew_equilibrium_report) before the call.
   uint32_t iterations;   ///< Number of linear systems solved.
   uint32_t products;     ///< Number of matrix-vector products.
   /// [N] Largest force left on a free node, before positions are rounded to float.
@@ -964,83 +944,217 @@ typedef struct sinew_rest_state_report {
   /// [J] Energy of springs, gravity and forces before the search, 0 at the origin.
   double energy_before;
   double energy_after;   ///< [J] Energy of springs, gravity and forces after the search.
-} sinew_rest_state_report;
+} sinew_equilibrium_report;
 
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
 /// It is not a step: it allocates and may take seconds. It ignores tools. Velocities become 0,
 /// pending forces stay. The rigid position of unpinned parts is unspecified. `def` (defaults) and
-/// `report` are nullable. It ends the views of the body's positions and velocities. On failure
+/// `out_report` are nullable. It ends the views of the body's positions and velocities. On failure
 /// nothing changes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part;
 /// SINEW_STATUS_UNSTABLE if not found.
-sinew_status sinew_body_rest_state(sinew_world *world, sinew_body_id body,
-                                   const sinew_rest_state_def *def,
-                                   sinew_rest_state_report *report);
+sinew_status sinew_body_solve_equilibrium(sinew_world *world, sinew_body_id body,
+    const sinew_equilibrium_def *def, sinew_equilibrium_report *out_report);
+
+// sinew/query.h: rays, nearest points and the overlap of two bodies.
+
+// ---- Surface points -----------------------------------------------------------------------------
+
+/// Point on the surface of a body.
+typedef struct sinew_surface_point {
+  size_t struct_size;  ///< Set to sizeof(sinew_surface_point) before the call.
+  sinew_body_id body;  ///< Body of the point; all zero if nothing was found, and the rest is 0.
+  uint32_t triangle;   ///< Index of the triangle in the body's surface.
+  float weights[3];    ///< Weights of the triangle's corners, with sum 1.
+  float position[3];   ///< [m] Position of the point.
+  float normal[3];     ///< Outward unit normal of the triangle; 0 if it has no area.
+  float distance;      ///< [m] Distance from the query point.
+} sinew_surface_point;
+
+/// Finds the first body surface point that a ray hits.
+/// `origin` [m] and `direction` are 3 floats each; the direction may have any length but 0.
+/// `max_distance` [m] is at least 0. Without a hit out->body is all zero. A triangle parallel to
+/// the ray is not hit. The first query near a body builds a tree, which may allocate; nodes that
+/// moved refit it.
+sinew_status sinew_world_cast_ray(const sinew_world *world, const float *origin,
+    const float *direction, float max_distance, sinew_surface_point *out);
+
+/// Finds the body surface point that is nearest to a point.
+/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. If no surface is within it out->body
+/// is all zero. It uses the trees of sinew_world_cast_ray.
+sinew_status sinew_world_find_nearest(const sinew_world *world, const float *point,
+    float max_distance, sinew_surface_point *out);
+
+// ---- Overlap ------------------------------------------------------------------------------------
+
+/// Contents of the images of a detector.
+typedef enum sinew_image_form {
+  /// Intervals of each pixel's ray inside a body; finds every edge, and points deeper than 0.71
+  /// pixels.
+  SINEW_IMAGE_FORM_INTERVALS = 0,
+  /// CInDeR (Halic et al., section 2.1): edges in a depth buffer, faces in front counted; for
+  /// comparison. Of edges that share a pixel only the nearest is found. No points and no volume.
+  SINEW_IMAGE_FORM_COUNTED = 1
+} sinew_image_form;
+
+/// Bodies and method of a detector.
+/// Filled by sinew_detector_def_init; read only during sinew_detector_create.
+typedef struct sinew_detector_def {
+  size_t struct_size;       ///< Size of this struct; sinew_detector_def_init sets it.
+  /// First and second body with surfaces, at least one of them closed; no default.
+  sinew_body_id bodies[2];
+  /// SINEW_DETECTION_EXACT (default) or IMAGE_SPACE. EXACT ignores the other settings, but
+  /// thickness must be 0. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
+  uint32_t detection;
+  uint32_t form;  ///< IMAGE_SPACE: a sinew_image_form value; default SINEW_IMAGE_FORM_INTERVALS.
+  /// [m] IMAGE_SPACE: pixel size, above 0; no default. 1/256 of the body finds 99.9 % of edges.
+  float pixel;
+  /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes in turn. Depths are
+  /// measured along the view. They exceed the shortest distance by about 2 % of the size with three
+  /// axes and by about 6 % with one.
+  float direction[3];
+  /// IMAGE_SPACE: capacity of an image in pixels, 1 to 2^24; default 2^18. If it is too small, the
+  /// pixel size doubles until the image fits.
+  uint32_t pixels;
+  /// INTERVALS: capacity of ray-face crossings per body and image, at least 1; default 2^20. If it
+  /// is too small, the pixel size doubles. The default capacities take about 18 MB.
+  uint32_t crossings;
+  /// [m] IMAGE_SPACE: added thickness of each body along the view, at least 0; default 0 0. It
+  /// keeps thin parts from being missed, and adds to depths and volume.
+  float thickness[2];
+} sinew_detector_def;
+
+/// Fills a detector definition with its defaults; `struct_size` is sizeof(sinew_detector_def).
+sinew_status sinew_detector_def_init(sinew_detector_def *def, size_t struct_size);
+
+/// Detector of the overlap of two bodies; it applies no forces.
+/// The caller owns it; it may outlive its world. Any number of threads may use a `const
+/// sinew_detector *` at the same time; a `sinew_detector *` needs exclusive access.
+typedef struct sinew_detector sinew_detector;
+
+/// Creates a detector for two bodies and allocates its memory, without a first search.
+/// Destroy it with sinew_detector_destroy.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bodies are the same, one has no surface, or both
+/// are open; with EXACT also if a closed surface is inverted, self-intersecting or degenerate.
+/// SINEW_STATUS_UNSUPPORTED for SINEW_DETECTION_DISTANCE_FIELD.
+sinew_status sinew_detector_create(const sinew_world *world, const sinew_detector_def *def,
+    sinew_detector **out);
+
+/// Destroys a detector and ends its lists and views; NULL has no effect.
+void sinew_detector_destroy(sinew_detector *detector);
+
+/// Overlap that a detector found; index 0 is the first body, 1 the second.
+typedef struct sinew_detector_report {
+  size_t struct_size;        ///< Set to sizeof(sinew_detector_report) before the call.
+  /// [m^3] INTERVALS: overlap volume, mean over the views; 0 with an open body, COUNTED or EXACT.
+  double volume;
+  /// Unit direction that moves the first body out of the second fastest; 0 without volume.
+  float normal[3];
+  float depth;               ///< [m] Linear estimate of the distance to move it.
+  float pixel;               ///< [m] Largest pixel size used; 0 with EXACT.
+  uint32_t point_counts[2];  ///< Number of entries of sinew_detector_get_points.
+  uint32_t edge_counts[2];   ///< Number of entries of sinew_detector_get_edges.
+  uint32_t unlisted[2];  ///< Number of edge parts beyond the capacity of four per edge on average.
+  /// 1: the body is closed; 0: it is open, and nothing is found inside it. A detector made for an
+  /// open body does not check again.
+  uint32_t closed[2];
+} sinew_detector_report;
+
+/// Finds the overlap of the two bodies at their current positions.
+/// You may pass another world, such as a loaded snapshot, if both ids refer there to bodies with
+/// identical surfaces. An open body reports only edges (EXACT: also points). Image space does not
+/// allocate. On failure the previous result stays.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface;
+/// SINEW_STATUS_CAPACITY if one ray has more than `crossings`.
+sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,
+    sinew_detector_report *out_report);
+
+#define SINEW_NO_TRIANGLE UINT32_MAX  ///< Value of `triangle` if there is none.
+
+/// Node of a body that lies inside the other body.
+typedef struct sinew_point_inside {
+  uint32_t node;      ///< Index of the node.
+  /// IMAGE_SPACE: triangle of the other surface where the node would leave; EXACT:
+  /// SINEW_NO_TRIANGLE.
+  uint32_t triangle;
+  /// [m] IMAGE_SPACE: shortest distance out along the views; EXACT: distance to the surface.
+  float depth;
+  float normal[3];    ///< EXACT: unit direction of the shortest distance out; IMAGE_SPACE: 0.
+} sinew_point_inside;
+
+/// Writes the list of nodes of one body that lie inside the other, in ascending order.
+/// `side` 0 is the first body, 1 the second. The list is empty before the first search and with
+/// COUNTED.
+/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
+sinew_status sinew_detector_get_points(const sinew_detector *detector, uint32_t side,
+    const sinew_point_inside **out_points, size_t *out_count);
+
+/// Part of an edge of a body that lies inside the other body.
+typedef struct sinew_edge_inside {
+  uint32_t nodes[2];  ///< First and second node of the edge.
+  float entry;        ///< Fraction of the edge where it enters; 0 if it starts inside.
+  float exit;         ///< Fraction of the edge where it leaves; 1 if it ends inside.
+  /// [m] IMAGE_SPACE: largest distance out along the view, the least over the views; EXACT: 0.
+  /// COUNTED: the distance from the edge to the next face.
+  float depth;
+} sinew_edge_inside;
+
+/// Writes the list of surface edge parts of one body that lie inside the other.
+/// `side` 0 is the first body, 1 the second. The list is ordered by edge and along it, and empty
+/// before the first search.
+/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
+sinew_status sinew_detector_get_edges(const sinew_detector *detector, uint32_t side,
+    const sinew_edge_inside **out_edges, size_t *out_count);
+
+/// Writes a view of the gradient [m^2] of the overlap volume at each node of one body.
+/// `side` 0 is the first body, 1 the second. Moving the nodes against it separates the bodies. It
+/// is empty before the first search, with COUNTED or EXACT, and if a body is open.
+/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
+sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_t side,
+    sinew_dvec3_view *out);
 
 // sinew/attachment.h: grasping tissue, joining tissue, sutures.
 //
 // An attachment holds a node or a surface point on a tool or on another point until it is released,
 // breaks, or one of the two is destroyed.
 
-// ---- Tissue to a tool ---------------------------------------------------------------------------
+// ---- Creation -----------------------------------------------------------------------------------
 
-/// Attaches one node of a body to a tool, like sinew_body_attach_nodes.
-sinew_status sinew_body_attach_node(sinew_world *world, sinew_body_id body, uint32_t node,
-                                    sinew_tool_id tool, float force_limit,
-                                    sinew_attachment_id *out);
+/// What is attached to what: nodes or surface points of a body, to a tool or to nodes or points of
+/// a body.
+/// Filled by sinew_attachment_def_init; read only during sinew_attachment_create.
+typedef struct sinew_attachment_def {
+  size_t struct_size;               ///< Size of this struct; sinew_attachment_def_init sets it.
+  sinew_body_id body;               ///< Body whose nodes or points are attached; no default.
+  sinew_tool_id tool;  ///< Tool that they are attached to; all zero (default): those of `other`.
+  /// Body that they are attached to, also the same body; all zero (default): the tool.
+  sinew_body_id other;
+  size_t count;                     ///< Number of attachments; default 0.
+  const uint32_t *nodes;            ///< `count` node indices; nullable: points.
+  const uint32_t *triangles;  ///< `count` surface triangle indices, one per point; nullable: nodes.
+  /// 3 * count corner weights of the points, at least 0 with sum 1; nullable: nodes.
+  const float *weights;
+  const uint32_t *other_nodes;  ///< `count` node indices of `other`; nullable: points or a tool.
+  /// `count` surface triangle indices of `other`; nullable: nodes or a tool.
+  const uint32_t *other_triangles;
+  /// 3 * count corner weights of these points; nullable: nodes or a tool.
+  const float *other_weights;
+  /// [N] Mean force of a step above which an attachment breaks, at least 0. Infinity (default) or
+  /// 0: unlimited.
+  float force_limit;
+} sinew_attachment_def;
 
-/// Attaches nodes of a body rigidly to a tool, each by its own attachment.
-/// The nodes move with the tool until sinew_attachment_release; the tool does not collide with
-/// them. The holding force is part of the tool's wrench. `out` receives `count` ids. `force_limit`
-/// [N]: the attachment breaks after a step with a larger mean force; 0 or infinity: unlimited.
-/// Attachments end with the body or tool. On failure nothing is attached.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node is pinned, massless or held by another tool.
-sinew_status sinew_body_attach_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     size_t count, sinew_tool_id tool, float force_limit,
-                                     sinew_attachment_id *out);
+/// Fills an attachment definition with its defaults; `struct_size` is sizeof(sinew_attachment_def).
+sinew_status sinew_attachment_def_init(sinew_attachment_def *def, size_t struct_size);
 
-/// Attaches surface points of a body rigidly to a tool, each by its own attachment.
-/// `triangles` holds `count` indices into the body's surface, `weights` 3 * count corner weights,
-/// at least 0 with sum 1. Every corner with a weight is attached, so that the patch cannot rotate;
-/// its forces add up. Corners shared by points split their force by weight. Otherwise like
-/// sinew_body_attach_nodes.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a corner is pinned, massless or held by another tool.
-sinew_status sinew_body_attach_points(sinew_world *world, sinew_body_id body,
-                                      const uint32_t *triangles, const float *weights, size_t count,
-                                      sinew_tool_id tool, float force_limit,
-                                      sinew_attachment_id *out);
-
-// ---- Tissue to tissue ---------------------------------------------------------------------------
-
-/// Attaches nodes of a body to nodes of another or the same body, pair by pair.
-/// Each pair becomes one point, about which both may rotate; a gap closes at no more than 0.25 m/s.
-/// Momentum is conserved. Paired nodes and their features do not collide. `out` receives `count`
-/// ids. `force_limit` [N]: breaks after a step with a larger mean force; 0 or infinity: unlimited.
-/// Attachments end with either body. On failure nothing is attached.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if both nodes of a pair are the same.
-sinew_status sinew_body_attach_nodes_to_nodes(sinew_world *world, sinew_body_id body,
-                                              const uint32_t *nodes, size_t count,
-                                              sinew_body_id other, const uint32_t *other_nodes,
-                                              float force_limit, sinew_attachment_id *out);
-
-/// Attaches nodes of a body to surface points of another or the same body, pair by pair.
-/// `other_triangles` and `other_weights` are as in sinew_body_attach_points, but the surface may
-/// rotate about each point. Otherwise like sinew_body_attach_nodes_to_nodes.
-sinew_status sinew_body_attach_nodes_to_points(sinew_world *world, sinew_body_id body,
-                                               const uint32_t *nodes, size_t count,
-                                               sinew_body_id other, const uint32_t *other_triangles,
-                                               const float *other_weights, float force_limit,
-                                               sinew_attachment_id *out);
-
-/// Attaches surface points of a body to surface points of another or the same body, pair by pair.
-/// Points are as in sinew_body_attach_nodes_to_points, the rest as in
-/// sinew_body_attach_nodes_to_nodes.
-sinew_status sinew_body_attach_points_to_points(sinew_world *world, sinew_body_id body,
-                                                const uint32_t *triangles, const float *weights,
-                                                size_t count, sinew_body_id other,
-                                                const uint32_t *other_triangles,
-                                                const float *other_weights, float force_limit,
-                                                sinew_attachment_id *out);
+/// Attaches nodes or surface points of a body to a tool or to a body, each by its own attachment.
+/// A tool holds its nodes, and the corners of its points, rigidly, and does not collide with them.
+/// Two bodies join at one point that both rotate about; a gap closes at no more than 0.25 m/s.
+/// `out_attachments` receives `count` ids.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool takes a node that is pinned, massless or held,
+/// or both ends are the same.
+sinew_status sinew_attachment_create(sinew_world *world, const sinew_attachment_def *def,
+    sinew_attachment_id *out_attachments);
 
 // ---- Sutures ------------------------------------------------------------------------------------
 
@@ -1049,26 +1163,22 @@ typedef struct sinew_suture_def {
   size_t struct_size;  ///< Size of this struct; sinew_suture_def_init sets it.
   /// [m] Unloaded length of the thread, at least 0; -1 (default): the current distance.
   float length;
-  /// [N/m] Stiffness of the thread, above 0; infinity (default): inextensible.
-  float stiffness;
-  /// [N] Mean force above which it tears out, at least 0; 0 (default) or infinity: unlimited.
+  float stiffness;  ///< [N/m] Stiffness of the thread, above 0; infinity (default): inextensible.
+  /// [N] Mean force above which it tears out, at least 0; infinity (default) or 0: unlimited.
   float force_limit;
-  uint32_t reserved0;  ///< Reserved; must be 0.
 } sinew_suture_def;
 
 /// Fills a suture definition with its defaults; `struct_size` is sizeof(sinew_suture_def).
 sinew_status sinew_suture_def_init(sinew_suture_def *def, size_t struct_size);
 
 /// Joins two surface points of bodies by a thread, which pulls and never pushes.
-/// A point is a surface triangle with 3 corner weights, at least 0 with sum 1. The bodies may be
-/// the same and still collide. `def` is nullable: the defaults. A thread shorter than the distance
-/// is drawn in at no more than 0.25 m/s. Release and force are those of an attachment; a torn
-/// suture is in sinew_world_get_slipped.
+/// Body, triangle and weights of the points count; the bodies may be the same and still collide.
+/// `def` is nullable: the defaults. A thread shorter than the distance is drawn in at no more than
+/// 0.25 m/s. Release and force are those of an attachment; a torn suture is in
+/// sinew_world_get_broken_attachments.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if both points are the same.
-sinew_status sinew_body_suture_points(sinew_world *world, sinew_body_id body, uint32_t triangle,
-                                      const float *weights, sinew_body_id other,
-                                      uint32_t other_triangle, const float *other_weights,
-                                      const sinew_suture_def *def, sinew_attachment_id *out);
+sinew_status sinew_suture_create(sinew_world *world, const sinew_surface_point *point,
+    const sinew_surface_point *other_point, const sinew_suture_def *def, sinew_attachment_id *out);
 
 /// Changes the length [m] of a suture's thread evenly over the next step.
 /// The length is at least 0. It shortens by at most 0.25 m/s, over as many steps as that takes.
@@ -1087,7 +1197,7 @@ typedef struct sinew_suture_report {
 /// Writes the current state of a suture.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
 sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_id suture,
-                                     sinew_suture_report *report);
+    sinew_suture_report *out_report);
 
 // ---- All attachments ----------------------------------------------------------------------------
 
@@ -1096,16 +1206,16 @@ sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_
 sinew_status sinew_attachment_release(sinew_world *world, sinew_attachment_id attachment);
 
 /// Writes the force of an attachment on its body, averaged over the last step.
-/// `force` [N] receives 3 floats in world axes, 0 before the first step. After
-/// sinew_body_rest_state it is the force of the tool in equilibrium.
+/// `out_force` [N] receives 3 floats in world axes, 0 before the first step. After
+/// sinew_body_solve_equilibrium it is the force of the tool in equilibrium.
 sinew_status sinew_attachment_get_force(const sinew_world *world, sinew_attachment_id attachment,
-                                        float *force);
+    float *out_force);
 
 /// Writes the attachments that broke in the last step because of their force_limit.
-/// `out` receives at most `capacity` ids, `count` the number that broke. The ids are stale: compare
-/// them with those you stored.
-sinew_status sinew_world_get_slipped(const sinew_world *world, sinew_attachment_id *out,
-                                     size_t capacity, size_t *count);
+/// `out_attachments` receives at most `capacity` ids, `out_count` the number that broke. The ids
+/// are stale: compare them with those you stored.
+sinew_status sinew_world_get_broken_attachments(const sinew_world *world,
+    sinew_attachment_id *out_attachments, size_t capacity, size_t *out_count);
 
 // sinew/cutting.h: cuts, blades, tears and the changes they make.
 //
@@ -1121,21 +1231,20 @@ typedef struct sinew_cut_report {
   /// Number of springs removed by the blade or replaced by springs of copies.
   uint32_t springs_removed;
   uint32_t pieces_parted;    ///< Increase of the number of connected surface components.
-  /// [m] Length of the cut in the rest shape; for a solid on its surface.
-  double length;
+  double length;  ///< [m] Length of the cut in the rest shape; for a solid on its surface.
   /// [m^2] Area of the opened faces of a solid in the rest shape, counted on one side. A cell in
   /// which the cut ends stays whole, so the area can be less than the blade swept.
   double area;
 } sinew_cut_report;
 
 /// Cuts a body along the surface that a blade's edge swept, at the current positions.
-/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `report` is nullable. A
-/// sweep that starts where the body's last one ended continues it. New nodes are appended; mass,
-/// momentum and energy are conserved. The call ends views of positions and triangles; see
-/// sinew_body_get_topology_changes. On failure nothing changes.
+/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `out_report` is
+/// nullable. A sweep that starts where the body's last one ended continues it. New nodes are
+/// appended; mass, momentum and energy are conserved. The call ends views of positions and
+/// triangles; see sinew_body_get_topology_changes. On failure nothing changes.
 /// Errors: SINEW_STATUS_UNSUPPORTED without spare_nodes; SINEW_STATUS_CAPACITY if too few are left.
 sinew_status sinew_body_cut(sinew_world *world, sinew_body_id body, const float *start,
-                            const float *end, sinew_cut_report *report);
+    const float *end, sinew_cut_report *out_report);
 
 /// Origin of a node that a cut added; vertex attributes interpolate by its weights.
 typedef struct sinew_new_node {
@@ -1175,13 +1284,14 @@ typedef struct sinew_topology_changes {
 /// again.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the version is in the future.
 sinew_status sinew_body_get_topology_changes(const sinew_world *world, sinew_body_id body,
-                                             uint64_t since_version, sinew_topology_changes *out);
+    uint64_t since_version, sinew_topology_changes *out);
 
 /// Writes the connected component of each node, and the number of components.
-/// Nodes are connected by springs, elements and the surface. `pieces` receives `count` numbers from
-/// 0, where `count` is the number of nodes. `pieces` and `piece_count` are nullable.
-sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body, uint32_t *pieces,
-                                   size_t count, uint32_t *piece_count);
+/// Nodes are connected by springs, elements and the surface. `out_pieces` receives `node_count`
+/// numbers from 0; `node_count` must be the body's number of nodes. `out_pieces` and
+/// `out_piece_count` are nullable.
+sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_pieces, size_t node_count, uint32_t *out_piece_count);
 
 // ---- Blades -------------------------------------------------------------------------------------
 
@@ -1197,10 +1307,8 @@ typedef struct sinew_blade_def {
   /// Bits of the categories that this blade belongs to; default 1. It cuts a body if each has a
   /// category in the mask of the other.
   uint32_t collision_category;
-  /// Bits of the categories that this blade cuts; default 0xffffffff.
-  uint32_t collision_mask;
-  /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
-  float position[3];
+  uint32_t collision_mask;  ///< Bits of the categories that this blade cuts; default 0xffffffff.
+  float position[3];  ///< [m] Initial position, each coordinate within 1e9; default 0 0 0.
   /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
   float orientation[4];
 } sinew_blade_def;
@@ -1214,7 +1322,7 @@ sinew_status sinew_blade_def_init(sinew_blade_def *def, size_t struct_size);
 /// onto the edge is cut too. Moving along the edge or back through the cut meets no resistance. A
 /// triangle needs about 10 spare_nodes. A step that cuts may allocate.
 sinew_status sinew_blade_create(sinew_world *world, const sinew_blade_def *def,
-                                sinew_blade_id *out);
+    sinew_blade_id *out);
 
 /// Destroys a blade; its cuts remain.
 sinew_status sinew_blade_destroy(sinew_world *world, sinew_blade_id blade);
@@ -1223,7 +1331,7 @@ sinew_status sinew_blade_destroy(sinew_world *world, sinew_blade_id blade);
 /// The blade moves along a straight line at constant speed. `position` [m] is 3 floats, each within
 /// 1e9; `orientation` is x y z w, not zero, nullable: unchanged.
 sinew_status sinew_blade_set_pose(sinew_world *world, sinew_blade_id blade, const float *position,
-                                  const float *orientation);
+    const float *orientation);
 
 /// Report of the cuts of a blade and the load on it in the last step.
 typedef struct sinew_blade_report {
@@ -1232,11 +1340,9 @@ typedef struct sinew_blade_report {
   float torque[3];      ///< [N m] Mean torque on the blade about its position, in world axes.
   double work;          ///< [J] Work that moving the blade did on tissue in the step.
   double length;        ///< [m] Length of the cuts in the rest shape; for solids on their surface.
-  /// [m] Distance of the blade ahead of its cut; 0 without tissue in its path.
-  double lag;
+  double lag;  ///< [m] Distance of the blade ahead of its cut; 0 without tissue in its path.
   /// SINEW_STATUS_OK, or CAPACITY or OUT_OF_MEMORY if a cut failed; the next step retries.
   sinew_status status;
-  uint32_t reserved0;   ///< Reserved; set to 0 by the library.
   /// [m^2] Area of the opened faces of solids in the rest shape. A cell in which the cut ends stays
   /// whole, so the area can be less than the blade swept.
   double area;
@@ -1244,7 +1350,7 @@ typedef struct sinew_blade_report {
 
 /// Writes the cuts of a blade and the load on it in the last step.
 sinew_status sinew_blade_get_report(const sinew_world *world, sinew_blade_id blade,
-                                    sinew_blade_report *out);
+    sinew_blade_report *out);
 
 // ---- Tears --------------------------------------------------------------------------------------
 
@@ -1255,8 +1361,7 @@ sinew_status sinew_blade_get_report(const sinew_world *world, sinew_blade_id bla
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a pair without spring and edge;
 /// SINEW_STATUS_UNSUPPORTED if most_tears is 0.
 sinew_status sinew_body_set_tear_limits(sinew_world *world, sinew_body_id body,
-                                        const uint32_t *pairs, size_t count, const float *strains,
-                                        const float *forces);
+    const uint32_t *pairs, const float *strains, const float *forces, size_t count);
 
 /// Report of the tears in the last step; all 0 for a body that does not tear.
 typedef struct sinew_tear_report {
@@ -1272,12 +1377,11 @@ typedef struct sinew_tear_report {
   /// Overloaded springs without spare nodes, FAST_LINK slots or memory; retried after a topology
   /// change.
   uint32_t no_room;
-  uint32_t reserved;       ///< Reserved; set to 0 by the library.
 } sinew_tear_report;
 
 /// Writes which tears the last step of a body made or refused.
 sinew_status sinew_body_get_tear_report(const sinew_world *world, sinew_body_id body,
-                                        sinew_tear_report *out);
+    sinew_tear_report *out);
 
 // sinew/haptics.h: force feedback at 1 kHz on the device's own thread.
 
@@ -1322,38 +1426,35 @@ typedef struct sinew_haptic sinew_haptic;
 /// step moves it to the latest proxy pose. The tool should start at the device's pose.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if another handle drives the tool.
 sinew_status sinew_haptic_create(sinew_world *world, const sinew_haptic_def *def,
-                                 sinew_haptic **out);
+    sinew_haptic **out);
 
 /// Destroys a haptic handle, before or after its world; NULL has no effect.
 /// The tool is then moved by sinew_tool_set_pose again.
 void sinew_haptic_destroy(sinew_haptic *haptic);
 
 /// Result of a haptic tick.
-typedef struct sinew_haptic_result {
-  size_t struct_size;          ///< Set to sizeof(sinew_haptic_result) before the call.
+typedef struct sinew_haptic_report {
+  size_t struct_size;          ///< Set to sizeof(sinew_haptic_report) before the call.
   float force[3];              ///< [N] Force on the device until the next tick, in world axes.
   float torque[3];             ///< [N m] Torque on the device about its position, in world axes.
   /// [m] Position that the tool is driven to: the device minus the coupling extension.
   float proxy_position[3];
   float proxy_orientation[4];  ///< Orientation that the tool is driven to, x y z w.
   uint32_t contact_count;      ///< Number of contacts of the model; see sinew_haptic_get_contacts.
-  /// [s] Age of the model by tick time; infinity before the first model.
-  float age;
+  float age;  ///< [s] Age of the model by tick time; infinity before the first model.
   uint64_t version;            ///< Number of world steps published to this handle.
-  /// Fraction of the model's force that is applied; below 1 if the model is stale.
-  float gain;
+  float gain;  ///< Fraction of the model's force that is applied; below 1 if the model is stale.
   uint32_t is_over;            ///< 1: the tool or its world was destroyed.
-  /// [J] Energy that the coupling dissipated; kept at least 0 as far as damping can.
-  double lost;
-} sinew_haptic_result;
+  double lost;  ///< [J] Energy that the coupling dissipated; kept at least 0 as far as damping can.
+} sinew_haptic_report;
 
 /// Computes the force on the device from its current pose, without waiting, locking or allocating.
 /// `position` [m] is 3 floats; `orientation` is x y z w, nullable: unchanged. `velocity` [m/s] and
 /// `angular_velocity` [rad/s] are 3 floats each in world axes, nullable: estimated. `dt` [s] is the
 /// time since the last tick, above 0, at most 1. After an error apply no force to the device.
 sinew_status sinew_haptic_tick(sinew_haptic *haptic, const float *position,
-                               const float *orientation, const float *velocity,
-                               const float *angular_velocity, float dt, sinew_haptic_result *out);
+    const float *orientation, const float *velocity, const float *angular_velocity, float dt,
+    sinew_haptic_report *out);
 
 /// Contact of the tool in the model of a haptic handle.
 typedef struct sinew_haptic_contact {
@@ -1365,10 +1466,10 @@ typedef struct sinew_haptic_contact {
 } sinew_haptic_contact;
 
 /// Writes the contacts of the model that the last tick used, without waiting.
-/// `contacts` receives at most `capacity` entries, `count` the number that exist, at most 32; with
-/// more, those with the largest force.
-sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic, sinew_haptic_contact *contacts,
-                                       size_t capacity, size_t *count);
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist, at most
+/// 32; with more, those with the largest force.
+sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic,
+    sinew_haptic_contact *out_contacts, size_t capacity, size_t *out_count);
 
 // sinew/dynamics.h: tools that are rigid bodies.
 
@@ -1387,7 +1488,7 @@ typedef struct sinew_mass_properties {
 /// `density` [kg/m^3] is above 0. `out` sets struct_size.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane.
 sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool_id tool,
-                                            float density, sinew_mass_properties *out);
+    float density, sinew_mass_properties *out);
 
 /// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
 /// `mass` is nullable: the tool becomes kinematic again, as it is created. A dynamic tool starts at
@@ -1397,30 +1498,30 @@ sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if attachments or a haptic handle use the
 /// tool.
 sinew_status sinew_tool_set_mass(sinew_world *world, sinew_tool_id tool,
-                                 const sinew_mass_properties *mass);
+    const sinew_mass_properties *mass);
 
 /// Writes the mass properties of a dynamic tool; all zero if the tool is kinematic.
 sinew_status sinew_tool_get_mass(const sinew_world *world, sinew_tool_id tool,
-                                 sinew_mass_properties *out);
+    sinew_mass_properties *out);
 
 /// Sets the velocity of a dynamic tool, in world axes.
 /// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] are 3 floats each.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
 sinew_status sinew_tool_set_velocity(sinew_world *world, sinew_tool_id tool, const float *velocity,
-                                     const float *angular_velocity);
+    const float *angular_velocity);
 
 /// Writes the velocity of a dynamic tool, in world axes.
-/// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] receive 3 floats each;
-/// both are nullable.
+/// `out_velocity` [m/s] of the center of mass and `out_angular_velocity` [rad/s] receive 3 floats
+/// each; both are nullable.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
-sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool, float *velocity,
-                                     float *angular_velocity);
+sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool,
+    float *out_velocity, float *out_angular_velocity);
 
 /// Adds a force and a torque on a dynamic tool throughout the next step, in world axes.
 /// `force` [N] acts at the center of mass, `torque` [N m] about it; they are 3 floats each.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
 sinew_status sinew_tool_apply_wrench(sinew_world *world, sinew_tool_id tool, const float *force,
-                                     const float *torque);
+    const float *torque);
 
 /// Moves a tool to a new pose at once, without a sweep.
 /// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable:
@@ -1428,7 +1529,7 @@ sinew_status sinew_tool_apply_wrench(sinew_world *world, sinew_tool_id tool, con
 /// pending sinew_tool_set_pose is dropped.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if attachments or a haptic handle use the tool.
 sinew_status sinew_tool_teleport(sinew_world *world, sinew_tool_id tool, const float *position,
-                                 const float *orientation);
+    const float *orientation);
 
 // sinew/render.h: render surfaces, and positions for a render thread.
 
@@ -1464,7 +1565,7 @@ typedef struct sinew_embedding sinew_embedding;
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if no tetrahedron has a volume, or the body has no
 /// surface.
 sinew_status sinew_embedding_create(const sinew_world *world, sinew_body_id body,
-                                    const sinew_embedding_def *def, sinew_embedding **out);
+    const sinew_embedding_def *def, sinew_embedding **out);
 
 /// Destroys an embedding and ends its views; NULL has no effect.
 void sinew_embedding_destroy(sinew_embedding *embedding);
@@ -1483,7 +1584,7 @@ sinew_status sinew_embedding_update(sinew_embedding *embedding, const sinew_worl
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body had another number of nodes at the last
 /// sinew_embedding_update.
 sinew_status sinew_embedding_update_from(sinew_embedding *embedding, const float *positions,
-                                         size_t node_count);
+    size_t node_count);
 
 /// Writes a view of the vertex positions [m], in the given order.
 /// Lifetime: until the embedding is destroyed; updates change its contents.
@@ -1492,7 +1593,7 @@ sinew_status sinew_embedding_get_positions(const sinew_embedding *embedding, sin
 /// Writes a view of the triangles, in the given order, without those across a cut.
 /// Lifetime: until the first update after the next cut, or the embedding's destruction.
 sinew_status sinew_embedding_get_triangles(const sinew_embedding *embedding,
-                                           sinew_triangle_view *out);
+    sinew_triangle_view *out);
 
 /// Computes the unit vertex normals if needed, and writes a view of them.
 /// They are area-weighted and point outward; 0 without area. The view is empty without triangles.
@@ -1508,8 +1609,7 @@ sinew_status sinew_embedding_get_normals(sinew_embedding *embedding, sinew_vec3_
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` is too fine
 /// or too coarse, or elements, springs, rest positions or lists of values are given.
 sinew_status sinew_body_create_from_surface(sinew_world *world, const sinew_body_def *def,
-                                            float spacing, sinew_body_id *out_body,
-                                            sinew_embedding **out_embedding);
+    float spacing, sinew_body_id *out_body, sinew_embedding **out_embedding);
 
 // ---- Readers ------------------------------------------------------------------------------------
 
@@ -1535,182 +1635,18 @@ typedef struct sinew_frame {
   sinew_vec3_view positions;      ///< [m] Node positions, with the nodes added by cuts.
   /// Triangles of sinew_body_get_triangles; they change only with topology_version.
   sinew_triangle_view triangles;
-  /// Number of the frame; larger than before if the body was moved.
-  uint64_t version;
+  uint64_t version;  ///< Number of the frame; larger than before if the body was moved.
   uint64_t topology_version;      ///< Version of sinew_body_get_topology_changes at that moment.
   uint64_t step;                  ///< Number of steps that the world had taken.
   double time;                    ///< [s] Sum of the lengths of these steps.
   uint32_t is_new;                ///< 1: this reader did not read this frame before.
-  /// 1: the body or its world was destroyed, and this is its last frame.
-  uint32_t is_over;
+  uint32_t is_over;  ///< 1: the body or its world was destroyed, and this is its last frame.
 } sinew_frame;
 
 /// Writes the latest frame of the body without copying, allocating, locking or waiting.
 /// It returns the same frame again if there is no newer one. It ends the views of the previous
 /// frame.
 sinew_status sinew_reader_read(sinew_reader *reader, sinew_frame *out);
-
-// sinew/query.h: rays, nearest points and the overlap of two bodies.
-
-// ---- Surface points -----------------------------------------------------------------------------
-
-/// Point on the surface of a body.
-typedef struct sinew_surface_point {
-  size_t struct_size;  ///< Set to sizeof(sinew_surface_point) before the call.
-  sinew_body_id body;  ///< Body of the point; all zero if nothing was found, and the rest is 0.
-  uint32_t triangle;   ///< Index of the triangle in the body's surface.
-  float weights[3];    ///< Weights of the triangle's corners, with sum 1.
-  float position[3];   ///< [m] Position of the point.
-  float normal[3];     ///< Outward unit normal of the triangle; 0 if it has no area.
-  float distance;      ///< [m] Distance from the query point.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
-} sinew_surface_point;
-
-/// Finds the first body surface point that a ray hits.
-/// `origin` [m] and `direction` are 3 floats each; the direction may have any length but 0.
-/// `max_distance` [m] is at least 0. Without a hit out->body is all zero. A triangle parallel to
-/// the ray is not hit. The first query near a body builds a tree, which may allocate; nodes that
-/// moved refit it.
-sinew_status sinew_world_cast_ray(const sinew_world *world, const float *origin,
-                                  const float *direction, float max_distance,
-                                  sinew_surface_point *out);
-
-/// Finds the body surface point that is nearest to a point.
-/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. If no surface is within it out->body
-/// is all zero. It uses the trees of sinew_world_cast_ray.
-sinew_status sinew_world_find_nearest(const sinew_world *world, const float *point,
-                                      float max_distance, sinew_surface_point *out);
-
-// ---- Overlap ------------------------------------------------------------------------------------
-
-/// Contents of the images of a detector.
-typedef enum sinew_image_form {
-  /// Intervals of each pixel's ray inside a body; finds every edge, and points deeper than 0.71
-  /// pixels.
-  SINEW_IMAGE_FORM_INTERVALS = 0,
-  /// CInDeR (Halic et al., section 2.1): edges in a depth buffer, faces in front counted; for
-  /// comparison. Of edges that share a pixel only the nearest is found. No points and no volume.
-  SINEW_IMAGE_FORM_COUNTED = 1
-} sinew_image_form;
-
-/// Bodies and method of a detector.
-/// Filled by sinew_detector_def_init; read only during sinew_detector_create.
-typedef struct sinew_detector_def {
-  size_t struct_size;       ///< Size of this struct; sinew_detector_def_init sets it.
-  /// First and second body with surfaces, at least one of them closed; no default.
-  sinew_body_id bodies[2];
-  /// SINEW_DETECTION_EXACT (default) or IMAGE_SPACE. EXACT ignores the other settings, but
-  /// thickness must be 0. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
-  uint32_t detection;
-  /// IMAGE_SPACE: a sinew_image_form value; default SINEW_IMAGE_FORM_INTERVALS.
-  uint32_t form;
-  /// [m] IMAGE_SPACE: pixel size, above 0; no default. 1/256 of the body finds 99.9 % of edges.
-  float pixel;
-  /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes in turn. Depths are
-  /// measured along the view. They exceed the shortest distance by about 2 % of the size with three
-  /// axes and by about 6 % with one.
-  float direction[3];
-  /// IMAGE_SPACE: capacity of an image in pixels, 1 to 2^24; default 2^18. If it is too small, the
-  /// pixel size doubles until the image fits.
-  uint32_t pixels;
-  /// INTERVALS: capacity of ray-face crossings per body and image, at least 1; default 2^20. If it
-  /// is too small, the pixel size doubles. The default capacities take about 18 MB.
-  uint32_t crossings;
-  /// [m] IMAGE_SPACE: added thickness of each body along the view, at least 0; default 0 0. It
-  /// keeps thin parts from being missed, and adds to depths and volume.
-  float thickness[2];
-} sinew_detector_def;
-
-/// Fills a detector definition with its defaults; `struct_size` is sizeof(sinew_detector_def).
-sinew_status sinew_detector_def_init(sinew_detector_def *def, size_t struct_size);
-
-/// Detector of the overlap of two bodies; it applies no forces.
-/// The caller owns it; it may outlive its world. Any number of threads may use a `const
-/// sinew_detector *` at the same time; a `sinew_detector *` needs exclusive access.
-typedef struct sinew_detector sinew_detector;
-
-/// Creates a detector for two bodies and allocates its memory, without a first search.
-/// Destroy it with sinew_detector_destroy.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bodies are the same, one has no surface, or both
-/// are open; with EXACT also if a closed surface is inverted, self-intersecting or degenerate.
-/// SINEW_STATUS_UNSUPPORTED for SINEW_DETECTION_DISTANCE_FIELD.
-sinew_status sinew_detector_create(const sinew_world *world, const sinew_detector_def *def,
-                                   sinew_detector **out);
-
-/// Destroys a detector and ends its lists and views; NULL has no effect.
-void sinew_detector_destroy(sinew_detector *detector);
-
-/// Overlap that a detector found; index 0 is the first body, 1 the second.
-typedef struct sinew_detector_report {
-  size_t struct_size;        ///< Set to sizeof(sinew_detector_report) before the call.
-  /// [m^3] INTERVALS: overlap volume, mean over the views; 0 with an open body, COUNTED or EXACT.
-  double volume;
-  /// Unit direction that moves the first body out of the second fastest; 0 without volume.
-  float normal[3];
-  float depth;               ///< [m] Linear estimate of the distance to move it.
-  float pixel;               ///< [m] Largest pixel size used; 0 with EXACT.
-  uint32_t point_counts[2];  ///< Number of entries of sinew_detector_get_points.
-  uint32_t edge_counts[2];   ///< Number of entries of sinew_detector_get_edges.
-  /// Number of edge parts beyond the capacity of four per edge on average.
-  uint32_t unlisted[2];
-  /// 1: the body is closed; 0: it is open, and nothing is found inside it. A detector made for an
-  /// open body does not check again.
-  uint32_t closed[2];
-  uint32_t reserved;         ///< Reserved; set to 0 by the library.
-} sinew_detector_report;
-
-/// Finds the overlap of the two bodies at their current positions.
-/// You may pass another world, such as a loaded snapshot, if both ids refer there to bodies with
-/// identical surfaces. An open body reports only edges (EXACT: also points). Image space does not
-/// allocate. On failure the previous result stays.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface;
-/// SINEW_STATUS_CAPACITY if one ray has more than `crossings`.
-sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,
-                                 sinew_detector_report *report);
-
-#define SINEW_NO_TRIANGLE UINT32_MAX  ///< Value of `triangle` if there is none.
-
-/// Node of a body that lies inside the other body.
-typedef struct sinew_point_inside {
-  uint32_t node;      ///< Index of the node.
-  /// IMAGE_SPACE: triangle of the other surface where the node would leave; EXACT:
-  /// SINEW_NO_TRIANGLE.
-  uint32_t triangle;
-  /// [m] IMAGE_SPACE: shortest distance out along the views; EXACT: distance to the surface.
-  float depth;
-  float normal[3];    ///< EXACT: unit direction of the shortest distance out; IMAGE_SPACE: 0.
-} sinew_point_inside;
-
-/// Writes the list of nodes of one body that lie inside the other, in ascending order.
-/// `side` 0 is the first body, 1 the second. The list is empty before the first search and with
-/// COUNTED.
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-sinew_status sinew_detector_get_points(const sinew_detector *detector, uint32_t side,
-                                       const sinew_point_inside **points, size_t *count);
-
-/// Part of an edge of a body that lies inside the other body.
-typedef struct sinew_edge_inside {
-  uint32_t nodes[2];  ///< First and second node of the edge.
-  float entry;        ///< Fraction of the edge where it enters; 0 if it starts inside.
-  float exit;         ///< Fraction of the edge where it leaves; 1 if it ends inside.
-  /// [m] IMAGE_SPACE: largest distance out along the view, the least over the views; EXACT: 0.
-  /// COUNTED: the distance from the edge to the next face.
-  float depth;
-} sinew_edge_inside;
-
-/// Writes the list of surface edge parts of one body that lie inside the other.
-/// `side` 0 is the first body, 1 the second. The list is ordered by edge and along it, and empty
-/// before the first search.
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-sinew_status sinew_detector_get_edges(const sinew_detector *detector, uint32_t side,
-                                      const sinew_edge_inside **edges, size_t *count);
-
-/// Writes a view of the gradient [m^2] of the overlap volume at each node of one body.
-/// `side` 0 is the first body, 1 the second. Moving the nodes against it separates the bodies. It
-/// is empty before the first search, with COUNTED or EXACT, and if a body is open.
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_t side,
-                                         sinew_dvec3_view *out);
 
 // sinew/more.h: whole bodies, several nodes, filtered rays, settings and user data.
 
@@ -1721,8 +1657,7 @@ sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_
 /// tetrahedron_count node indices. node_of_vertex of sinew_mesh_view maps the given nodes to those
 /// of the mesh.
 sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
-                               size_t triangle_count, const uint32_t *tetrahedra,
-                               size_t tetrahedron_count, sinew_mesh **out);
+    size_t triangle_count, const uint32_t *tetrahedra, size_t tetrahedron_count, sinew_mesh **out);
 
 /// Creates a mesh of tetrahedra that fills the closed surface of a mesh.
 /// `spacing` [m] is the mean edge length. Nodes and tetrahedra are those of the body that
@@ -1745,30 +1680,30 @@ sinew_status sinew_body_def_set_mesh(sinew_body_def *def, const sinew_mesh *mesh
 /// nullable: none, none, and the center of the bounding box. Nothing is swept; otherwise like
 /// sinew_body_set_positions.
 sinew_status sinew_body_transform(sinew_world *world, sinew_body_id body, const float *translation,
-                                  const float *rotation, const float *pivot);
+    const float *rotation, const float *pivot);
 
 /// Writes the bounding box of the nodes of a body.
 /// `out_min` [m] and `out_max` [m] receive 3 floats each.
 sinew_status sinew_body_get_bounds(const sinew_world *world, sinew_body_id body, float *out_min,
-                                   float *out_max);
+    float *out_max);
 
 /// Writes the unit normals of the surface of a body at its nodes.
-/// They are area-weighted and point outward; 0 for a node without a triangle. `normals` receives 3
-/// * node_count floats; `node_count` must be the body's number of nodes.
-sinew_status sinew_body_get_normals(const sinew_world *world, sinew_body_id body, float *normals,
-                                    size_t node_count);
+/// They are area-weighted and point outward; 0 for a node without a triangle. `out_normals`
+/// receives 3 * node_count floats; `node_count` must be the body's number of nodes.
+sinew_status sinew_body_get_normals(const sinew_world *world, sinew_body_id body,
+    float *out_normals, size_t node_count);
 
 /// Writes the masses [kg] of all nodes of a body; see sinew_body_get_node_mass.
-/// `masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
-sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body, float *masses,
-                                   size_t node_count);
+/// `out_masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
+sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body, float *out_masses,
+    size_t node_count);
 
 /// Changes the velocities of nodes at once by impulses.
 /// `nodes` holds `count` indices, which may repeat; `impulses` [N s] holds 3 * count floats. They
 /// have no effect on a pinned or attached node, nor along a pinned axis. On failure no velocity
 /// changes.
 sinew_status sinew_body_apply_impulses(sinew_world *world, sinew_body_id body,
-                                       const uint32_t *nodes, const float *impulses, size_t count);
+    const uint32_t *nodes, const float *impulses, size_t count);
 
 /// Sets the factor of the world's gravity on a body, from the next step on.
 /// `scale` is finite: 0 means no gravity.
@@ -1782,60 +1717,58 @@ sinew_status sinew_body_get_gravity_scale(const sinew_world *world, sinew_body_i
 /// Pins nodes at their current positions; see sinew_body_pin.
 /// `nodes` holds `count` indices. On failure no node changes.
 sinew_status sinew_body_pin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                  size_t count);
+    size_t count);
 
 /// Unpins nodes along all axes; see sinew_body_unpin.
 /// `nodes` holds `count` indices. On failure no node changes.
 sinew_status sinew_body_unpin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                    size_t count);
+    size_t count);
 
 /// Pins all nodes in a box, and writes how many nodes of the box are pinned.
 /// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
 sinew_status sinew_body_pin_box(sinew_world *world, sinew_body_id body, const float *min,
-                                const float *max, size_t *out_count);
+    const float *max, size_t *out_count);
 
 /// Unpins the pinned nodes in a box, except those of mass 0, and writes how many.
 /// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
 sinew_status sinew_body_unpin_box(sinew_world *world, sinew_body_id body, const float *min,
-                                  const float *max, size_t *out_count);
+    const float *max, size_t *out_count);
 
 /// Writes the reaction forces on all nodes, averaged over the last step.
-/// `forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool
+/// `out_forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool
 /// holds. `node_count` must be the body's number of nodes.
-sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body, float *forces,
-                                       size_t node_count);
+sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body,
+    float *out_forces, size_t node_count);
 
 // ---- Tools --------------------------------------------------------------------------------------
 
 /// Writes the pose that the last step moved a tool to, before the force_limit.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats x y z w; both are nullable.
 /// Replaying these poses with sinew_tool_set_pose reproduces the steps, also those that a haptic
 /// handle drove.
-sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool, float *position,
-                                   float *orientation);
+sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool,
+    float *out_position, float *out_orientation);
 
 /// Writes the total force and torque on several tools, averaged over the last step, in world axes.
-/// `tools` holds `count` different ids. `point` [m] is 3 floats. `force` [N] and `torque` [N m],
-/// about `point`, receive 3 floats each; both are nullable.
-sinew_status sinew_tools_get_wrench(const sinew_world *world, const sinew_tool_id *tools,
-                                    size_t count, const float *point, float *force, float *torque);
+/// `tools` holds `count` different ids. `point` [m] is 3 floats. `out_force` [N] and `out_torque`
+/// [N m], about `point`, receive 3 floats each; both are nullable.
+sinew_status sinew_world_get_total_wrench(const sinew_world *world, const sinew_tool_id *tools,
+    size_t count, const float *point, float *out_force, float *out_torque);
 
 /// Contact between a tool and a body that began or ended in the last step.
 typedef struct sinew_contact_change {
   sinew_tool_id tool;  ///< Tool of the contact.
   sinew_body_id body;  ///< Body of the contact.
   uint32_t begun;      ///< 1: the contact began; 0: it ended.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
 } sinew_contact_change;
 
 /// Writes the contacts that began or ended in the last step.
-/// `changes` receives at most `capacity` entries, `count` the number that exist. Destroying a tool
-/// or body does not report an end.
+/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist. Destroying
+/// a tool or body does not report an end.
 sinew_status sinew_world_get_contact_changes(const sinew_world *world,
-                                             sinew_contact_change *changes, size_t capacity,
-                                             size_t *count);
+    sinew_contact_change *out_changes, size_t capacity, size_t *out_count);
 
 /// First body or tool that a ray hits.
 typedef struct sinew_ray_hit {
@@ -1847,15 +1780,14 @@ typedef struct sinew_ray_hit {
   float position[3];   ///< [m] Position of the hit.
   float normal[3];     ///< Outward unit normal at the hit.
   float distance;      ///< [m] Distance from the origin.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
 } sinew_ray_hit;
 
 /// Finds the first body or tool that a ray with a collision filter hits.
 /// The ray meets bodies and tools as if it had this category and mask. Otherwise like
 /// sinew_world_cast_ray; without a hit both ids are all zero.
 sinew_status sinew_world_cast_ray_filtered(const sinew_world *world, const float *origin,
-                                           const float *direction, float max_distance,
-                                           uint32_t category, uint32_t mask, sinew_ray_hit *out);
+    const float *direction, float max_distance, uint32_t category, uint32_t mask,
+    sinew_ray_hit *out);
 
 // ---- Settings -----------------------------------------------------------------------------------
 
@@ -1868,7 +1800,7 @@ sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravit
 
 /// Writes the collision category and mask of a body.
 sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
-                                      uint32_t *out_category, uint32_t *out_mask);
+    uint32_t *out_category, uint32_t *out_mask);
 
 /// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
 sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
@@ -1881,17 +1813,21 @@ sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id 
 
 /// Writes the collision category and mask of a tool.
 sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
-                                      uint32_t *out_category, uint32_t *out_mask);
+    uint32_t *out_category, uint32_t *out_mask);
 
 /// Writes the current pose of a blade.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
-sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade, float *position,
-                                  float *orientation);
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats x y z w; both are nullable.
+sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade,
+    float *out_position, float *out_orientation);
 
 /// Sets the collision category and mask of a blade, from the next step on.
 /// A body that it no longer meets lets go of the blade.
 sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
-                                       uint32_t mask);
+    uint32_t mask);
+
+/// Writes the collision category and mask of a blade.
+sinew_status sinew_blade_get_collision(const sinew_world *world, sinew_blade_id blade,
+    uint32_t *out_category, uint32_t *out_mask);
 
 /// Sets the number of substeps per step and its limit, from the next step on.
 /// See sinew_world_def.
@@ -1899,7 +1835,7 @@ sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uin
 
 /// Writes the number of substeps per step and its limit; both outputs are nullable.
 sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
-                                      uint32_t *out_max_substeps);
+    uint32_t *out_max_substeps);
 
 /// Settings of a body that can change after creation; see sinew_body_def.
 typedef struct sinew_body_settings {
@@ -1917,19 +1853,19 @@ typedef struct sinew_body_settings {
 /// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a body that was cut change, other than both
 /// to 0.
 sinew_status sinew_body_set_settings(sinew_world *world, sinew_body_id body,
-                                     const sinew_body_settings *settings);
+    const sinew_body_settings *settings);
 
 /// Writes the settings of a body that can change.
 sinew_status sinew_body_get_settings(const sinew_world *world, sinew_body_id body,
-                                     sinew_body_settings *out);
+    sinew_body_settings *out);
 
 /// Sets the drag [N s/m] on each node of a body, at least 0, from the next step on.
 sinew_status sinew_body_set_node_damping(sinew_world *world, sinew_body_id body,
-                                         float node_damping);
+    float node_damping);
 
 /// Writes the drag [N s/m] on a node.
 sinew_status sinew_body_get_node_damping(const sinew_world *world, sinew_body_id body,
-                                         uint32_t node, float *out);
+    uint32_t node, float *out);
 
 /// Advances the world by at most `work` units of work.
 /// A unit is one substep of each VERLET body or one matrix-vector product of each other body. The
@@ -1939,13 +1875,13 @@ sinew_status sinew_body_get_node_damping(const sinew_world *world, sinew_body_id
 /// motion. `report` is nullable.
 /// Errors: SINEW_STATUS_UNSUPPORTED with fixed substeps or a tolerance.
 sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t work,
-                                          sinew_step_report *report);
+    sinew_step_report *report);
 
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
 /// The first calls do little work and measure. A step can be late if the machine or the scene
 /// became slower. For a bitwise replay record `work` of `report`.
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
-                                     sinew_step_report *report);
+    sinew_step_report *report);
 
 // ---- Ids and user data --------------------------------------------------------------------------
 
@@ -1999,17 +1935,16 @@ sinew_status sinew_world_get_snapshot_size(const sinew_world *world, size_t *out
 /// detectors and embeddings. Only this library version can read it. A checksum detects damage, not
 /// tampering.
 /// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool.
-sinew_status sinew_world_save_snapshot(const sinew_world *world, uint8_t *bytes, size_t size);
+sinew_status sinew_world_save_snapshot(const sinew_world *world, uint8_t *out_bytes, size_t size);
 
 /// Creates a world from the bytes of a snapshot.
-/// `thread_count`, `run_tasks` (nullable) and `tasks_context` (nullable) are as in sinew_world_def.
-/// Destroy the world with sinew_world_destroy. Results are bitwise identical only with the kernel
-/// of the saved world.
+/// `def` is nullable: the defaults. Its thread_count, run_tasks and tasks_context apply; the
+/// snapshot holds the other settings. Destroy the world with sinew_world_destroy. Results are
+/// bitwise identical only with the kernel of the saved world.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bytes are damaged; SINEW_STATUS_UNSUPPORTED for
 /// another library version or kernel, or if a thread could not be started.
-sinew_status sinew_world_load_snapshot(const uint8_t *bytes, size_t size, uint32_t thread_count,
-                                       sinew_run_tasks run_tasks, void *tasks_context,
-                                       sinew_world **out);
+sinew_status sinew_world_load_snapshot(const uint8_t *bytes, size_t size,
+    const sinew_world_def *def, sinew_world **out);
 
 // sinew/diagnostics.h: energy, solver and memory reports, strain, images.
 
@@ -2047,20 +1982,18 @@ typedef struct sinew_solver_report {
   uint32_t auto_substeps;
   /// [s] AUTO: step length of the choice, the mean of the world so far or 1/60 s; else 0.
   float auto_step;
-  uint32_t reserved;       ///< Reserved; set to 0 by the library.
 } sinew_solver_report;
 
 /// Writes how the solver of a body took the last step.
 sinew_status sinew_body_get_solver_report(const sinew_world *world, sinew_body_id body,
-                                          sinew_solver_report *out);
+    sinew_solver_report *out);
 
 /// Limit of the substep of a step that was refused.
 typedef enum sinew_limit {
   SINEW_LIMIT_NONE = 0,      ///< The step was not refused.
   SINEW_LIMIT_SPRING = 1,    ///< Springs of a node; the nodes are the stiffest spring.
   SINEW_LIMIT_ELEMENT = 2,   ///< Elements of a node; the nodes are the stiffest tetrahedron.
-  /// Anchor, bending, fiber, Maxwell or strain-limiting terms of a node.
-  SINEW_LIMIT_TERM = 3,
+  SINEW_LIMIT_TERM = 3,  ///< Anchor, bending, fiber, Maxwell or strain-limiting terms of a node.
   SINEW_LIMIT_CAVITY = 4,    ///< Pressure in a cavity.
   /// Number of parts of a step of IMPLICIT or NEWTON in contact or attached.
   SINEW_LIMIT_PARTS = 5,
@@ -2078,17 +2011,16 @@ typedef struct sinew_storage_report {
 
 /// Writes the memory use of the springs of a body.
 sinew_status sinew_body_get_storage_report(const sinew_world *world, sinew_body_id body,
-                                           sinew_storage_report *out);
+    sinew_storage_report *out);
 
 // ---- Strain -------------------------------------------------------------------------------------
 
 /// Writes the strain L / L0 - 1 between pairs of nodes; 0 where L0 is 0.
 /// `pairs` holds 2 * count indices. `rest_lengths` [m] holds `count` floats; it is nullable: the
-/// rest lengths of the springs, which takes longer. `strains` receives `count` floats.
+/// rest lengths of the springs, which takes longer. `out_strains` receives `count` floats.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring and `rest_lengths` is NULL.
 sinew_status sinew_body_get_spring_strains(const sinew_world *world, sinew_body_id body,
-                                           const uint32_t *pairs, const float *rest_lengths,
-                                           size_t count, float *strains);
+    const uint32_t *pairs, const float *rest_lengths, size_t count, float *out_strains);
 
 /// Strain of a triangle or tetrahedron; 0 for a rigid motion, or if it has no size at rest.
 typedef struct sinew_strain {
@@ -2099,28 +2031,26 @@ typedef struct sinew_strain {
 
 /// Writes the strains of any triangles between nodes of a body.
 /// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `triangles` holds 3 *
-/// triangle_count indices; `strains` receives one entry per triangle. `node_count` must be the
+/// triangle_count indices; `out_strains` receives one entry per triangle. `node_count` must be the
 /// body's.
 sinew_status sinew_body_get_triangle_strains(const sinew_world *world, sinew_body_id body,
-                                             const float *rest_positions, size_t node_count,
-                                             const uint32_t *triangles, size_t triangle_count,
-                                             sinew_strain *strains);
+    const float *rest_positions, size_t node_count, const uint32_t *triangles,
+    size_t triangle_count, sinew_strain *out_strains);
 
 /// Writes the strains of any tetrahedra between nodes of a body.
 /// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `tetrahedra` holds 4 *
-/// tetrahedron_count indices; `strains` receives one entry per tetrahedron. `node_count` must be
-/// the body's.
+/// tetrahedron_count indices; `out_strains` receives one entry per tetrahedron. `node_count` must
+/// be the body's.
 sinew_status sinew_body_get_tetrahedron_strains(const sinew_world *world, sinew_body_id body,
-                                                const float *rest_positions, size_t node_count,
-                                                const uint32_t *tetrahedra,
-                                                size_t tetrahedron_count, sinew_strain *strains);
+    const float *rest_positions, size_t node_count, const uint32_t *tetrahedra,
+    size_t tetrahedron_count, sinew_strain *out_strains);
 
 /// Averages values of elements at their nodes; 0 at a node without elements.
 /// `elements` holds corners * element_count node indices, `corners` is 2, 3 or 4, `values` holds
-/// element_count finite floats, and `means` receives node_count floats. Use it to color an image by
-/// strain.
-sinew_status sinew_mean_at_nodes(const uint32_t *elements, uint32_t corners, const float *values,
-                                 size_t element_count, float *means, size_t node_count);
+/// element_count finite floats, and `out_means` receives node_count floats. Use it to color an
+/// image by strain.
+sinew_status sinew_util_average_to_nodes(const uint32_t *elements, uint32_t corners,
+    const float *values, size_t element_count, float *out_means, size_t node_count);
 
 // ---- Images -------------------------------------------------------------------------------------
 
@@ -2134,8 +2064,7 @@ typedef struct sinew_picture_def {
   /// bodies along `direction`.
   float target[3];
   float up[3];             ///< Up direction of the image; default 0 1 0.
-  /// Fitted view: direction from the scene to the camera; default 1 0.6 1.4.
-  float direction[3];
+  float direction[3];  ///< Fitted view: direction from the scene to the camera; default 1 0.6 1.4.
   float field_of_view;     ///< [rad] Vertical field of view, above 0 and below pi; default 0.6.
   uint32_t show_contacts;  ///< 1: draws contact points and forces on tools; 0 (default): does not.
 } sinew_picture_def;
@@ -2148,7 +2077,7 @@ sinew_status sinew_picture_def_init(sinew_picture_def *def, size_t struct_size);
 /// existing file is replaced once the image is complete.
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
 sinew_status sinew_world_save_picture(const sinew_world *world, const sinew_picture_def *def,
-                                      const char *path);
+    const char *path);
 
 /// Color map of values.
 typedef enum sinew_colours {
@@ -2165,7 +2094,6 @@ typedef struct sinew_body_values {
   float low;            ///< Value of the first color; also used below it.
   float high;           ///< Value of the last color, above low; also used above it.
   uint32_t colours;     ///< Color map, a sinew_colours value.
-  uint32_t reserved;    ///< Reserved; must be 0.
 } sinew_body_values;
 
 /// Draws all bodies and tools into a PNG file, with some bodies colored by values.
@@ -2173,9 +2101,8 @@ typedef struct sinew_body_values {
 /// is as in sinew_world_save_picture.
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
 sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
-                                                const sinew_picture_def *def,
-                                                const sinew_body_values *coloured, size_t count,
-                                                const char *path);
+    const sinew_picture_def *def, const sinew_body_values *coloured, size_t count,
+    const char *path);
 
 // sinew/debug.h: profile, debug drawing, recording, log.
 
@@ -2191,10 +2118,8 @@ typedef struct sinew_profile {
   size_t struct_size;        ///< Set to sizeof(sinew_profile) before the call.
   double step;               ///< [s] Whole step.
   double plan;               ///< [s] Targets and paths of tools and blades.
-  /// [s] VERLET: forces and integration, which are one pass over the nodes.
-  double forces;
-  /// [s] IMPLICIT, NEWTON: equations and their solution, with the forces.
-  double solver;
+  double forces;  ///< [s] VERLET: forces and integration, which are one pass over the nodes.
+  double solver;  ///< [s] IMPLICIT, NEWTON: equations and their solution, with the forces.
   double broad_phase;        ///< [s] Search for what is near a tool or other tissue.
   double narrow_phase;       ///< [s] Search for contacts among what is near.
   double contact_solver;     ///< [s] Impulses of contacts, attachments and sutures.
@@ -2274,7 +2199,6 @@ typedef struct sinew_replay_report {
   uint64_t recorded_hash;     ///< State hash after that step in the recording; else 0.
   uint64_t replayed_hash;     ///< State hash after that step in the replay; else 0.
   uint32_t cut_short;         ///< 1 if the file ends within a step, else 0.
-  uint32_t reserved;          ///< Reserved; set to 0 by the library.
 } sinew_replay_report;
 
 /// Replays a recording and compares the state hash after each step, up to the first difference.

@@ -28,8 +28,7 @@ typedef enum sinew_shape {
 typedef struct sinew_tool_def {
   size_t struct_size;           ///< Size of this struct; sinew_tool_def_init sets it.
   uint32_t shape;               ///< Shape of the tool, a sinew_shape value.
-  /// [m] Sphere, capsule: above 0, at most 1e9 with half_length added; no default.
-  float radius;
+  float radius;  ///< [m] Sphere, capsule: above 0, at most 1e9 with half_length added; no default.
   /// [m] Capsule: distance from the center to the center of a cap, at least 0. IMAGE_SPACE allows
   /// at most 10,000 times the radius. Contact points are accurate to 1e-7 of it.
   float half_length;
@@ -42,8 +41,7 @@ typedef struct sinew_tool_def {
   /// Contact detection, a sinew_detection value; default SINEW_DETECTION_EXACT.
   uint32_t detection;
   float friction;               ///< Coulomb coefficient, at least 0; default 0.
-  /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
-  float position[3];
+  float position[3];  ///< [m] Initial position, each coordinate within 1e9; default 0 0 0.
   /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
   float orientation[4];
   uint32_t reserved;            ///< Reserved; must be 0.
@@ -62,7 +60,6 @@ typedef struct sinew_tool_def {
   uint32_t collision_mask;
   /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
   float half_extents[3];
-  uint32_t reserved1;           ///< Reserved; must be 0.
 } sinew_tool_def;
 
 /// Fills a tool definition with its defaults; `struct_size` is sizeof(sinew_tool_def).
@@ -84,13 +81,13 @@ sinew_status sinew_tool_destroy(sinew_world *world, sinew_tool_id tool);
 /// step.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const float *position,
-                                 const float *orientation);
+    const float *orientation);
 
 /// Writes the current pose of a tool.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. A tool
-/// with a force_limit can be short of its commanded pose.
-sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *position,
-                                 float *orientation);
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats x y z w; both are nullable.
+/// A tool with a force_limit can be short of its commanded pose.
+sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *out_position,
+    float *out_orientation);
 
 /// Sets the friction coefficient of a tool, at least 0, from the next step on.
 sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, float friction);
@@ -102,7 +99,7 @@ sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, 
 /// Sets the collision category and mask of a tool from the next step on.
 /// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
 sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, uint32_t category,
-                                      uint32_t mask);
+    uint32_t mask);
 
 // ---- Forces and contacts ------------------------------------------------------------------------
 
@@ -110,7 +107,7 @@ sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, ui
 /// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each; both are
 /// nullable.
 sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool, float *force,
-                                   float *torque);
+    float *torque);
 
 /// Contact between a tool and a body at the end of the last step.
 typedef struct sinew_contact {
@@ -126,9 +123,9 @@ typedef struct sinew_contact {
 } sinew_contact;
 
 /// Writes the contacts of a tool at the end of the last step.
-/// `contacts` receives at most `capacity` entries, `count` the number that exist.
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist.
 sinew_status sinew_tool_get_contacts(const sinew_world *world, sinew_tool_id tool,
-                                     sinew_contact *contacts, size_t capacity, size_t *count);
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
 
 #ifdef __cplusplus
 }

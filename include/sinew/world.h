@@ -57,7 +57,6 @@ typedef struct sinew_world_def {
   sinew_run_tasks run_tasks;
   void *tasks_context;        ///< First argument of run_tasks; nullable.
   uint32_t kernel;            ///< SIMD level, a sinew_kernel value; default SINEW_KERNEL_BEST.
-  uint32_t reserved2;         ///< Reserved; must be 0.
 } sinew_world_def;
 
 /// Fills a world definition with its defaults; `struct_size` is sizeof(sinew_world_def).

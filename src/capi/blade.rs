@@ -67,8 +67,6 @@ pub struct sinew_blade_report {
     pub lag: f64,
     /// SINEW_STATUS_OK, or CAPACITY or OUT_OF_MEMORY if a cut failed; the next step retries.
     pub status: sinew_status,
-    /// Reserved; set to 0 by the library.
-    pub reserved0: u32,
     /// [m^2] Area of the opened faces of solids in the rest shape.
     ///
     /// A cell in which the cut ends stays whole, so the area can be less than the blade swept.
@@ -204,7 +202,6 @@ pub unsafe extern "C" fn sinew_blade_get_report(
                 length: told.length,
                 lag: told.lag,
                 status: told.refused.as_ref().map_or(SINEW_STATUS_OK, status_of),
-                reserved0: 0,
                 area: told.area,
             });
             Ok(())

@@ -151,7 +151,7 @@ pub unsafe extern "C" fn sinew_body_apply_forces(
 
 /// Writes a view of the node positions [m] without copying.
 ///
-/// Lifetime: until the next step, sinew_body_set_positions, sinew_body_set_velocities, sinew_body_rest_state or
+/// Lifetime: until the next step, sinew_body_set_positions, sinew_body_set_velocities, sinew_body_solve_equilibrium or
 /// topology change of the body, or its destruction.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_positions(

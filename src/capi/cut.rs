@@ -113,7 +113,7 @@ const _: () = assert!(size_of::<sinew_rim_edge>() == size_of::<NewRimEdge>());
 
 /// Cuts a body along the surface that a blade's edge swept, at the current positions.
 ///
-/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `report` is nullable. A sweep that
+/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `out_report` is nullable. A sweep that
 /// starts where the body's last one ended continues it. New nodes are appended; mass, momentum and energy are
 /// conserved. The call ends views of positions and triangles; see sinew_body_get_topology_changes. On failure
 /// nothing changes.
@@ -125,17 +125,17 @@ pub unsafe extern "C" fn sinew_body_cut(
     body: sinew_body_id,
     start: *const f32,
     end: *const f32,
-    report: *mut sinew_cut_report,
+    out_report: *mut sinew_cut_report,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world_mut(world, |world| {
             let start = edge("start", start)?;
             let end = edge("end", end)?;
-            let out = if report.is_null() {
+            let out = if out_report.is_null() {
                 None
             } else {
-                Some(memory::report("report", report)?)
+                Some(memory::report("out_report", out_report)?)
             };
             let done = world.cut(body.id(), &Sweep { start, end })?;
             if let Some(out) = out {
@@ -207,30 +207,30 @@ pub unsafe extern "C" fn sinew_body_get_triangles(
 
 /// Writes the connected component of each node, and the number of components.
 ///
-/// Nodes are connected by springs, elements and the surface. `pieces` receives `count` numbers from 0, where
-/// `count` is the number of nodes. `pieces` and `piece_count` are nullable.
+/// Nodes are connected by springs, elements and the surface. `out_pieces` receives `node_count` numbers from 0;
+/// `node_count` must be the body's number of nodes. `out_pieces` and `out_piece_count` are nullable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_pieces(
     world: *const sinew_world,
     body: sinew_body_id,
-    pieces: *mut u32,
-    count: usize,
-    piece_count: *mut u32,
+    out_pieces: *mut u32,
+    node_count: usize,
+    out_piece_count: *mut u32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            let out = memory::optional_output_array("pieces", pieces, count)?;
-            let piece_count = memory::optional_output_array("piece_count", piece_count, 1)?;
+            let out = memory::optional_output_array("out_pieces", out_pieces, node_count)?;
+            let out_piece_count = memory::optional_output_array("out_piece_count", out_piece_count, 1)?;
             if out.is_some() {
-                expect_count("pieces", count, body.node_count())?;
+                expect_count("out_pieces", node_count, body.node_count())?;
             }
             let found = body.pieces()?;
             if let Some(out) = out {
                 out.copy_from_slice(&found.of_nodes);
             }
-            if let Some(piece_count) = piece_count {
-                piece_count[0] = found.count;
+            if let Some(out_piece_count) = out_piece_count {
+                out_piece_count[0] = found.count;
             }
             Ok(())
         })

@@ -89,8 +89,6 @@ pub struct sinew_detector_report {
     ///
     /// A detector made for an open body does not check again.
     pub closed: [u32; 2],
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 /// Node of a body that lies inside the other body.
@@ -353,15 +351,15 @@ pub unsafe extern "C" fn sinew_detector_create(
 pub unsafe extern "C" fn sinew_detector_find(
     detector: *mut sinew_detector,
     world: *const sinew_world,
-    report: *mut sinew_detector_report,
+    out_report: *mut sinew_detector_report,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
             let detector = memory::output("detector", detector)?;
-            let report = memory::report("report", report)?;
+            let out_report = memory::report("out_report", out_report)?;
             detector.find(world)?;
-            report.fill(detector.found.report);
+            out_report.fill(detector.found.report);
             Ok(())
         })
     }
@@ -376,14 +374,17 @@ pub unsafe extern "C" fn sinew_detector_find(
 pub unsafe extern "C" fn sinew_detector_get_points(
     detector: *const sinew_detector,
     side: u32,
-    points: *mut *const sinew_point_inside,
-    count: *mut usize,
+    out_points: *mut *const sinew_point_inside,
+    out_count: *mut usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     guard(|| unsafe {
         let detector = memory::reference("detector", detector)?;
         let found = &detector.found.points[index_of(side)?];
-        memory::write_both(("points", points, found.as_ptr()), ("count", count, found.len()))
+        memory::write_both(
+            ("out_points", out_points, found.as_ptr()),
+            ("out_count", out_count, found.len()),
+        )
     })
 }
 
@@ -397,14 +398,17 @@ pub unsafe extern "C" fn sinew_detector_get_points(
 pub unsafe extern "C" fn sinew_detector_get_edges(
     detector: *const sinew_detector,
     side: u32,
-    edges: *mut *const sinew_edge_inside,
-    count: *mut usize,
+    out_edges: *mut *const sinew_edge_inside,
+    out_count: *mut usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     guard(|| unsafe {
         let detector = memory::reference("detector", detector)?;
         let found = &detector.found.edges[index_of(side)?];
-        memory::write_both(("edges", edges, found.as_ptr()), ("count", count, found.len()))
+        memory::write_both(
+            ("out_edges", out_edges, found.as_ptr()),
+            ("out_count", out_count, found.len()),
+        )
     })
 }
 

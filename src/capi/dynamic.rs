@@ -141,23 +141,23 @@ pub unsafe extern "C" fn sinew_tool_set_velocity(
 
 /// Writes the velocity of a dynamic tool, in world axes.
 ///
-/// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] receive 3 floats each; both are nullable.
+/// `out_velocity` [m/s] of the center of mass and `out_angular_velocity` [rad/s] receive 3 floats each; both are nullable.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_velocity(
     world: *const sinew_world,
     tool: sinew_tool_id,
-    velocity: *mut f32,
-    angular_velocity: *mut f32,
+    out_velocity: *mut f32,
+    out_angular_velocity: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
             let (linear, angular) = world.tool_velocity(tool.id())?;
             memory::write_wanted(
-                ("velocity", velocity.cast(), linear.to_array()),
-                ("angular_velocity", angular_velocity.cast(), angular.to_array()),
+                ("out_velocity", out_velocity.cast(), linear.to_array()),
+                ("out_angular_velocity", out_angular_velocity.cast(), angular.to_array()),
             )
         })
     }

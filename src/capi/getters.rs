@@ -216,18 +216,36 @@ pub unsafe extern "C" fn sinew_body_get_pressure(
 
 /// Writes the current pose of a blade.
 ///
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats x y z w; both are nullable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_get_pose(
     world: *const sinew_world,
     blade: sinew_blade_id,
-    position: *mut f32,
-    orientation: *mut f32,
+    out_position: *mut f32,
+    out_orientation: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            write_pose(world.blade_pose(blade.id())?, position, orientation)
+            write_pose(world.blade_pose(blade.id())?, out_position, out_orientation)
+        })
+    }
+}
+
+/// Writes the collision category and mask of a blade.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_blade_get_collision(
+    world: *const sinew_world,
+    blade: sinew_blade_id,
+    out_category: *mut u32,
+    out_mask: *mut u32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let filter = world.blade_collision_filter(blade.id())?;
+            let category = ("out_category", out_category, filter.category);
+            memory::write_both(category, ("out_mask", out_mask, filter.mask))
         })
     }
 }

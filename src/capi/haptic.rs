@@ -61,8 +61,8 @@ pub struct sinew_haptic_def {
 /// Result of a haptic tick.
 #[repr(C)]
 #[derive(Clone, Copy)]
-pub struct sinew_haptic_result {
-    /// Set to sizeof(sinew_haptic_result) before the call.
+pub struct sinew_haptic_report {
+    /// Set to sizeof(sinew_haptic_report) before the call.
     pub struct_size: usize,
     /// [N] Force on the device until the next tick, in world axes.
     pub force: [f32; 3],
@@ -106,7 +106,7 @@ pub struct sinew_haptic_contact {
 unsafe impl Versioned for sinew_haptic_def {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_haptic_result {}
+unsafe impl Versioned for sinew_haptic_report {}
 
 impl sinew_haptic_def {
     fn defaults() -> Self {
@@ -144,7 +144,7 @@ impl sinew_haptic_def {
     }
 }
 
-impl sinew_haptic_result {
+impl sinew_haptic_report {
     fn of(tick: HapticTick, is_over: bool) -> Self {
         Self {
             struct_size: size_of::<Self>(),
@@ -233,7 +233,7 @@ pub unsafe extern "C" fn sinew_haptic_tick(
     velocity: *const f32,
     angular_velocity: *const f32,
     dt: f32,
-    out: *mut sinew_haptic_result,
+    out: *mut sinew_haptic_report,
 ) -> sinew_status {
     // SAFETY: the caller vouches for the handle where the pointer is not NULL.
     let Some(haptic) = (unsafe { haptic.as_mut() }) else {
@@ -256,21 +256,21 @@ pub unsafe extern "C" fn sinew_haptic_tick(
         let tick = haptic.handle.tick(pose, along, about, dt)?;
         haptic.orientation = orientation;
         // SAFETY: still there.
-        unsafe { out.fill(sinew_haptic_result::of(tick, haptic.handle.is_over())) };
+        unsafe { out.fill(sinew_haptic_report::of(tick, haptic.handle.is_over())) };
         Ok(())
     })
 }
 
 /// Writes the contacts of the model that the last tick used, without waiting.
 ///
-/// `contacts` receives at most `capacity` entries, `count` the number that exist, at most 32; with more, those with
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist, at most 32; with more, those with
 /// the largest force.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_get_contacts(
     haptic: *const sinew_haptic,
-    contacts: *mut sinew_haptic_contact,
+    out_contacts: *mut sinew_haptic_contact,
     capacity: usize,
-    count: *mut usize,
+    out_count: *mut usize,
 ) -> sinew_status {
     // SAFETY: the caller vouches for the handle where the pointer is not NULL.
     let Some(haptic) = (unsafe { haptic.as_ref() }) else {
@@ -278,17 +278,17 @@ pub unsafe extern "C" fn sinew_haptic_get_contacts(
     };
     guard(|| {
         // SAFETY: the same contract.
-        let count = unsafe { memory::output("count", count) }?;
+        let out_count = unsafe { memory::output("out_count", out_count) }?;
         // SAFETY: the same contract.
-        let contacts = unsafe { memory::output_array("contacts", contacts, capacity) }?;
+        let out_contacts = unsafe { memory::output_array("out_contacts", out_contacts, capacity) }?;
         let mut found = 0;
         haptic.handle.contacts(|contact| {
-            if let Some(place) = contacts.get_mut(found) {
+            if let Some(place) = out_contacts.get_mut(found) {
                 *place = contact.into();
             }
             found += 1;
         });
-        *count = found;
+        *out_count = found;
         Ok(())
     })
 }

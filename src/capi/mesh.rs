@@ -77,8 +77,6 @@ pub struct sinew_mesh_view {
     pub flipped_tetrahedra: usize,
     /// 1: every surface edge is used equally often in both directions; 0: open.
     pub closed: u32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
     /// 8 * cell_count node indices of lattice cubes; corner bits: x 1, y 2, z 4.
     pub cells: *const u32,
     /// Number of cells.
@@ -127,7 +125,6 @@ impl sinew_mesh_view {
             dropped_tetrahedra: report.dropped_tetrahedra(),
             flipped_tetrahedra: report.flipped_tetrahedra,
             closed: u32::from(*closed),
-            reserved: 0,
             cells: loaded.mesh.cells.as_ptr().cast(),
             cell_count: loaded.mesh.cells.len(),
         }

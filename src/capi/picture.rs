@@ -104,15 +104,12 @@ pub struct sinew_body_values {
     pub high: f32,
     /// Color map, a sinew_colours value.
     pub colours: u32,
-    /// Reserved; must be 0.
-    pub reserved: u32,
 }
 
 impl sinew_body_values {
     /// # Safety
     /// `values` is NULL or as long as stated.
     unsafe fn values<'a>(&self) -> Result<BodyValues<'a>> {
-        memory::reserved("reserved", self.reserved)?;
         Ok(BodyValues {
             body: self.body.id(),
             // SAFETY: the same contract.

@@ -26,25 +26,37 @@ pub struct sinew_surface_point {
     pub normal: [f32; 3],
     /// [m] Distance from the query point.
     pub distance: f32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_surface_point {}
 
+impl sinew_surface_point {
+    pub(super) const NONE: Self = Self {
+        struct_size: size_of::<Self>(),
+        body: sinew_body_id {
+            index1: 0,
+            generation: 0,
+        },
+        triangle: 0,
+        weights: [0.0; 3],
+        position: [0.0; 3],
+        normal: [0.0; 3],
+        distance: 0.0,
+    };
+}
+
 impl From<Option<SurfaceHit>> for sinew_surface_point {
     fn from(found: Option<SurfaceHit>) -> Self {
-        Self {
+        found.map_or(Self::NONE, |found| Self {
             struct_size: size_of::<Self>(),
-            body: found.map_or(sinew_body_id::default(), |found| found.body.into()),
-            triangle: found.map_or(0, |found| found.triangle),
-            weights: found.map_or([0.0; 3], |found| found.weights),
-            position: found.map_or([0.0; 3], |found| found.position.to_array()),
-            normal: found.map_or([0.0; 3], |found| found.normal.to_array()),
-            distance: found.map_or(0.0, |found| found.distance),
-            reserved: 0,
-        }
+            body: found.body.into(),
+            triangle: found.triangle,
+            weights: found.weights,
+            position: found.position.to_array(),
+            normal: found.normal.to_array(),
+            distance: found.distance,
+        })
     }
 }
 
@@ -115,8 +127,6 @@ pub struct sinew_ray_hit {
     pub normal: [f32; 3],
     /// [m] Distance from the origin.
     pub distance: f32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -133,7 +143,6 @@ impl From<Option<RayHit>> for sinew_ray_hit {
             position: [0.0; 3],
             normal: [0.0; 3],
             distance: 0.0,
-            reserved: 0,
         };
         match hit {
             None => nothing,

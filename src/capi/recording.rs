@@ -25,8 +25,6 @@ pub struct sinew_replay_report {
     pub replayed_hash: u64,
     /// 1 if the file ends within a step, else 0.
     pub cut_short: u32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -42,7 +40,6 @@ impl From<ReplayReport> for sinew_replay_report {
             recorded_hash: difference.map_or(0, |difference| difference.recorded),
             replayed_hash: difference.map_or(0, |difference| difference.replayed),
             cut_short: u32::from(report.is_cut_short),
-            reserved: 0,
         }
     }
 }

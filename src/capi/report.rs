@@ -64,8 +64,6 @@ pub struct sinew_solver_report {
     pub auto_substeps: u32,
     /// [s] AUTO: step length of the choice, the mean of the world so far or 1/60 s; else 0.
     pub auto_step: f32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 /// Sums over the closed cavities of a body; all 0 without enclosed_stiffness and pressure.
@@ -172,7 +170,6 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
                 },
                 auto_substeps: choice.substeps,
                 auto_step: choice.step,
-                reserved: 0,
             });
             Ok(())
         })

@@ -97,19 +97,19 @@ pub unsafe extern "C" fn sinew_body_unpin_box(
 
 /// Writes the reaction forces on all nodes, averaged over the last step.
 ///
-/// `forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool holds. `node_count` must
+/// `out_forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool holds. `node_count` must
 /// be the body's number of nodes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_pin_forces(
     world: *const sinew_world,
     body: sinew_body_id,
-    forces: *mut f32,
+    out_forces: *mut f32,
     node_count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            body.pin_forces(memory::output_array("forces", forces.cast(), node_count)?)
+            body.pin_forces(memory::output_array("out_forces", out_forces.cast(), node_count)?)
         })
     }
 }

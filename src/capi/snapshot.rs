@@ -1,12 +1,9 @@
 //! Worlds as bytes.
 
-use std::ffi::c_void;
-
 use super::guard::{guard, sinew_world, with_world};
 use super::memory;
 use super::status::sinew_status;
-use super::world::sinew_run_tasks;
-use crate::threads::RunTasks;
+use super::world::sinew_world_def;
 use crate::world::World;
 
 /// Writes the number of bytes that sinew_world_save_snapshot needs now.
@@ -34,22 +31,22 @@ pub unsafe extern "C" fn sinew_world_get_snapshot_size(world: *const sinew_world
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_save_snapshot(
     world: *const sinew_world,
-    bytes: *mut u8,
+    out_bytes: *mut u8,
     size: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let bytes = memory::output_array("bytes", bytes, size)?;
-            world.save_into(bytes)
+            let out_bytes = memory::output_array("out_bytes", out_bytes, size)?;
+            world.save_into(out_bytes)
         })
     }
 }
 
 /// Creates a world from the bytes of a snapshot.
 ///
-/// `thread_count`, `run_tasks` (nullable) and `tasks_context` (nullable) are as in sinew_world_def. Destroy the
-/// world with sinew_world_destroy. Results are bitwise identical only with the kernel of the saved world.
+/// `def` is nullable: the defaults. Its thread_count, run_tasks and tasks_context apply; the snapshot holds the other
+/// settings. Destroy the world with sinew_world_destroy. Results are bitwise identical only with the kernel of the saved world.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bytes are damaged; SINEW_STATUS_UNSUPPORTED for another library
 /// version or kernel, or if a thread could not be started.
@@ -57,17 +54,15 @@ pub unsafe extern "C" fn sinew_world_save_snapshot(
 pub unsafe extern "C" fn sinew_world_load_snapshot(
     bytes: *const u8,
     size: usize,
-    thread_count: u32,
-    run_tasks: sinew_run_tasks,
-    tasks_context: *mut c_void,
+    def: *const sinew_world_def,
     out: *mut *mut sinew_world,
 ) -> sinew_status {
     guard(|| {
         // SAFETY: the same contract.
         let (out, bytes) = unsafe { (memory::output("out", out)?, memory::array("bytes", bytes, size)?) };
         // SAFETY: the same contract.
-        let tasks = run_tasks.map(|run| unsafe { RunTasks::from_c(run, tasks_context) });
-        let world = World::load(bytes, thread_count, tasks)?;
+        let def = unsafe { sinew_world_def::read_or_default(def) }?;
+        let world = World::load(bytes, def.thread_count, def.tasks)?;
         *out = Box::into_raw(crate::base::memory::boxed(sinew_world::new(world))?);
         Ok(())
     })

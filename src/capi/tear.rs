@@ -22,8 +22,6 @@ pub struct sinew_tear_report {
     pub small_pieces: u32,
     /// Overloaded springs without spare nodes, FAST_LINK slots or memory; retried after a topology change.
     pub no_room: u32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -47,7 +45,6 @@ pub unsafe extern "C" fn sinew_body_get_tear_report(
                 waiting: report.waiting,
                 small_pieces: report.small_pieces,
                 no_room: report.no_room,
-                reserved: 0,
             });
             Ok(())
         })
@@ -67,9 +64,9 @@ pub unsafe extern "C" fn sinew_body_set_tear_limits(
     world: *mut sinew_world,
     body: sinew_body_id,
     pairs: *const u32,
-    count: usize,
     strains: *const f32,
     forces: *const f32,
+    count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {

@@ -97,8 +97,6 @@ pub struct sinew_tool_def {
     pub collision_mask: u32,
     /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
     pub half_extents: [f32; 3],
-    /// Reserved; must be 0.
-    pub reserved1: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -142,7 +140,6 @@ impl sinew_tool_def {
             collision_category: CollisionFilter::default().category,
             collision_mask: CollisionFilter::default().mask,
             half_extents: [0.0; 3],
-            reserved1: 0,
         }
     }
 
@@ -153,7 +150,6 @@ impl sinew_tool_def {
     unsafe fn definition<'a>(&self) -> Result<ToolDefinition<'a>> {
         memory::reserved("reserved0", self.reserved0)?;
         memory::reserved("reserved", self.reserved)?;
-        memory::reserved("reserved1", self.reserved1)?;
         let detection = detection("detection", self.detection)?;
         let shape = match self.shape {
             SINEW_SHAPE_SPHERE => Shape::Sphere { radius: self.radius },
@@ -293,34 +289,38 @@ pub unsafe extern "C" fn sinew_tool_set_collision(
 
 /// Writes the current pose of a tool.
 ///
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. A tool with a
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats x y z w; both are nullable. A tool with a
 /// force_limit can be short of its commanded pose.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_pose(
     world: *const sinew_world,
     tool: sinew_tool_id,
-    position: *mut f32,
-    orientation: *mut f32,
+    out_position: *mut f32,
+    out_orientation: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe { with_world(world, |world| write_pose(world.pose(tool.id())?, position, orientation)) }
+    unsafe {
+        with_world(world, |world| {
+            write_pose(world.pose(tool.id())?, out_position, out_orientation)
+        })
+    }
 }
 
 /// Writes the pose that the last step moved a tool to, before the force_limit.
 ///
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. Replaying these poses
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats x y z w; both are nullable. Replaying these poses
 /// with sinew_tool_set_pose reproduces the steps, also those that a haptic handle drove.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_target(
     world: *const sinew_world,
     tool: sinew_tool_id,
-    position: *mut f32,
-    orientation: *mut f32,
+    out_position: *mut f32,
+    out_orientation: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            write_pose(world.tool_target(tool.id())?, position, orientation)
+            write_pose(world.tool_target(tool.id())?, out_position, out_orientation)
         })
     }
 }
@@ -330,8 +330,8 @@ pub unsafe extern "C" fn sinew_tool_get_target(
 /// # Safety
 /// Each place is NULL or writable: for 3 floats, and for 4.
 pub(super) unsafe fn write_pose(pose: Pose, position: *mut f32, orientation: *mut f32) -> Result<()> {
-    let position = ("position", position.cast(), pose.position.to_array());
-    let orientation = ("orientation", orientation.cast(), pose.orientation.to_array());
+    let position = ("out_position", position.cast(), pose.position.to_array());
+    let orientation = ("out_orientation", orientation.cast(), pose.orientation.to_array());
     // SAFETY: the same contract.
     unsafe { memory::write_wanted(position, orientation) }
 }

@@ -133,37 +133,37 @@ pub unsafe extern "C" fn sinew_body_get_bounds(
 
 /// Writes the unit normals of the surface of a body at its nodes.
 ///
-/// They are area-weighted and point outward; 0 for a node without a triangle. `normals` receives 3 * node_count floats;
+/// They are area-weighted and point outward; 0 for a node without a triangle. `out_normals` receives 3 * node_count floats;
 /// `node_count` must be the body's number of nodes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_normals(
     world: *const sinew_world,
     body: sinew_body_id,
-    normals: *mut f32,
+    out_normals: *mut f32,
     node_count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            body.normals(memory::output_array("normals", normals.cast(), node_count)?)
+            body.normals(memory::output_array("out_normals", out_normals.cast(), node_count)?)
         })
     }
 }
 
 /// Writes the masses [kg] of all nodes of a body; see sinew_body_get_node_mass.
 ///
-/// `masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
+/// `out_masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_masses(
     world: *const sinew_world,
     body: sinew_body_id,
-    masses: *mut f32,
+    out_masses: *mut f32,
     node_count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            body.node_masses(memory::output_array("masses", masses, node_count)?)
+            body.node_masses(memory::output_array("out_masses", out_masses, node_count)?)
         })
     }
 }

@@ -76,8 +76,6 @@ pub struct sinew_world_def {
     pub tasks_context: *mut c_void,
     /// SIMD level, a sinew_kernel value; default SINEW_KERNEL_BEST.
     pub kernel: u32,
-    /// Reserved; must be 0.
-    pub reserved2: u32,
 }
 
 /// Report of a step; written on SINEW_STATUS_OK and on SINEW_STATUS_UNSTABLE.
@@ -146,15 +144,25 @@ impl sinew_world_def {
             run_tasks: None,
             tasks_context: std::ptr::null_mut(),
             kernel: SINEW_KERNEL_BEST,
-            reserved2: 0,
         }
+    }
+
+    /// # Safety
+    /// `def` is NULL or points to a definition of the size that it states, whose `run_tasks` is as [`Self::definition`] says.
+    pub(super) unsafe fn read_or_default(def: *const Self) -> Result<WorldDefinition> {
+        let mut read = Self::defaults();
+        if !def.is_null() {
+            // SAFETY: the same contract.
+            read = unsafe { memory::definition("def", def, read) }?;
+        }
+        // SAFETY: the same contract.
+        unsafe { read.definition() }
     }
 
     /// # Safety
     /// `run_tasks` is NULL or what [`sinew_run_tasks`] says, for as long as a world of this definition lives.
     unsafe fn definition(&self) -> Result<WorldDefinition> {
         memory::reserved("reserved", self.reserved)?;
-        memory::reserved("reserved2", self.reserved2)?;
         // SAFETY: the same contract.
         let run_tasks = |run| unsafe { RunTasks::from_c(run, self.tasks_context) };
         Ok(WorldDefinition {

@@ -205,9 +205,11 @@ fn comment(paragraphs: &[String], indent: &str) -> String {
 /// Code with its comment: behind it, in this column, where there is room, else above.
 fn commented(code: &str, of: &[String], indent: &str, column: usize) -> String {
     if let [text] = of {
-        let line = format!("{:column$}///< {text}\n", format!("{indent}{code}  "));
-        if line.len() <= WIDTH + 1 {
-            return line;
+        let code = format!("{indent}{code}  ");
+        for line in [format!("{code:column$}///< {text}\n"), format!("{code}///< {text}\n")] {
+            if line.len() <= WIDTH + 1 {
+                return line;
+            }
         }
     }
     format!("{}{indent}{code}\n", comment(&[of.join(" ")], indent))
@@ -228,9 +230,8 @@ impl Item {
             else {
                 return text + &wrap(self.code.split_whitespace(), "", "    ");
             };
-            let first = format!("{head}(");
             let pieces = arguments.split_inclusive(',').map(str::trim_start);
-            return text + &wrap(pieces, &first, &" ".repeat(first.len()));
+            return text + &wrap(pieces, &format!("{head}("), "    ");
         }
         let is_enum = self.code.starts_with("typedef enum");
         let last = self.members.len() - 1;
@@ -395,7 +396,8 @@ pub fn arrange(declared: &str) -> Vec<Header> {
         });
         all += &format!("\n{}{}", prose(&part.introduction), part.content);
     }
-    overview += "\n#endif\n";
+    overview += "#include \"sinew/helpers.h\"\n\n";
+    overview += "#ifdef SINEW_COMPAT_0_1 // names of version 0.1\n#include \"sinew/compat_0_1.h\"\n#endif\n\n#endif\n";
     all += CLOSE;
     for (path, text) in [("sinew.h", overview), ("sinew/sinew_all.h", all)] {
         headers.push(Header {
