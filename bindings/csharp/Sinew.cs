@@ -131,6 +131,18 @@ public static unsafe class Sinew
     public static extern int sinew_world_set_gravity(IntPtr world, float* gravity);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_get_gravity(IntPtr world, float* out_gravity);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_set_substeps(IntPtr world, uint substeps, uint max_substeps);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_get_substeps(IntPtr world, uint* out_substeps, uint* out_max_substeps);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_get_time(IntPtr world, double* out_time, ulong* out_steps);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_world_get_state_hash(IntPtr world, ulong* @out);
 
     public enum sinew_mesh_format { SINEW_MESH_FORMAT_AUTO = 0, SINEW_MESH_FORMAT_OBJ = 1, SINEW_MESH_FORMAT_STL = 2, SINEW_MESH_FORMAT_VTK = 3, SINEW_MESH_FORMAT_GMSH = 4, SINEW_MESH_FORMAT_TETGEN = 5 }
@@ -149,6 +161,12 @@ public static unsafe class Sinew
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_mesh_create_organ(float length, float spacing, IntPtr* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_mesh_create(float* positions, UIntPtr node_count, uint* triangles, UIntPtr triangle_count, uint* tetrahedra, UIntPtr tetrahedron_count, IntPtr* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_mesh_create_filled(IntPtr surface, float spacing, IntPtr* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern void sinew_mesh_destroy(IntPtr mesh);
@@ -327,6 +345,9 @@ public static unsafe class Sinew
     public static extern int sinew_body_set_collision(IntPtr world, sinew_body_id body, uint category, uint mask);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_collision(IntPtr world, sinew_body_id body, uint* out_category, uint* out_mask);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_wake(IntPtr world, sinew_body_id body);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -377,10 +398,19 @@ public static unsafe class Sinew
     public static extern int sinew_tool_set_friction(IntPtr world, sinew_tool_id tool, float friction);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_get_friction(IntPtr world, sinew_tool_id tool, float* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_tool_set_force_limit(IntPtr world, sinew_tool_id tool, float force_limit);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_get_force_limit(IntPtr world, sinew_tool_id tool, float* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_tool_set_collision(IntPtr world, sinew_tool_id tool, uint category, uint mask);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_get_collision(IntPtr world, sinew_tool_id tool, uint* out_category, uint* out_mask);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_tool_get_wrench(IntPtr world, sinew_tool_id tool, float* force, float* torque);
@@ -435,6 +465,9 @@ public static unsafe class Sinew
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_set_pressure(IntPtr world, sinew_body_id body, float pressure);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_pressure(IntPtr world, sinew_body_id body, float* @out);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_enclosed_report
@@ -699,6 +732,15 @@ public static unsafe class Sinew
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_blade_set_pose(IntPtr world, sinew_blade_id blade, float* position, float* orientation);
 
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_blade_get_pose(IntPtr world, sinew_blade_id blade, float* out_position, float* out_orientation);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_blade_set_collision(IntPtr world, sinew_blade_id blade, uint category, uint mask);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_blade_get_collision(IntPtr world, sinew_blade_id blade, uint* out_category, uint* out_mask);
+
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_blade_report
     {
@@ -883,12 +925,6 @@ public static unsafe class Sinew
     public static extern int sinew_reader_read(IntPtr reader, sinew_frame* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_mesh_create(float* positions, UIntPtr node_count, uint* triangles, UIntPtr triangle_count, uint* tetrahedra, UIntPtr tetrahedron_count, IntPtr* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_mesh_create_filled(IntPtr surface, float spacing, IntPtr* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_def_set_mesh(sinew_body_def* def, IntPtr mesh);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -959,42 +995,6 @@ public static unsafe class Sinew
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_world_cast_ray_filtered(IntPtr world, float* origin, float* direction, float max_distance, uint category, uint mask, sinew_ray_hit* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_get_time(IntPtr world, double* out_time, ulong* out_steps);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_get_gravity(IntPtr world, float* out_gravity);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_collision(IntPtr world, sinew_body_id body, uint* out_category, uint* out_mask);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_pressure(IntPtr world, sinew_body_id body, float* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tool_get_friction(IntPtr world, sinew_tool_id tool, float* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tool_get_force_limit(IntPtr world, sinew_tool_id tool, float* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tool_get_collision(IntPtr world, sinew_tool_id tool, uint* out_category, uint* out_mask);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_blade_get_pose(IntPtr world, sinew_blade_id blade, float* out_position, float* out_orientation);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_blade_set_collision(IntPtr world, sinew_blade_id blade, uint category, uint mask);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_blade_get_collision(IntPtr world, sinew_blade_id blade, uint* out_category, uint* out_mask);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_set_substeps(IntPtr world, uint substeps, uint max_substeps);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_get_substeps(IntPtr world, uint* out_substeps, uint* out_max_substeps);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_body_settings

@@ -100,6 +100,11 @@ typedef struct sinew_step_report {
 } sinew_step_report;
 sinew_status sinew_world_step(sinew_world *world, float dt, sinew_step_report *report);
 sinew_status sinew_world_set_gravity(sinew_world *world, const float *gravity);
+sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravity);
+sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uint32_t max_substeps);
+sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
+    uint32_t *out_max_substeps);
+sinew_status sinew_world_get_time(const sinew_world *world, double *out_time, uint64_t *out_steps);
 sinew_status sinew_world_get_state_hash(const sinew_world *world, uint64_t *out);
 typedef struct sinew_mesh sinew_mesh;
 typedef enum sinew_mesh_format {
@@ -115,6 +120,9 @@ sinew_status sinew_mesh_create_cloth(const float *size, const uint32_t *cells, s
 sinew_status sinew_mesh_create_block(const float *size, const uint32_t *cells, sinew_mesh **out);
 sinew_status sinew_mesh_create_lattice(float edge, const uint32_t *cells, sinew_mesh **out);
 sinew_status sinew_mesh_create_organ(float length, float spacing, sinew_mesh **out);
+sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
+    size_t triangle_count, const uint32_t *tetrahedra, size_t tetrahedron_count, sinew_mesh **out);
+sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, sinew_mesh **out);
 void sinew_mesh_destroy(sinew_mesh *mesh);
 typedef struct sinew_mesh_view {
   size_t struct_size;
@@ -274,6 +282,8 @@ sinew_status sinew_body_get_pin_force(const sinew_world *world, sinew_body_id bo
     float *force);
 sinew_status sinew_body_set_collision(sinew_world *world, sinew_body_id body, uint32_t category,
     uint32_t mask);
+sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_category, uint32_t *out_mask);
 sinew_status sinew_body_wake(sinew_world *world, sinew_body_id body);
 sinew_status sinew_body_get_awake_share(const sinew_world *world, sinew_body_id body, float *out);
 typedef enum sinew_shape {
@@ -312,9 +322,13 @@ sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const f
 sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *out_position,
     float *out_orientation);
 sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, float friction);
+sinew_status sinew_tool_get_friction(const sinew_world *world, sinew_tool_id tool, float *out);
 sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, float force_limit);
+sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id tool, float *out);
 sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, uint32_t category,
     uint32_t mask);
+sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
+    uint32_t *out_category, uint32_t *out_mask);
 sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool, float *force,
     float *torque);
 typedef struct sinew_contact {
@@ -358,6 +372,7 @@ sinew_status sinew_body_set_springs(sinew_world *world, sinew_body_id body, cons
 sinew_status sinew_body_scale_region(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
     size_t node_count, float stiffness_factor, float length_factor);
 sinew_status sinew_body_set_pressure(sinew_world *world, sinew_body_id body, float pressure);
+sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
 typedef struct sinew_enclosed_report {
   size_t struct_size;
   size_t cavity_count;
@@ -539,6 +554,12 @@ sinew_status sinew_blade_create(sinew_world *world, const sinew_blade_def *def,
 sinew_status sinew_blade_destroy(sinew_world *world, sinew_blade_id blade);
 sinew_status sinew_blade_set_pose(sinew_world *world, sinew_blade_id blade, const float *position,
     const float *orientation);
+sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade,
+    float *out_position, float *out_orientation);
+sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
+    uint32_t mask);
+sinew_status sinew_blade_get_collision(const sinew_world *world, sinew_blade_id blade,
+    uint32_t *out_category, uint32_t *out_mask);
 typedef struct sinew_blade_report {
   size_t struct_size;
   float force[3];
@@ -665,9 +686,6 @@ typedef struct sinew_frame {
   uint32_t is_over;
 } sinew_frame;
 sinew_status sinew_reader_read(sinew_reader *reader, sinew_frame *out);
-sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
-    size_t triangle_count, const uint32_t *tetrahedra, size_t tetrahedron_count, sinew_mesh **out);
-sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, sinew_mesh **out);
 sinew_status sinew_body_def_set_mesh(sinew_body_def *def, const sinew_mesh *mesh);
 sinew_status sinew_body_transform(sinew_world *world, sinew_body_id body, const float *translation,
     const float *rotation, const float *pivot);
@@ -715,24 +733,6 @@ typedef struct sinew_ray_hit {
 sinew_status sinew_world_cast_ray_filtered(const sinew_world *world, const float *origin,
     const float *direction, float max_distance, uint32_t category, uint32_t mask,
     sinew_ray_hit *out);
-sinew_status sinew_world_get_time(const sinew_world *world, double *out_time, uint64_t *out_steps);
-sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravity);
-sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
-    uint32_t *out_category, uint32_t *out_mask);
-sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
-sinew_status sinew_tool_get_friction(const sinew_world *world, sinew_tool_id tool, float *out);
-sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id tool, float *out);
-sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
-    uint32_t *out_category, uint32_t *out_mask);
-sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade,
-    float *out_position, float *out_orientation);
-sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
-    uint32_t mask);
-sinew_status sinew_blade_get_collision(const sinew_world *world, sinew_blade_id blade,
-    uint32_t *out_category, uint32_t *out_mask);
-sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uint32_t max_substeps);
-sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
-    uint32_t *out_max_substeps);
 typedef struct sinew_body_settings {
   size_t struct_size;
   float contact_thickness;

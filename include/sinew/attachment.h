@@ -10,45 +10,38 @@
 #include "base.h"
 #include "query.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 // ---- Creation -----------------------------------------------------------------------------------
 
-/// What is attached to what: nodes or surface points of a body, to a tool or to nodes or points of
-/// a body.
+/// Nodes or surface points of a body that are attached to a tool or a body.
 /// Filled by sinew_attachment_def_init; read only during sinew_attachment_create.
 typedef struct sinew_attachment_def {
   size_t struct_size;               ///< Size of this struct; sinew_attachment_def_init sets it.
   sinew_body_id body;               ///< Body whose nodes or points are attached; no default.
   sinew_tool_id tool;  ///< Tool that they are attached to; all zero (default): those of `other`.
-  /// Body that they are attached to, also the same body; all zero (default): the tool.
-  sinew_body_id other;
+  sinew_body_id other;  ///< Body that they are attached to; all zero (default): the tool.
   size_t count;                     ///< Number of attachments; default 0.
   const uint32_t *nodes;            ///< `count` node indices; nullable: points.
-  const uint32_t *triangles;  ///< `count` surface triangle indices, one per point; nullable: nodes.
-  /// 3 * count corner weights of the points, at least 0 with sum 1; nullable: nodes.
+  const uint32_t *triangles;  ///< `count` surface triangle indices of points; nullable: nodes.
+  /// 3 * count corner weights of them, at least 0 with sum 1; nullable: nodes.
   const float *weights;
   const uint32_t *other_nodes;  ///< `count` node indices of `other`; nullable: points or a tool.
   /// `count` surface triangle indices of `other`; nullable: nodes or a tool.
   const uint32_t *other_triangles;
   /// 3 * count corner weights of these points; nullable: nodes or a tool.
   const float *other_weights;
-  /// [N] Mean force of a step above which an attachment breaks, at least 0. Infinity (default) or
-  /// 0: unlimited.
-  float force_limit;
+  float force_limit;  ///< [N] Mean force above which it breaks; infinity (default) or 0: unlimited.
 } sinew_attachment_def;
 
 /// Fills an attachment definition with its defaults; `struct_size` is sizeof(sinew_attachment_def).
 sinew_status sinew_attachment_def_init(sinew_attachment_def *def, size_t struct_size);
 
 /// Attaches nodes or surface points of a body to a tool or to a body, each by its own attachment.
-/// A tool holds its nodes, and the corners of its points, rigidly, and does not collide with them.
-/// Two bodies join at one point that both rotate about; a gap closes at no more than 0.25 m/s.
-/// `out_attachments` receives `count` ids.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool takes a node that is pinned, massless or held,
-/// or both ends are the same.
+/// A tool holds them rigidly and does not collide with them. Two bodies join at one point that both
+/// rotate about; a gap closes at no more than 0.25 m/s. `out_attachments` receives `count` ids.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node for a tool is pinned, massless or held, or both
+/// ends are the same.
 sinew_status sinew_attachment_create(sinew_world *world, const sinew_attachment_def *def,
     sinew_attachment_id *out_attachments);
 
@@ -57,27 +50,24 @@ sinew_status sinew_attachment_create(sinew_world *world, const sinew_attachment_
 /// Settings of a suture, filled by sinew_suture_def_init.
 typedef struct sinew_suture_def {
   size_t struct_size;  ///< Size of this struct; sinew_suture_def_init sets it.
-  /// [m] Unloaded length of the thread, at least 0; -1 (default): the current distance.
-  float length;
+  float length;        ///< [m] Unloaded length of the thread; -1 (default): the current distance.
   float stiffness;  ///< [N/m] Stiffness of the thread, above 0; infinity (default): inextensible.
-  /// [N] Mean force above which it tears out, at least 0; infinity (default) or 0: unlimited.
-  float force_limit;
+  float force_limit;   ///< [N] Mean force where it tears out; infinity (default) or 0: unlimited.
 } sinew_suture_def;
 
 /// Fills a suture definition with its defaults; `struct_size` is sizeof(sinew_suture_def).
 sinew_status sinew_suture_def_init(sinew_suture_def *def, size_t struct_size);
 
 /// Joins two surface points of bodies by a thread, which pulls and never pushes.
-/// Body, triangle and weights of the points count; the bodies may be the same and still collide.
-/// `def` is nullable: the defaults. A thread shorter than the distance is drawn in at no more than
-/// 0.25 m/s. Release and force are those of an attachment; a torn suture is in
-/// sinew_world_get_broken_attachments.
+/// Body, triangle and weights of the points count. The bodies may be the same and still collide.
+/// `def` is nullable: the defaults. The thread is drawn in at no more than 0.25 m/s. It is an
+/// attachment.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if both points are the same.
 sinew_status sinew_suture_create(sinew_world *world, const sinew_surface_point *point,
     const sinew_surface_point *other_point, const sinew_suture_def *def, sinew_attachment_id *out);
 
-/// Changes the length [m] of a suture's thread evenly over the next step.
-/// The length is at least 0. It shortens by at most 0.25 m/s, over as many steps as that takes.
+/// Changes the length [m] of a suture's thread over the next step, by at most 0.25 m/s.
+/// A longer change goes on over the following steps.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
 sinew_status sinew_suture_set_length(sinew_world *world, sinew_attachment_id suture, float length);
 
@@ -86,8 +76,7 @@ typedef struct sinew_suture_report {
   size_t struct_size;  ///< Set to sizeof(sinew_suture_report) before the call.
   float length;        ///< [m] Unloaded length of the thread.
   float distance;      ///< [m] Distance of its points; larger than the length under load.
-  /// [J] Energy stored in the thread, not part of the bodies' energy; 0 if inextensible.
-  double energy;
+  double energy;       ///< [J] Energy of the thread, not of the bodies; 0 if inextensible.
 } sinew_suture_report;
 
 /// Writes the current state of a suture.
@@ -101,20 +90,17 @@ sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_
 /// Errors: SINEW_STATUS_STALE_ID also if it broke, or if a body or the tool was destroyed.
 sinew_status sinew_attachment_release(sinew_world *world, sinew_attachment_id attachment);
 
-/// Writes the force of an attachment on its body, averaged over the last step.
-/// `out_force` [N] receives 3 floats in world axes, 0 before the first step. After
-/// sinew_body_solve_equilibrium it is the force of the tool in equilibrium.
+/// Writes the force [N] of an attachment on its body, averaged over the last step.
+/// `out_force` receives 3 floats in world axes. After sinew_body_solve_equilibrium it is the force
+/// of the tool in equilibrium.
 sinew_status sinew_attachment_get_force(const sinew_world *world, sinew_attachment_id attachment,
     float *out_force);
 
 /// Writes the attachments that broke in the last step because of their force_limit.
-/// `out_attachments` receives at most `capacity` ids, `out_count` the number that broke. The ids
-/// are stale: compare them with those you stored.
+/// `out_attachments` receives at most `capacity` ids, which are stale, `out_count` their number.
 sinew_status sinew_world_get_broken_attachments(const sinew_world *world,
     sinew_attachment_id *out_attachments, size_t capacity, size_t *out_count);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

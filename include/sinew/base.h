@@ -21,6 +21,11 @@
 // library fills, set struct_size to sizeof the struct before the call. A struct_size that no header
 // gave the struct, such as 0, is refused.
 //
+// Values: a number of a definition is at least 0, and 0 by default, unless its comment says
+// otherwise. An orientation is not zero; the library normalizes it. Coordinates of tools and blades
+// are within 1e9 m. A node_count beside a body must be its number of nodes. Two objects collide if
+// each has a collision category in the mask of the other.
+//
 // Threads: any number of threads may use a const sinew_world * at the same time. A sinew_world *
 // needs exclusive access to that world. Worlds are independent of each other. Readers and haptic
 // handles work on their own thread while other threads use the world.
@@ -38,8 +43,14 @@
 #include <stdint.h>
 
 #ifdef __cplusplus
-extern "C" {
+#define SINEW_BEGIN extern "C" {
+#define SINEW_END }
+#else
+#define SINEW_BEGIN
+#define SINEW_END
 #endif
+
+SINEW_BEGIN
 
 // ---- Version ------------------------------------------------------------------------------------
 
@@ -61,13 +72,10 @@ typedef enum sinew_status_code {
   SINEW_STATUS_STALE_ID = 2,          ///< The id refers to a destroyed object, or to none.
   SINEW_STATUS_CAPACITY = 3,          ///< A storage of fixed capacity is full.
   SINEW_STATUS_OUT_OF_MEMORY = 4,     ///< Memory could not be allocated; nothing changed.
-  /// The step or the equilibrium failed: nothing moved, forces and poses stay pending.
-  SINEW_STATUS_UNSTABLE = 5,
-  /// The request is valid, but this build or combination does not offer it.
-  SINEW_STATUS_UNSUPPORTED = 6,
+  SINEW_STATUS_UNSTABLE = 5,  ///< Step or equilibrium failed: nothing moved; forces and poses stay.
+  SINEW_STATUS_UNSUPPORTED = 6,       ///< Valid, but this build or combination does not offer it.
   SINEW_STATUS_IO = 7,                ///< A file could not be read or written.
-  /// Fault inside the library; the world then accepts only sinew_world_destroy.
-  SINEW_STATUS_INTERNAL = 8
+  SINEW_STATUS_INTERNAL = 8  ///< Fault in the library; the world accepts only sinew_world_destroy.
 } sinew_status_code;
 
 /// Result of every function that can fail: a sinew_status_code value.
@@ -143,8 +151,6 @@ typedef enum sinew_detection {
   SINEW_DETECTION_DISTANCE_FIELD = 2  ///< Sampled signed distance; only for mesh and box tools.
 } sinew_detection;
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

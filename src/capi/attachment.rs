@@ -25,7 +25,7 @@ pub struct sinew_attachment_id {
 
 converts!(sinew_attachment_id, AttachmentId);
 
-/// What is attached to what: nodes or surface points of a body, to a tool or to nodes or points of a body.
+/// Nodes or surface points of a body that are attached to a tool or a body.
 ///
 /// Filled by sinew_attachment_def_init; read only during sinew_attachment_create.
 #[repr(C)]
@@ -37,15 +37,15 @@ pub struct sinew_attachment_def {
     pub body: sinew_body_id,
     /// Tool that they are attached to; all zero (default): those of `other`.
     pub tool: sinew_tool_id,
-    /// Body that they are attached to, also the same body; all zero (default): the tool.
+    /// Body that they are attached to; all zero (default): the tool.
     pub other: sinew_body_id,
     /// Number of attachments; default 0.
     pub count: usize,
     /// `count` node indices; nullable: points.
     pub nodes: *const u32,
-    /// `count` surface triangle indices, one per point; nullable: nodes.
+    /// `count` surface triangle indices of points; nullable: nodes.
     pub triangles: *const u32,
-    /// 3 * count corner weights of the points, at least 0 with sum 1; nullable: nodes.
+    /// 3 * count corner weights of them, at least 0 with sum 1; nullable: nodes.
     pub weights: *const f32,
     /// `count` node indices of `other`; nullable: points or a tool.
     pub other_nodes: *const u32,
@@ -53,9 +53,7 @@ pub struct sinew_attachment_def {
     pub other_triangles: *const u32,
     /// 3 * count corner weights of these points; nullable: nodes or a tool.
     pub other_weights: *const f32,
-    /// [N] Mean force of a step above which an attachment breaks, at least 0.
-    ///
-    /// Infinity (default) or 0: unlimited.
+    /// [N] Mean force above which it breaks; infinity (default) or 0: unlimited.
     pub force_limit: f32,
 }
 
@@ -169,11 +167,10 @@ pub unsafe extern "C" fn sinew_attachment_def_init(def: *mut sinew_attachment_de
 
 /// Attaches nodes or surface points of a body to a tool or to a body, each by its own attachment.
 ///
-/// A tool holds its nodes, and the corners of its points, rigidly, and does not collide with them. Two bodies join at
-/// one point that both rotate about; a gap closes at no more than 0.25 m/s. `out_attachments` receives `count` ids.
+/// A tool holds them rigidly and does not collide with them. Two bodies join at one point that both rotate about; a gap
+/// closes at no more than 0.25 m/s. `out_attachments` receives `count` ids.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool takes a node that is pinned, massless or held, or both ends are the
-/// same.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node for a tool is pinned, massless or held, or both ends are the same.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_create(
     world: *mut sinew_world,
@@ -205,10 +202,10 @@ pub unsafe extern "C" fn sinew_attachment_release(
     unsafe { with_world_mut(world, |world| world.release(attachment.id())) }
 }
 
-/// Writes the force of an attachment on its body, averaged over the last step.
+/// Writes the force [N] of an attachment on its body, averaged over the last step.
 ///
-/// `out_force` [N] receives 3 floats in world axes, 0 before the first step. After sinew_body_solve_equilibrium it is the
-/// force of the tool in equilibrium.
+/// `out_force` receives 3 floats in world axes. After sinew_body_solve_equilibrium it is the force of the tool in
+/// equilibrium.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_get_force(
     world: *const sinew_world,
@@ -226,8 +223,7 @@ pub unsafe extern "C" fn sinew_attachment_get_force(
 
 /// Writes the attachments that broke in the last step because of their force_limit.
 ///
-/// `out_attachments` receives at most `capacity` ids, `out_count` the number that broke. The ids are stale: compare them with those
-/// you stored.
+/// `out_attachments` receives at most `capacity` ids, which are stale, `out_count` their number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_broken_attachments(
     world: *const sinew_world,

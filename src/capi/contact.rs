@@ -13,7 +13,7 @@ use crate::contact::{Contact, ContactChange};
 pub struct sinew_contact {
     /// Body that the tool touches.
     pub body: sinew_body_id,
-    /// Nodes of the touched node, edge or face; the last is repeated if there are fewer than 3.
+    /// Nodes of the touched node, edge or face; the last is repeated below 3.
     pub nodes: [u32; 3],
     /// Weights of the nodes at the contact point; 0 for a repeated node.
     pub weights: [f32; 3],
@@ -21,7 +21,7 @@ pub struct sinew_contact {
     pub point: [f32; 3],
     /// Unit normal that points away from the tool.
     pub normal: [f32; 3],
-    /// [N] Force on the tool with friction, in the last substep; the wrench is the mean of all substeps.
+    /// [N] Force on the tool in the last substep; the wrench is a mean.
     pub force: [f32; 3],
 }
 
@@ -85,8 +85,8 @@ pub unsafe extern "C" fn sinew_tool_get_contacts(
 
 /// Writes the contacts that began or ended in the last step.
 ///
-/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist. Destroying a tool or body does not
-/// report an end.
+/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist. Destroying a tool or body
+/// reports no end.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_contact_changes(
     world: *const sinew_world,

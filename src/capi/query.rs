@@ -14,7 +14,7 @@ use crate::query::{RayHit, SurfaceHit};
 pub struct sinew_surface_point {
     /// Set to sizeof(sinew_surface_point) before the call.
     pub struct_size: usize,
-    /// Body of the point; all zero if nothing was found, and the rest is 0.
+    /// Body of the point; all zero if none was found.
     pub body: sinew_body_id,
     /// Index of the triangle in the body's surface.
     pub triangle: u32,
@@ -60,11 +60,10 @@ impl From<Option<SurfaceHit>> for sinew_surface_point {
     }
 }
 
-/// Finds the first body surface point that a ray hits.
+/// Finds the first body surface point that a ray hits; without one out->body is all zero.
 ///
-/// `origin` [m] and `direction` are 3 floats each; the direction may have any length but 0. `max_distance` [m] is
-/// at least 0. Without a hit out->body is all zero. A triangle parallel to the ray is not hit. The first query near
-/// a body builds a tree, which may allocate; nodes that moved refit it.
+/// `origin` [m] and `direction`, of any length but 0, are 3 floats each; `max_distance` [m] is at least 0. A triangle
+/// parallel to the ray is not hit. The first query near a body may allocate.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_cast_ray(
     world: *const sinew_world,
@@ -85,10 +84,9 @@ pub unsafe extern "C" fn sinew_world_cast_ray(
     }
 }
 
-/// Finds the body surface point that is nearest to a point.
+/// Finds the body surface point nearest to a point; without one out->body is all zero.
 ///
-/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. If no surface is within it out->body is all zero. It
-/// uses the trees of sinew_world_cast_ray.
+/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. The first query may allocate.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_find_nearest(
     world: *const sinew_world,
@@ -171,10 +169,9 @@ impl From<Option<RayHit>> for sinew_ray_hit {
     }
 }
 
-/// Finds the first body or tool that a ray with a collision filter hits.
+/// Finds the first body or tool that a ray hits, as if it had this category and mask.
 ///
-/// The ray meets bodies and tools as if it had this category and mask. Otherwise like sinew_world_cast_ray; without a hit
-/// both ids are all zero.
+/// Otherwise like sinew_world_cast_ray; without a hit both ids are all zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_cast_ray_filtered(
     world: *const sinew_world,

@@ -12,7 +12,7 @@ use crate::solver::RestStateDefinition;
 pub struct sinew_equilibrium_def {
     /// Size of this struct; sinew_equilibrium_def_init sets it.
     pub struct_size: usize,
-    /// [m] Estimated position error allowed; 0 (default): 1e-6 of the body's extent.
+    /// [m] Estimated position error allowed; 0: 1e-6 of the body's extent.
     pub tolerance: f32,
     /// Largest number of matrix-vector products; 0 (default): 1,000,000.
     pub iterations: u32,
@@ -28,11 +28,11 @@ pub struct sinew_equilibrium_report {
     pub iterations: u32,
     /// Number of matrix-vector products.
     pub products: u32,
-    /// [N] Largest force left on a free node, before positions are rounded to float.
+    /// [N] Largest force left on a free node, before positions become floats.
     pub residual: f64,
-    /// [m] Estimated position error, before positions are rounded to float.
+    /// [m] Estimated position error, before positions become floats.
     pub error: f64,
-    /// [J] Energy of springs, gravity and forces before the search, 0 at the origin.
+    /// [J] Energy of springs, gravity and forces before the search.
     pub energy_before: f64,
     /// [J] Energy of springs, gravity and forces after the search.
     pub energy_after: f64,
@@ -66,12 +66,10 @@ pub unsafe extern "C" fn sinew_equilibrium_def_init(
 
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
 ///
-/// It is not a step: it allocates and may take seconds. It ignores tools. Velocities become 0, pending forces stay.
-/// The rigid position of unpinned parts is unspecified. `def` (defaults) and `out_report` are nullable. It ends the
-/// views of the body's positions and velocities. On failure nothing changes.
+/// It may take seconds, ignores tools and ends views. Velocities become 0, pending forces stay. `def` (defaults) and
+/// `out_report` are nullable. The rigid position of unpinned parts is unspecified.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part; SINEW_STATUS_UNSTABLE if not
-/// found.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part; SINEW_STATUS_UNSTABLE if not found.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_solve_equilibrium(
     world: *mut sinew_world,

@@ -8,7 +8,7 @@ use crate::world::World;
 
 /// Writes the number of bytes that sinew_world_save_snapshot needs now.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or the size exceeds what memory can address.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or memory cannot address the size.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_snapshot_size(world: *const sinew_world, out: *mut usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -23,9 +23,8 @@ pub unsafe extern "C" fn sinew_world_get_snapshot_size(world: *const sinew_world
 
 /// Saves a world as bytes, from which sinew_world_load_snapshot continues bitwise identically.
 ///
-/// `size` must be that of sinew_world_get_snapshot_size. The snapshot holds bodies with cuts, contacts,
-/// attachments, blades, pending forces and ids. It does not hold threads, readers, detectors and embeddings. Only
-/// this library version can read it. A checksum detects damage, not tampering.
+/// `size` is that of sinew_world_get_snapshot_size. Threads, readers, detectors and embeddings are not saved. Only this
+/// library version can read it. A checksum detects damage, not tampering.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool.
 #[unsafe(no_mangle)]
@@ -45,11 +44,11 @@ pub unsafe extern "C" fn sinew_world_save_snapshot(
 
 /// Creates a world from the bytes of a snapshot.
 ///
-/// `def` is nullable: the defaults. Its thread_count, run_tasks and tasks_context apply; the snapshot holds the other
-/// settings. Destroy the world with sinew_world_destroy. Results are bitwise identical only with the kernel of the saved world.
+/// `def` is nullable: the defaults. Its thread_count, run_tasks and tasks_context apply; the snapshot holds the rest.
+/// Results are bitwise identical only with the kernel of the saved world.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bytes are damaged; SINEW_STATUS_UNSUPPORTED for another library
-/// version or kernel, or if a thread could not be started.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bytes are damaged; SINEW_STATUS_UNSUPPORTED for another library version
+/// or kernel, or if a thread cannot start.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_load_snapshot(
     bytes: *const u8,

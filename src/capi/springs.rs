@@ -8,8 +8,8 @@ use crate::def::{Values, expect_count};
 
 /// Writes the two nodes of each spring, each spring once, the lower node first.
 ///
-/// `out_pairs` receives 2 * count indices; `count` must be spring_count of sinew_body_get_storage_report. The order
-/// stays until springs are added or removed.
+/// `out_pairs` receives 2 * count indices; `count` is spring_count of sinew_body_get_storage_report. The order stays
+/// until springs are added or removed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_spring_pairs(
     world: *const sinew_world,
@@ -31,8 +31,8 @@ pub unsafe extern "C" fn sinew_body_get_spring_pairs(
 
 /// Writes the stiffnesses and rest lengths of the springs between pairs of nodes.
 ///
-/// `pairs` holds 2 * count indices. `out_stiffnesses` [N/m] and `out_rest_lengths` [m] receive `count` floats each and are
-/// nullable. PACKED merges rest lengths that differ only by rounding.
+/// `pairs` holds 2 * count indices. `out_stiffnesses` [N/m] and `out_rest_lengths` [m] receive `count` floats each and
+/// are nullable.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 #[unsafe(no_mangle)]
@@ -66,9 +66,8 @@ pub unsafe extern "C" fn sinew_body_get_springs(
 
 /// Sets stiffnesses, rest lengths or both of the springs between pairs of nodes.
 ///
-/// `pairs` holds 2 * count indices, the arrays `count` floats each: `stiffnesses` [N/m], `rest_lengths` [m], both
-/// nullable: unchanged. If a pair repeats, its last entry counts. Damping, force law, positions and velocities
-/// stay. On failure no spring changes.
+/// `pairs` holds 2 * count indices, `stiffnesses` [N/m] and `rest_lengths` [m] `count` floats each, nullable:
+/// unchanged. If a pair repeats, its last entry counts. Damping, force law and motion stay.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 #[unsafe(no_mangle)]
@@ -93,9 +92,9 @@ pub unsafe extern "C" fn sinew_body_set_springs(
 
 /// Multiplies the stiffness and the rest length of the material between given nodes.
 ///
-/// It changes springs, tetrahedra, bending and fibers whose nodes are all among `nodes`, which may repeat; anchor
-/// springs change only their stiffness. `stiffness_factor` is at least 0, where 0 is permanent; `length_factor` is
-/// above 0. Repeated calls multiply. Masses, damping, positions and velocities stay. On failure nothing changes.
+/// It changes springs, tetrahedra, bending and fibers whose nodes are all among `nodes`, which may repeat, and the
+/// stiffness of anchor springs. `stiffness_factor` is at least 0, where 0 is permanent; `length_factor` is above 0.
+/// Masses, damping and motion stay.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_scale_region(
     world: *mut sinew_world,

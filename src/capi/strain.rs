@@ -17,7 +17,7 @@ pub struct sinew_strain {
     pub largest: f32,
     /// Smallest principal stretch minus 1, at least -1.
     pub smallest: f32,
-    /// Volumetric (or areal) strain J - 1; below -1 for an inverted tetrahedron.
+    /// Volumetric (or areal) strain J - 1; below -1 if inverted.
     pub growth: f32,
 }
 
@@ -33,8 +33,8 @@ unsafe fn strains_of<'a>(strains: *mut sinew_strain, count: usize) -> Result<&'a
 
 /// Writes the strain L / L0 - 1 between pairs of nodes; 0 where L0 is 0.
 ///
-/// `pairs` holds 2 * count indices. `rest_lengths` [m] holds `count` floats; it is nullable: the rest lengths of
-/// the springs, which takes longer. `out_strains` receives `count` floats.
+/// `pairs` holds 2 * count indices, `rest_lengths` [m] `count` floats; nullable: those of the springs, which takes
+/// longer. `out_strains` receives `count` floats.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring and `rest_lengths` is NULL.
 #[unsafe(no_mangle)]
@@ -61,10 +61,9 @@ pub unsafe extern "C" fn sinew_body_get_spring_strains(
     }
 }
 
-/// Writes the strains of any triangles between nodes of a body.
+/// Writes the strains of any triangles between nodes of a body, one per triangle.
 ///
-/// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `triangles` holds 3 * triangle_count
-/// indices; `out_strains` receives one entry per triangle. `node_count` must be the body's.
+/// `rest_positions` [m] holds 3 * node_count floats; `triangles` holds 3 * triangle_count indices.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_triangle_strains(
     world: *const sinew_world,
@@ -86,10 +85,9 @@ pub unsafe extern "C" fn sinew_body_get_triangle_strains(
     }
 }
 
-/// Writes the strains of any tetrahedra between nodes of a body.
+/// Writes the strains of any tetrahedra between nodes of a body, one per tetrahedron.
 ///
-/// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `tetrahedra` holds 4 * tetrahedron_count
-/// indices; `out_strains` receives one entry per tetrahedron. `node_count` must be the body's.
+/// `rest_positions` [m] holds 3 * node_count floats; `tetrahedra` 4 * tetrahedron_count indices.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_tetrahedron_strains(
     world: *const sinew_world,
@@ -113,8 +111,8 @@ pub unsafe extern "C" fn sinew_body_get_tetrahedron_strains(
 
 /// Averages values of elements at their nodes; 0 at a node without elements.
 ///
-/// `elements` holds corners * element_count node indices, `corners` is 2, 3 or 4, `values` holds element_count
-/// finite floats, and `out_means` receives node_count floats. Use it to color an image by strain.
+/// `elements` holds corners * element_count node indices, `corners` is 2, 3 or 4, `values` holds element_count finite
+/// floats, and `out_means` receives node_count floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_util_average_to_nodes(
     elements: *const u32,

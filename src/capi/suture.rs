@@ -14,11 +14,11 @@ use crate::world::SutureDefinition;
 pub struct sinew_suture_def {
     /// Size of this struct; sinew_suture_def_init sets it.
     pub struct_size: usize,
-    /// [m] Unloaded length of the thread, at least 0; -1 (default): the current distance.
+    /// [m] Unloaded length of the thread; -1 (default): the current distance.
     pub length: f32,
     /// [N/m] Stiffness of the thread, above 0; infinity (default): inextensible.
     pub stiffness: f32,
-    /// [N] Mean force above which it tears out, at least 0; infinity (default) or 0: unlimited.
+    /// [N] Mean force where it tears out; infinity (default) or 0: unlimited.
     pub force_limit: f32,
 }
 
@@ -32,7 +32,7 @@ pub struct sinew_suture_report {
     pub length: f32,
     /// [m] Distance of its points; larger than the length under load.
     pub distance: f32,
-    /// [J] Energy stored in the thread, not part of the bodies' energy; 0 if inextensible.
+    /// [J] Energy of the thread, not of the bodies; 0 if inextensible.
     pub energy: f64,
 }
 
@@ -62,9 +62,8 @@ pub unsafe extern "C" fn sinew_suture_def_init(def: *mut sinew_suture_def, struc
 
 /// Joins two surface points of bodies by a thread, which pulls and never pushes.
 ///
-/// Body, triangle and weights of the points count; the bodies may be the same and still collide. `def` is nullable: the
-/// defaults. A thread shorter than the distance is drawn in at no more than 0.25 m/s. Release and force are those of
-/// an attachment; a torn suture is in sinew_world_get_broken_attachments.
+/// Body, triangle and weights of the points count. The bodies may be the same and still collide. `def` is nullable: the
+/// defaults. The thread is drawn in at no more than 0.25 m/s. It is an attachment.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if both points are the same.
 #[unsafe(no_mangle)]
@@ -110,9 +109,9 @@ pub unsafe extern "C" fn sinew_suture_create(
     }
 }
 
-/// Changes the length [m] of a suture's thread evenly over the next step.
+/// Changes the length [m] of a suture's thread over the next step, by at most 0.25 m/s.
 ///
-/// The length is at least 0. It shortens by at most 0.25 m/s, over as many steps as that takes.
+/// A longer change goes on over the following steps.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
 #[unsafe(no_mangle)]

@@ -21,7 +21,7 @@ const CORE: [&str; 5] = [
     "sinew/tool.h",
 ];
 const CORE_LINES: usize = 900;
-const ALL_LINES: usize = 2570;
+const ALL_LINES: usize = 2300;
 const IN_ONE: &str = "sinew/sinew_all.h";
 /// Headers that are written by hand: what they have is inline, and nothing that the library exports.
 const BY_HAND: [&str; 2] = ["compat_0_1.h", "helpers.h"];
@@ -120,7 +120,8 @@ fn the_headers_are_short() {
     };
     let core: usize = CORE.into_iter().map(lines_of).sum();
     let all = generated().iter().filter(|header| header.path != IN_ONE);
-    let all: usize = all.map(|header| header.text.lines().count()).sum();
+    let helpers = fs::read_to_string(root().join("include/sinew/helpers.h")).expect("helpers.h");
+    let all: usize = all.map(|header| header.text.lines().count()).sum::<usize>() + helpers.lines().count();
     assert!(core <= CORE_LINES, "the core has {core} lines");
     assert!(all <= ALL_LINES, "the headers have {all} lines");
     for header in generated() {
@@ -204,7 +205,7 @@ fn every_function_says_first_what_it_does() {
             .iter()
             .map(|line| line.split_whitespace().count() - 1)
             .sum::<usize>();
-        if !first.ends_with('.') || first.split_whitespace().count() < 4 || words > 95 {
+        if !first.ends_with('.') || first.split_whitespace().count() < 4 || words > 75 {
             bad.push(format!("{words} words: {first}"));
         }
         let can_fail = declaration.starts_with("sinew_status ");
