@@ -760,6 +760,9 @@ public static unsafe class Sinew
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_set_tear_limits(IntPtr world, sinew_body_id body, uint* pairs, float* strains, float* forces, UIntPtr count);
 
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_tear_limits(IntPtr world, sinew_body_id body, uint* pairs, UIntPtr count, float* out_strains, float* out_forces);
+
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_tear_report
     {

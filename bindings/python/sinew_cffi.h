@@ -574,6 +574,8 @@ sinew_status sinew_blade_get_report(const sinew_world *world, sinew_blade_id bla
     sinew_blade_report *out);
 sinew_status sinew_body_set_tear_limits(sinew_world *world, sinew_body_id body,
     const uint32_t *pairs, const float *strains, const float *forces, size_t count);
+sinew_status sinew_body_get_tear_limits(const sinew_world *world, sinew_body_id body,
+    const uint32_t *pairs, size_t count, float *out_strains, float *out_forces);
 typedef struct sinew_tear_report {
   size_t struct_size;
   uint32_t tears;

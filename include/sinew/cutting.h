@@ -146,6 +146,12 @@ sinew_status sinew_blade_get_report(const sinew_world *world, sinew_blade_id bla
 sinew_status sinew_body_set_tear_limits(sinew_world *world, sinew_body_id body,
     const uint32_t *pairs, const float *strains, const float *forces, size_t count);
 
+/// Writes the tear limits of springs or element edges between pairs of nodes.
+/// `pairs` holds 2 * count indices. `out_strains` and `out_forces` [N] receive `count` floats each,
+/// 0: no limit, and are nullable. Errors are those of sinew_body_set_tear_limits.
+sinew_status sinew_body_get_tear_limits(const sinew_world *world, sinew_body_id body,
+    const uint32_t *pairs, size_t count, float *out_strains, float *out_forces);
+
 /// Report of the tears in the last step; all 0 for a body that does not tear.
 /// Springs of small_pieces and no_room are retried after a topology change.
 typedef struct sinew_tear_report {

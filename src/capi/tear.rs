@@ -53,6 +53,36 @@ pub unsafe extern "C" fn sinew_body_get_tear_report(
     }
 }
 
+/// Writes the tear limits of springs or element edges between pairs of nodes.
+///
+/// `pairs` holds 2 * count indices. `out_strains` and `out_forces` [N] receive `count` floats each, 0: no limit, and
+/// are nullable. Errors are those of sinew_body_set_tear_limits.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_tear_limits(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    pairs: *const u32,
+    count: usize,
+    out_strains: *mut f32,
+    out_forces: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
+            let strains = memory::optional_output_array("out_strains", out_strains, count)?;
+            let forces = memory::optional_output_array("out_forces", out_forces, count)?;
+            let limits = body.tear_limits(pairs)?;
+            for (out, of) in [(strains, 0), (forces, 1)] {
+                for (out, limits) in out.unwrap_or_default().iter_mut().zip(&limits) {
+                    *out = limits[of];
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
 /// Sets tear limits of single springs or element edges, in place of the body's.
 ///
 /// `pairs` holds 2 * count indices; `strains` and `forces` [N] `count` floats each, 0: no limit; both are nullable:

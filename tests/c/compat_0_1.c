@@ -77,6 +77,8 @@ static void values(sinew_world *world, sinew_body_id sheet)
     MUST(sinew_body_get_springs(world, sheet, pair, 1, &read, NULL));
     CHECK(read == stiffness);
     MUST(sinew_body_set_tear_limits(world, sheet, pair, 1, &limit, NULL));
+    MUST(sinew_body_get_tear_limits(world, sheet, pair, 1, means, means + 1));
+    CHECK(means[0] == limit && means[1] == 0);
     {
         static const uint32_t edge[2] = {0, 1};
         MUST(sinew_mean_at_nodes(edge, 2, ones, 1, means, 2));

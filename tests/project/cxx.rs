@@ -13,7 +13,7 @@ use crate::support::{Library, installed, root, skip, succeed};
 const COMPILERS: [&str; 2] = ["g++", "clang++"];
 
 /// What a C++ program does by the C function itself.
-const LEFT_TO_C: [&str; 10] = [
+const LEFT_TO_C: [&str; 11] = [
     // Constants, and what `error` does not need.
     "sinew_version",
     "sinew_status_name",
@@ -22,6 +22,7 @@ const LEFT_TO_C: [&str; 10] = [
     "sinew_body_get_springs",
     "sinew_body_set_springs",
     "sinew_body_set_tear_limits",
+    "sinew_body_get_tear_limits",
     "sinew_body_get_spring_strains",
     "sinew_body_get_triangle_strains",
     "sinew_body_get_tetrahedron_strains",
