@@ -86,12 +86,13 @@ typedef struct sinew_body_def {
   uint32_t storage;                ///< Spring storage, a sinew_storage value.
   /// Slots per node (FAST_LINK) or per array (DYNAMIC_BULK); 0 (default): from the springs given.
   uint32_t springs_per_node;
-  uint32_t solver;                 ///< Time integrator, a sinew_solver value.
+  uint32_t solver;                 ///< Time integrator, a sinew_solver value; default AUTO.
   uint32_t reserved;               ///< Reserved; must be 0.
   uint32_t order;  ///< IMPLICIT, NEWTON: 1 is implicit Euler; 2 or 0 is BDF2, far more accurate.
-  /// IMPLICIT, NEWTON: largest number of matrix-vector products per step, at most 1,000,000. 0 is
-  /// 1000 for IMPLICIT, 100,000 for NEWTON. Each part of a subdivided step gets at least 1/32 of
-  /// it. If less than 256, a step beside a tool may take seven times as many, at most 128 more.
+  /// IMPLICIT, NEWTON: largest number of matrix-vector products per step, at most 1,000,000. 0
+  /// (default) is 1000 for IMPLICIT, 100,000 for NEWTON. Each part of a subdivided step gets at
+  /// least 1/32 of it. If less than 256, a step beside a tool may take seven times as many, at most
+  /// 128 more, before it is subdivided.
   uint32_t iterations;
   /// IMPLICIT, NEWTON: error of the linear solve, 1e-6 to 1, relative to the displacement that
   /// forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
@@ -115,8 +116,8 @@ typedef struct sinew_body_def {
   /// tetrahedra are much softer.
   float young_modulus;
   float poisson_ratio;  ///< TETRAHEDRA: 0 to 0.49; SPRINGS: 0 or the implied value +- 0.001.
-  /// [kg/m^3] Above 0: nodes share the mass of their elements, of which each needs one. Masses must
-  /// then be NULL and node_mass 0.
+  /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
+  /// Every node must then belong to an element, masses be NULL and node_mass 0.
   float density;
   float thickness;  ///< [m] Thickness of a material that fills triangles, above 0; else 0.
   /// [Pa] Resistance of each tetrahedron to volume change and inversion; 0 with TETRAHEDRA. 0.3 to
@@ -138,15 +139,17 @@ typedef struct sinew_body_def {
   /// Fibers pull in proportion to their extension and never push.
   const float *fibre_directions;
   const float *fibre_stiffnesses;  ///< [Pa] tetrahedron_count floats; nullable: fibre_stiffness.
-  /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6, parallel to it.
-  /// Later springs have none. From about 0.01 s on use IMPLICIT: VERLET needs short substeps.
+  /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6. It acts in
+  /// parallel with the stiffness. Later springs have none. From about 0.01 s on use IMPLICIT:
+  /// VERLET needs short substeps.
   float retardation_time;
   /// [s] Relaxation time of the Maxwell branch, 1e-9 to 1e6; 0: a Kelvin-Voigt solid. After a
   /// strain step the stress is E (1 + retardation_time / relaxation_time exp(-t /
   /// relaxation_time)). Bodies start relaxed; sinew_body_set_positions relaxes them.
   float relaxation_time;
   /// Strain at which springs and elements yield; 0: never. Strain beyond it is permanent. It needs
-  /// SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow it in tetrahedra.
+  /// SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow the yielding of
+  /// tetrahedra.
   float yield_strain;
   /// With yield_strain: maximum plastic strain, above 0 and below 1; default 0.5. Elastic beyond.
   float largest_set;
@@ -178,10 +181,10 @@ typedef struct sinew_body_def {
   uint32_t collision_mask;         ///< Categories that it collides with; default 0xffffffff.
   /// Number of nodes that cuts may add, about 5 per cut element; 0 (default): cannot be cut. Needs
   /// a consistently oriented 2-manifold surface, or tetrahedra connected through faces around each
-  /// node, whose boundary are the triangles. 1 is enough for a body of springs alone.
+  /// node; triangles, if given, are their boundary. 1 is enough for a body of springs alone.
   uint32_t spare_nodes;
-  /// Fracture energy of a blade's cut: [J/m] (times thickness) for a surface, [J/m^2] for a solid.
-  /// Above 0 it needs spare_nodes. SINEW_STATUS_UNSUPPORTED for a body of springs alone.
+  /// Fracture energy of a blade's cut: [J/m^2] for a solid; [J/m] for a surface, with its
+  /// thickness. Above 0 it needs spare_nodes. SINEW_STATUS_UNSUPPORTED for a body of springs alone.
   float toughness;
   /// Strain above which a spring or an element edge tears; 0: never. A surface tears at the node
   /// with the larger separating force, across it; a solid along faces. A step that tears may

@@ -27,8 +27,8 @@ typedef struct sinew_cut_report {
 
 /// Cuts a body along the surface that a blade's edge swept, at the current positions.
 /// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `out_report` is
-/// nullable. A sweep that starts where the last one ended continues it. It appends nodes and ends
-/// views.
+/// nullable. A sweep that starts where the last one ended continues it. New nodes are appended, and
+/// views end; see sinew_body_get_topology_changes.
 /// Errors: SINEW_STATUS_UNSUPPORTED without spare_nodes; SINEW_STATUS_CAPACITY if too few are left.
 sinew_status sinew_body_cut(sinew_world *world, sinew_body_id body, const float *start,
     const float *end, sinew_cut_report *out_report);
@@ -96,7 +96,7 @@ sinew_status sinew_blade_def_init(sinew_blade_def *def, size_t struct_size);
 /// Creates a blade: an edge that cuts bodies with spare_nodes as its pose moves.
 /// It has no volume. Tissue resists with its toughness; tissue that moves onto the edge is cut too.
 /// Moving along the edge or back meets no resistance. A triangle needs about 10 spare_nodes. A step
-/// that cuts may allocate; a failed cut is in sinew_blade_report.
+/// that cuts may allocate; sinew_blade_report tells of a failed cut.
 sinew_status sinew_blade_create(sinew_world *world, const sinew_blade_def *def,
     sinew_blade_id *out);
 

@@ -72,7 +72,8 @@ typedef struct sinew_step_report {
   uint32_t substeps;         ///< Largest number of substeps that a body took.
   /// [s] Longest stable explicit substep over all bodies; infinity with IMPLICIT and NEWTON.
   float stable_substep;
-  uint32_t bodies_restored;  ///< Bodies that became non-finite and were rolled back; others moved.
+  /// Number of bodies that became non-finite and were rolled back; the others were stepped.
+  uint32_t bodies_restored;
   /// [m] Position error of this step; 0 without a tolerance, infinity if the step was refused
   /// before it could be estimated.
   float error_estimate;

@@ -116,8 +116,8 @@ pub unsafe extern "C" fn sinew_blade_def_init(def: *mut sinew_blade_def, struct_
 /// Creates a blade: an edge that cuts bodies with spare_nodes as its pose moves.
 ///
 /// It has no volume. Tissue resists with its toughness; tissue that moves onto the edge is cut too. Moving along the
-/// edge or back meets no resistance. A triangle needs about 10 spare_nodes. A step that cuts may allocate; a failed cut
-/// is in sinew_blade_report.
+/// edge or back meets no resistance. A triangle needs about 10 spare_nodes. A step that cuts may allocate;
+/// sinew_blade_report tells of a failed cut.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_create(
     world: *mut sinew_world,

@@ -112,7 +112,8 @@ const _: () = assert!(size_of::<sinew_rim_edge>() == size_of::<NewRimEdge>());
 /// Cuts a body along the surface that a blade's edge swept, at the current positions.
 ///
 /// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `out_report` is nullable. A sweep that
-/// starts where the last one ended continues it. It appends nodes and ends views.
+/// starts where the last one ended continues it. New nodes are appended, and views end; see
+/// sinew_body_get_topology_changes.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED without spare_nodes; SINEW_STATUS_CAPACITY if too few are left.
 #[unsafe(no_mangle)]

@@ -103,7 +103,7 @@ pub struct sinew_body_def {
     pub storage: u32,
     /// Slots per node (FAST_LINK) or per array (DYNAMIC_BULK); 0 (default): from the springs given.
     pub springs_per_node: u32,
-    /// Time integrator, a sinew_solver value.
+    /// Time integrator, a sinew_solver value; default AUTO.
     pub solver: u32,
     /// Reserved; must be 0.
     pub reserved: u32,
@@ -111,8 +111,8 @@ pub struct sinew_body_def {
     pub order: u32,
     /// IMPLICIT, NEWTON: largest number of matrix-vector products per step, at most 1,000,000.
     ///
-    /// 0 is 1000 for IMPLICIT, 100,000 for NEWTON. Each part of a subdivided step gets at least 1/32 of it. If less
-    /// than 256, a step beside a tool may take seven times as many, at most 128 more.
+    /// 0 (default) is 1000 for IMPLICIT, 100,000 for NEWTON. Each part of a subdivided step gets at least 1/32 of it.
+    /// If less than 256, a step beside a tool may take seven times as many, at most 128 more, before it is subdivided.
     pub iterations: u32,
     /// IMPLICIT, NEWTON: error of the linear solve, 1e-6 to 1, relative to the displacement that forces cause in the
     /// step.
@@ -145,9 +145,9 @@ pub struct sinew_body_def {
     pub young_modulus: f32,
     /// TETRAHEDRA: 0 to 0.49; SPRINGS: 0 or the implied value +- 0.001.
     pub poisson_ratio: f32,
-    /// [kg/m^3] Above 0: nodes share the mass of their elements, of which each needs one.
+    /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
     ///
-    /// Masses must then be NULL and node_mass 0.
+    /// Every node must then belong to an element, masses be NULL and node_mass 0.
     pub density: f32,
     /// [m] Thickness of a material that fills triangles, above 0; else 0.
     pub thickness: f32,
@@ -181,9 +181,10 @@ pub struct sinew_body_def {
     pub fibre_directions: *const f32,
     /// [Pa] tetrahedron_count floats; nullable: fibre_stiffness.
     pub fibre_stiffnesses: *const f32,
-    /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6, parallel to it.
+    /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6.
     ///
-    /// Later springs have none. From about 0.01 s on use IMPLICIT: VERLET needs short substeps.
+    /// It acts in parallel with the stiffness. Later springs have none. From about 0.01 s on use IMPLICIT: VERLET needs
+    /// short substeps.
     pub retardation_time: f32,
     /// [s] Relaxation time of the Maxwell branch, 1e-9 to 1e6; 0: a Kelvin-Voigt solid.
     ///
@@ -192,7 +193,7 @@ pub struct sinew_body_def {
     pub relaxation_time: f32,
     /// Strain at which springs and elements yield; 0: never. Strain beyond it is permanent.
     ///
-    /// It needs SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow it in tetrahedra.
+    /// It needs SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow the yielding of tetrahedra.
     pub yield_strain: f32,
     /// With yield_strain: maximum plastic strain, above 0 and below 1; default 0.5. Elastic beyond.
     pub largest_set: f32,
@@ -234,10 +235,10 @@ pub struct sinew_body_def {
     pub collision_mask: u32,
     /// Number of nodes that cuts may add, about 5 per cut element; 0 (default): cannot be cut.
     ///
-    /// Needs a consistently oriented 2-manifold surface, or tetrahedra connected through faces around each node, whose
-    /// boundary are the triangles. 1 is enough for a body of springs alone.
+    /// Needs a consistently oriented 2-manifold surface, or tetrahedra connected through faces around each node;
+    /// triangles, if given, are their boundary. 1 is enough for a body of springs alone.
     pub spare_nodes: u32,
-    /// Fracture energy of a blade's cut: [J/m] (times thickness) for a surface, [J/m^2] for a solid.
+    /// Fracture energy of a blade's cut: [J/m^2] for a solid; [J/m] for a surface, with its thickness.
     ///
     /// Above 0 it needs spare_nodes. SINEW_STATUS_UNSUPPORTED for a body of springs alone.
     pub toughness: f32,

@@ -86,7 +86,7 @@ pub struct sinew_step_report {
     pub substeps: u32,
     /// [s] Longest stable explicit substep over all bodies; infinity with IMPLICIT and NEWTON.
     pub stable_substep: f32,
-    /// Bodies that became non-finite and were rolled back; others moved.
+    /// Number of bodies that became non-finite and were rolled back; the others were stepped.
     pub bodies_restored: u32,
     /// [m] Position error of this step; 0 without a tolerance, infinity if the step was refused before it could be
     /// estimated.
