@@ -102,6 +102,7 @@ static void grasping(const char *directory, float *trace) {
   sinew_tool_def tool_def;
   sinew_tool_id tool;
   sinew_vec3_view nodes;
+  sinew_attachment_def attachment;
   sinew_attachment_id held[64];
   uint32_t near_tool[64];
   size_t count = 0;
@@ -117,7 +118,12 @@ static void grasping(const char *directory, float *trace) {
     const float tip[3] = {0, 0.016f, 0};
     if (node(nodes, i)[1] > 0.014f && distance(node(nodes, i), tip) < 0.011) near_tool[count++] = (uint32_t)i;
   }
-  CHECK(sinew_body_attach_nodes(world, block, near_tool, count, tool, 0.0f, held));
+  CHECK(sinew_attachment_def_init(&attachment, sizeof attachment));
+  attachment.body = block;
+  attachment.tool = tool;
+  attachment.nodes = near_tool;
+  attachment.count = count;
+  CHECK(sinew_attachment_create(world, &attachment, held));
   for (int frame = 0; frame < FRAMES; frame++) {
     const float position[3] = {0, 0.046f + 0.02f * (float)smooth(frame / 20.0), 0};
     float force[3], torque[3];

@@ -78,7 +78,7 @@ static void *feel(void *given) {
   path_at(it, 0, place);
   for (tick = 0; tick < it->tick_count; tick++) {
     record *now = it->records + tick;
-    sinew_haptic_result felt;
+    sinew_haptic_report felt;
     const double due = started + (double)tick * TICK;
     float position[3], velocity[3];
     double began;

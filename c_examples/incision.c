@@ -178,11 +178,13 @@ static uint32_t point_at(const drawing *mine, double u, double v, float weights[
 
 static sinew_attachment_id suture(sinew_world *world, sinew_body_id skin, const drawing *mine, double along) {
   const double x = LENGTH * (along - 0.5), z = 0.004 * sin(3 * along) / STRETCH;
-  float weights[2][3];
-  const uint32_t above = point_at(mine, x / SIZE + 0.5, (z + BITE) / SIZE + 0.5, weights[0]);
-  const uint32_t below = point_at(mine, x / SIZE + 0.5, (z - BITE) / SIZE + 0.5, weights[1]);
+  sinew_surface_point above, below;
   sinew_attachment_id made;
-  CHECK(sinew_body_suture_points(world, skin, above, weights[0], skin, below, weights[1], NULL, &made));
+  above.struct_size = below.struct_size = sizeof above;
+  above.body = below.body = skin;
+  above.triangle = point_at(mine, x / SIZE + 0.5, (z + BITE) / SIZE + 0.5, above.weights);
+  below.triangle = point_at(mine, x / SIZE + 0.5, (z - BITE) / SIZE + 0.5, below.weights);
+  CHECK(sinew_suture_create(world, &above, &below, NULL, &made));
   return made;
 }
 

@@ -153,7 +153,7 @@ static sinew_body_id create_organ(sinew_world *world, const sinew_mesh_view *sha
     const float *p = shape->positions + 3 * i;
     if (p[0] < BED && p[1] < BED_TOP) CHECK(sinew_body_pin(world, organ, (uint32_t)i));
   }
-  CHECK(sinew_body_rest_state(world, organ, NULL, NULL));
+  CHECK(sinew_body_solve_equilibrium(world, organ, NULL, NULL));
   return organ;
 }
 
@@ -173,6 +173,7 @@ static void hold(sinew_world *world, forceps *of, sinew_body_id organ) {
   for (jaw = 0; jaw < 2; jaw++) {
     uint32_t triangles[HOLDS];
     float weights[3 * HOLDS], hinge[3], point[3];
+    sinew_attachment_def def;
     quaternion q;
     size_t count = 0;
     CHECK(sinew_tool_get_pose(world, of->jaws[jaw], hinge, q.xyzw));
@@ -186,7 +187,13 @@ static void hold(sinew_world *world, forceps *of, sinew_body_id organ) {
       memcpy(weights + 3 * count++, found.weights, sizeof found.weights);
     }
     if (count == 0) fail("nothing between", jaw ? "the lower jaw and the tissue" : "the upper jaw and the tissue");
-    CHECK(sinew_body_attach_points(world, organ, triangles, weights, count, of->jaws[jaw], 0, of->held + of->held_count));
+    CHECK(sinew_attachment_def_init(&def, sizeof def));
+    def.body = organ;
+    def.tool = of->jaws[jaw];
+    def.count = count;
+    def.triangles = triangles;
+    def.weights = weights;
+    CHECK(sinew_attachment_create(world, &def, of->held + of->held_count));
     of->held_count += count;
   }
 }
@@ -238,7 +245,7 @@ static void get_wrenches(const sinew_world *world, const forceps *of, float wren
   const float origin[3] = {0, 0, 0};
   int jaw;
   for (jaw = 0; jaw < 2; jaw++) CHECK(sinew_tool_get_wrench(world, of->jaws[jaw], wrenches[jaw], wrenches[jaw] + 3));
-  CHECK(sinew_tools_get_wrench(world, of->jaws, 2, origin, wrenches[2], wrenches[2] + 3));
+  CHECK(sinew_world_get_total_wrench(world, of->jaws, 2, origin, wrenches[2], wrenches[2] + 3));
 }
 
 static void expect(int is_so, const char *what) {

@@ -102,7 +102,7 @@ static void save_strain(const trial *of, const sinew_mesh_view *shape, const sin
   CHECK(sinew_body_get_tetrahedron_strains(of->world, of->liver, shape->positions, shape->node_count, shape->tetrahedra,
                                            shape->tetrahedron_count, strains));
   for (i = 0; i < shape->tetrahedron_count; i++) pressed[i] = -strains[i].smallest;
-  CHECK(sinew_mean_at_nodes(shape->tetrahedra, 4, pressed, shape->tetrahedron_count, at_nodes, shape->node_count));
+  CHECK(sinew_util_average_to_nodes(shape->tetrahedra, 4, pressed, shape->tetrahedron_count, at_nodes, shape->node_count));
   memset(&values, 0, sizeof values);
   values.body = of->liver, values.values = at_nodes, values.node_count = shape->node_count;
   values.high = (float)DEPTH, values.colours = SINEW_COLOURS_SEQUENTIAL;

@@ -32,15 +32,20 @@
 #include "sinew/body.h"
 #include "sinew/tool.h"
 #include "sinew/material.h"
+#include "sinew/query.h"
 #include "sinew/attachment.h"
 #include "sinew/cutting.h"
 #include "sinew/haptics.h"
 #include "sinew/dynamics.h"
 #include "sinew/render.h"
-#include "sinew/query.h"
 #include "sinew/more.h"
 #include "sinew/snapshot.h"
 #include "sinew/diagnostics.h"
 #include "sinew/debug.h"
+#include "sinew/helpers.h"
+
+#ifdef SINEW_COMPAT_0_1 // names of version 0.1
+#include "sinew/compat_0_1.h"
+#endif
 
 #endif

@@ -97,8 +97,9 @@ template <class Def, sinew_status (*Init)(Def *, std::size_t)> struct definition
 using debug_draw_def = definition<sinew_debug_draw, sinew_debug_draw_init>;
 using world_def = definition<sinew_world_def, sinew_world_def_init>;
 using body_def = definition<sinew_body_def, sinew_body_def_init>;
-using rest_state_def = definition<sinew_rest_state_def, sinew_rest_state_def_init>;
+using equilibrium_def = definition<sinew_equilibrium_def, sinew_equilibrium_def_init>;
 using tool_def = definition<sinew_tool_def, sinew_tool_def_init>;
+using attachment_def = definition<sinew_attachment_def, sinew_attachment_def_init>;
 using suture_def = definition<sinew_suture_def, sinew_suture_def_init>;
 using blade_def = definition<sinew_blade_def, sinew_blade_def_init>;
 using haptic_def = definition<sinew_haptic_def, sinew_haptic_def_init>;
@@ -308,6 +309,10 @@ public:
   void set_collision(std::uint32_t category, std::uint32_t mask) {
     check(sinew_blade_set_collision(world(), id, category, mask));
   }
+  filter collision() const {
+    filter out{};
+    return check(sinew_blade_get_collision(world(), id, &out.category, &out.mask)), out;
+  }
   sinew_blade_report report() const {
     auto out = sized<sinew_blade_report>();
     return check(sinew_blade_get_report(world(), id, &out)), out;
@@ -428,9 +433,9 @@ public:
 
   float awake_share() const { return viewed<float>(sinew_body_get_awake_share); }
   void wake() { check(sinew_body_wake(world(), id)); }
-  sinew_rest_state_report rest_state(const rest_state_def &def = {}) {
-    auto out = sized<sinew_rest_state_report>();
-    return check(sinew_body_rest_state(world(), id, &def, &out)), out;
+  sinew_equilibrium_report solve_equilibrium(const equilibrium_def &def = {}) {
+    auto out = sized<sinew_equilibrium_report>();
+    return check(sinew_body_solve_equilibrium(world(), id, &def, &out)), out;
   }
   sinew_energy energy() const { return reported<sinew_energy>(sinew_body_get_energy); }
   sinew_storage_report storage_report() const { return reported<sinew_storage_report>(sinew_body_get_storage_report); }
@@ -439,23 +444,38 @@ public:
   sinew_tear_report tear_report() const { return reported<sinew_tear_report>(sinew_body_get_tear_report); }
 
   attachment attach(std::uint32_t node, const tool &to, float force_limit = no_limit) {
-    return attached([&](auto out) { return sinew_body_attach_node(world(), id, node, to.id, force_limit, out); });
+    attachment_def def;
+    def.nodes = &node, def.count = 1, def.tool = to.id, def.force_limit = force_limit;
+    sinew_attachment_id made{};
+    return attach(def, {&made, 1}), attachment(world(), made);
   }
   // An attachment for each node, whose ids `out` has room for: sinew::attachment(world(), id).
   void attach(nodes held, const tool &to, span<sinew_attachment_id> out, float force_limit = no_limit) {
-    expect(out.size() == held.size(), "out: as many as there are nodes");
-    check(sinew_body_attach_nodes(world(), id, held.data(), held.size(), to.id, force_limit, out.data()));
+    attachment_def def;
+    def.nodes = held.data(), def.count = held.size(), def.tool = to.id, def.force_limit = force_limit;
+    attach(def, out);
   }
   void attach(nodes held, const body &other, nodes others, span<sinew_attachment_id> out, float force_limit = no_limit) {
     expect(held.size() == others.size(), "others: as many as there are nodes");
-    expect(out.size() == held.size(), "out: as many as there are nodes");
-    check(sinew_body_attach_nodes_to_nodes(world(), id, held.data(), held.size(), other.id, others.data(), force_limit, out.data()));
+    attachment_def def;
+    def.nodes = held.data(), def.count = held.size(), def.other = other.id, def.other_nodes = others.data();
+    def.force_limit = force_limit;
+    attach(def, out);
+  }
+  // Nodes or points, to a tool or to a body, as the definition says; its body is this one.
+  void attach(attachment_def def, span<sinew_attachment_id> out) {
+    expect(out.size() == def.count, "out: as many as there are attachments");
+    def.body = id;
+    check(sinew_attachment_create(world(), &def, out.data()));
   }
   attachment suture(std::uint32_t triangle, vec3 weights, const body &other, std::uint32_t other_triangle, vec3 other_weights,
                     const suture_def &def = {}) {
-    return attached([&](auto out) {
-      return sinew_body_suture_points(world(), id, triangle, weights.data(), other.id, other_triangle, other_weights.data(), &def, out);
-    });
+    return suture(point(id, triangle, weights), point(other.id, other_triangle, other_weights), def);
+  }
+  // As rays and queries return them.
+  attachment suture(const sinew_surface_point &one, const sinew_surface_point &other, const suture_def &def = {}) {
+    sinew_attachment_id made{};
+    return check(sinew_suture_create(world(), &one, &other, &def, &made)), attachment(world(), made);
   }
 
 private:
@@ -471,9 +491,11 @@ private:
     auto out = sized<Out>();
     return check(get(world(), id, &out)), out;
   }
-  template <class Attach> attachment attached(Attach attach) {
-    sinew_attachment_id made{};
-    return check(attach(&made)), attachment(world(), made);
+  static sinew_surface_point point(sinew_body_id body, std::uint32_t triangle, vec3 weights) {
+    auto out = sized<sinew_surface_point>();
+    out.body = body, out.triangle = triangle;
+    for (std::size_t i = 0; i < 3; i++) out.weights[i] = weights[i];
+    return out;
   }
 };
 
@@ -528,8 +550,8 @@ class haptic : public owner<sinew_haptic, sinew_haptic_destroy> {
 public:
   haptic() = default;
   haptic(const tool &led, haptic_def def = {}) : owner(made(led, def)) {}
-  sinew_haptic_result tick(const pose &device, vec3 velocity, vec3 angular_velocity, float dt) {
-    auto out = sized<sinew_haptic_result>();
+  sinew_haptic_report tick(const pose &device, vec3 velocity, vec3 angular_velocity, float dt) {
+    auto out = sized<sinew_haptic_report>();
     check(sinew_haptic_tick(get(), device.position.data(), device.orientation.data(), velocity.data(), angular_velocity.data(), dt, &out));
     return out;
   }
@@ -646,10 +668,10 @@ public:
   // Into as many bytes as snapshot_size.
   void save_snapshot(span<std::uint8_t> bytes) const { check(sinew_world_save_snapshot(get(), bytes.data(), bytes.size())); }
   // Bodies and tools of it: sinew::body(world.get(), id).
-  static world load_snapshot(span<const std::uint8_t> bytes, std::uint32_t thread_count = 1, sinew_run_tasks run = nullptr,
-                             void *context = nullptr) {
+  // Of the definition its threads apply.
+  static world load_snapshot(span<const std::uint8_t> bytes, const world_def &def = {}) {
     sinew_world *raw = nullptr;
-    return check(sinew_world_load_snapshot(bytes.data(), bytes.size(), thread_count, run, context, &raw)), world(raw);
+    return check((sinew_world_load_snapshot)(bytes.data(), bytes.size(), &def, &raw)), world(raw); // no macro of compat_0_1.h
   }
 
   body create_body(const body_def &def) {
@@ -673,16 +695,16 @@ public:
 
   sinew::wrench wrench(span<const sinew_tool_id> tools, vec3 about) const {
     sinew::wrench out{};
-    check(sinew_tools_get_wrench(get(), tools.data(), tools.size(), about.data(), out.force.data(), out.torque.data()));
+    check(sinew_world_get_total_wrench(get(), tools.data(), tools.size(), about.data(), out.force.data(), out.torque.data()));
     return out;
   }
   std::size_t contact_changes(span<sinew_contact_change> into) const {
     std::size_t count = 0;
     return check(sinew_world_get_contact_changes(get(), into.data(), into.size(), &count)), count;
   }
-  std::size_t slipped(span<sinew_attachment_id> into) const {
+  std::size_t broken_attachments(span<sinew_attachment_id> into) const {
     std::size_t count = 0;
-    return check(sinew_world_get_slipped(get(), into.data(), into.size(), &count)), count;
+    return check(sinew_world_get_broken_attachments(get(), into.data(), into.size(), &count)), count;
   }
   sinew_surface_point cast_ray(vec3 origin, vec3 direction, float max_distance) const { // body.index1 is 0 where nothing is hit
     auto out = sized<sinew_surface_point>();

@@ -94,7 +94,6 @@ public static unsafe class Sinew
         public IntPtr run_tasks;
         public void* tasks_context;
         public uint kernel;
-        public uint reserved2;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -132,6 +131,18 @@ public static unsafe class Sinew
     public static extern int sinew_world_set_gravity(IntPtr world, float* gravity);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_get_gravity(IntPtr world, float* out_gravity);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_set_substeps(IntPtr world, uint substeps, uint max_substeps);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_get_substeps(IntPtr world, uint* out_substeps, uint* out_max_substeps);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_get_time(IntPtr world, double* out_time, ulong* out_steps);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_world_get_state_hash(IntPtr world, ulong* @out);
 
     public enum sinew_mesh_format { SINEW_MESH_FORMAT_AUTO = 0, SINEW_MESH_FORMAT_OBJ = 1, SINEW_MESH_FORMAT_STL = 2, SINEW_MESH_FORMAT_VTK = 3, SINEW_MESH_FORMAT_GMSH = 4, SINEW_MESH_FORMAT_TETGEN = 5 }
@@ -150,6 +161,12 @@ public static unsafe class Sinew
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_mesh_create_organ(float length, float spacing, IntPtr* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_mesh_create(float* positions, UIntPtr node_count, uint* triangles, UIntPtr triangle_count, uint* tetrahedra, UIntPtr tetrahedron_count, IntPtr* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_mesh_create_filled(IntPtr surface, float spacing, IntPtr* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern void sinew_mesh_destroy(IntPtr mesh);
@@ -174,7 +191,6 @@ public static unsafe class Sinew
         public UIntPtr dropped_tetrahedra;
         public UIntPtr flipped_tetrahedra;
         public uint closed;
-        public uint reserved;
         public uint* cells;
         public UIntPtr cell_count;
     }
@@ -329,6 +345,9 @@ public static unsafe class Sinew
     public static extern int sinew_body_set_collision(IntPtr world, sinew_body_id body, uint category, uint mask);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_collision(IntPtr world, sinew_body_id body, uint* out_category, uint* out_mask);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_wake(IntPtr world, sinew_body_id body);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -358,7 +377,6 @@ public static unsafe class Sinew
         public uint collision_category;
         public uint collision_mask;
         public fixed float half_extents[3];
-        public uint reserved1;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -374,16 +392,25 @@ public static unsafe class Sinew
     public static extern int sinew_tool_set_pose(IntPtr world, sinew_tool_id tool, float* position, float* orientation);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tool_get_pose(IntPtr world, sinew_tool_id tool, float* position, float* orientation);
+    public static extern int sinew_tool_get_pose(IntPtr world, sinew_tool_id tool, float* out_position, float* out_orientation);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_tool_set_friction(IntPtr world, sinew_tool_id tool, float friction);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_get_friction(IntPtr world, sinew_tool_id tool, float* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_tool_set_force_limit(IntPtr world, sinew_tool_id tool, float force_limit);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_get_force_limit(IntPtr world, sinew_tool_id tool, float* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_tool_set_collision(IntPtr world, sinew_tool_id tool, uint category, uint mask);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_get_collision(IntPtr world, sinew_tool_id tool, uint* out_category, uint* out_mask);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_tool_get_wrench(IntPtr world, sinew_tool_id tool, float* force, float* torque);
@@ -400,7 +427,7 @@ public static unsafe class Sinew
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tool_get_contacts(IntPtr world, sinew_tool_id tool, sinew_contact* contacts, UIntPtr capacity, UIntPtr* count);
+    public static extern int sinew_tool_get_contacts(IntPtr world, sinew_tool_id tool, sinew_contact* out_contacts, UIntPtr capacity, UIntPtr* out_count);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_material_preset
@@ -411,7 +438,6 @@ public static unsafe class Sinew
         public float shear_modulus;
         public float young_modulus;
         public float density;
-        public uint reserved;
     }
 
     public enum sinew_preset { SINEW_PRESET_LIVER = 0, SINEW_PRESET_FIBROTIC_LIVER = 1, SINEW_PRESET_LIVER_TUMOUR = 2, SINEW_PRESET_STOMACH = 3, SINEW_PRESET_GALLBLADDER = 4, SINEW_PRESET_BILE_DUCT = 5, SINEW_PRESET_HEPATIC_ARTERY = 6 }
@@ -426,19 +452,22 @@ public static unsafe class Sinew
     public static extern int sinew_body_remove_spring(IntPtr world, sinew_body_id body, uint a, uint b);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_spring_pairs(IntPtr world, sinew_body_id body, uint* pairs, UIntPtr count);
+    public static extern int sinew_body_get_spring_pairs(IntPtr world, sinew_body_id body, uint* out_pairs, UIntPtr count);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_springs(IntPtr world, sinew_body_id body, uint* pairs, UIntPtr count, float* stiffnesses, float* rest_lengths);
+    public static extern int sinew_body_get_springs(IntPtr world, sinew_body_id body, uint* pairs, UIntPtr count, float* out_stiffnesses, float* out_rest_lengths);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_set_springs(IntPtr world, sinew_body_id body, uint* pairs, UIntPtr count, float* stiffnesses, float* rest_lengths);
+    public static extern int sinew_body_set_springs(IntPtr world, sinew_body_id body, uint* pairs, float* stiffnesses, float* rest_lengths, UIntPtr count);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_scale_region(IntPtr world, sinew_body_id body, uint* nodes, UIntPtr node_count, float stiffness_factor, float length_factor);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_set_pressure(IntPtr world, sinew_body_id body, float pressure);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_pressure(IntPtr world, sinew_body_id body, float* @out);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_enclosed_report
@@ -454,7 +483,7 @@ public static unsafe class Sinew
     public static extern int sinew_body_get_enclosed_report(IntPtr world, sinew_body_id body, sinew_enclosed_report* @out);
 
     [StructLayout(LayoutKind.Sequential)]
-    public struct sinew_rest_state_def
+    public struct sinew_equilibrium_def
     {
         public UIntPtr struct_size;
         public float tolerance;
@@ -462,10 +491,10 @@ public static unsafe class Sinew
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_rest_state_def_init(sinew_rest_state_def* def, UIntPtr struct_size);
+    public static extern int sinew_equilibrium_def_init(sinew_equilibrium_def* def, UIntPtr struct_size);
 
     [StructLayout(LayoutKind.Sequential)]
-    public struct sinew_rest_state_report
+    public struct sinew_equilibrium_report
     {
         public UIntPtr struct_size;
         public uint iterations;
@@ -477,25 +506,117 @@ public static unsafe class Sinew
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_rest_state(IntPtr world, sinew_body_id body, sinew_rest_state_def* def, sinew_rest_state_report* report);
+    public static extern int sinew_body_solve_equilibrium(IntPtr world, sinew_body_id body, sinew_equilibrium_def* def, sinew_equilibrium_report* out_report);
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_surface_point
+    {
+        public UIntPtr struct_size;
+        public sinew_body_id body;
+        public uint triangle;
+        public fixed float weights[3];
+        public fixed float position[3];
+        public fixed float normal[3];
+        public float distance;
+    }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_attach_node(IntPtr world, sinew_body_id body, uint node, sinew_tool_id tool, float force_limit, sinew_attachment_id* @out);
+    public static extern int sinew_world_cast_ray(IntPtr world, float* origin, float* direction, float max_distance, sinew_surface_point* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_attach_nodes(IntPtr world, sinew_body_id body, uint* nodes, UIntPtr count, sinew_tool_id tool, float force_limit, sinew_attachment_id* @out);
+    public static extern int sinew_world_find_nearest(IntPtr world, float* point, float max_distance, sinew_surface_point* @out);
+
+    public enum sinew_image_form { SINEW_IMAGE_FORM_INTERVALS = 0, SINEW_IMAGE_FORM_COUNTED = 1 }
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_detector_def
+    {
+        public UIntPtr struct_size;
+        public sinew_body_id bodies_0, bodies_1;
+        public uint detection;
+        public uint form;
+        public float pixel;
+        public fixed float direction[3];
+        public uint pixels;
+        public uint crossings;
+        public fixed float thickness[2];
+    }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_attach_points(IntPtr world, sinew_body_id body, uint* triangles, float* weights, UIntPtr count, sinew_tool_id tool, float force_limit, sinew_attachment_id* @out);
+    public static extern int sinew_detector_def_init(sinew_detector_def* def, UIntPtr struct_size);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_attach_nodes_to_nodes(IntPtr world, sinew_body_id body, uint* nodes, UIntPtr count, sinew_body_id other, uint* other_nodes, float force_limit, sinew_attachment_id* @out);
+    public static extern int sinew_detector_create(IntPtr world, sinew_detector_def* def, IntPtr* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_attach_nodes_to_points(IntPtr world, sinew_body_id body, uint* nodes, UIntPtr count, sinew_body_id other, uint* other_triangles, float* other_weights, float force_limit, sinew_attachment_id* @out);
+    public static extern void sinew_detector_destroy(IntPtr detector);
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_detector_report
+    {
+        public UIntPtr struct_size;
+        public double volume;
+        public fixed float normal[3];
+        public float depth;
+        public float pixel;
+        public fixed uint point_counts[2];
+        public fixed uint edge_counts[2];
+        public fixed uint unlisted[2];
+        public fixed uint closed[2];
+    }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_attach_points_to_points(IntPtr world, sinew_body_id body, uint* triangles, float* weights, UIntPtr count, sinew_body_id other, uint* other_triangles, float* other_weights, float force_limit, sinew_attachment_id* @out);
+    public static extern int sinew_detector_find(IntPtr detector, IntPtr world, sinew_detector_report* out_report);
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_point_inside
+    {
+        public uint node;
+        public uint triangle;
+        public float depth;
+        public fixed float normal[3];
+    }
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_detector_get_points(IntPtr detector, uint side, sinew_point_inside** out_points, UIntPtr* out_count);
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_edge_inside
+    {
+        public fixed uint nodes[2];
+        public float entry;
+        public float exit;
+        public float depth;
+    }
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_detector_get_edges(IntPtr detector, uint side, sinew_edge_inside** out_edges, UIntPtr* out_count);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_detector_get_gradient(IntPtr detector, uint side, sinew_dvec3_view* @out);
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_attachment_def
+    {
+        public UIntPtr struct_size;
+        public sinew_body_id body;
+        public sinew_tool_id tool;
+        public sinew_body_id other;
+        public UIntPtr count;
+        public uint* nodes;
+        public uint* triangles;
+        public float* weights;
+        public uint* other_nodes;
+        public uint* other_triangles;
+        public float* other_weights;
+        public float force_limit;
+    }
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_attachment_def_init(sinew_attachment_def* def, UIntPtr struct_size);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_attachment_create(IntPtr world, sinew_attachment_def* def, sinew_attachment_id* out_attachments);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_suture_def
@@ -504,14 +625,13 @@ public static unsafe class Sinew
         public float length;
         public float stiffness;
         public float force_limit;
-        public uint reserved0;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_suture_def_init(sinew_suture_def* def, UIntPtr struct_size);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_suture_points(IntPtr world, sinew_body_id body, uint triangle, float* weights, sinew_body_id other, uint other_triangle, float* other_weights, sinew_suture_def* def, sinew_attachment_id* @out);
+    public static extern int sinew_suture_create(IntPtr world, sinew_surface_point* point, sinew_surface_point* other_point, sinew_suture_def* def, sinew_attachment_id* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_suture_set_length(IntPtr world, sinew_attachment_id suture, float length);
@@ -526,16 +646,16 @@ public static unsafe class Sinew
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_suture_get_report(IntPtr world, sinew_attachment_id suture, sinew_suture_report* report);
+    public static extern int sinew_suture_get_report(IntPtr world, sinew_attachment_id suture, sinew_suture_report* out_report);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_attachment_release(IntPtr world, sinew_attachment_id attachment);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_attachment_get_force(IntPtr world, sinew_attachment_id attachment, float* force);
+    public static extern int sinew_attachment_get_force(IntPtr world, sinew_attachment_id attachment, float* out_force);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_get_slipped(IntPtr world, sinew_attachment_id* @out, UIntPtr capacity, UIntPtr* count);
+    public static extern int sinew_world_get_broken_attachments(IntPtr world, sinew_attachment_id* out_attachments, UIntPtr capacity, UIntPtr* out_count);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_cut_report
@@ -550,7 +670,7 @@ public static unsafe class Sinew
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_cut(IntPtr world, sinew_body_id body, float* start, float* end, sinew_cut_report* report);
+    public static extern int sinew_body_cut(IntPtr world, sinew_body_id body, float* start, float* end, sinew_cut_report* out_report);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_new_node
@@ -586,7 +706,7 @@ public static unsafe class Sinew
     public static extern int sinew_body_get_topology_changes(IntPtr world, sinew_body_id body, ulong since_version, sinew_topology_changes* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_pieces(IntPtr world, sinew_body_id body, uint* pieces, UIntPtr count, uint* piece_count);
+    public static extern int sinew_body_get_pieces(IntPtr world, sinew_body_id body, uint* out_pieces, UIntPtr node_count, uint* out_piece_count);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_blade_def
@@ -612,6 +732,15 @@ public static unsafe class Sinew
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_blade_set_pose(IntPtr world, sinew_blade_id blade, float* position, float* orientation);
 
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_blade_get_pose(IntPtr world, sinew_blade_id blade, float* out_position, float* out_orientation);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_blade_set_collision(IntPtr world, sinew_blade_id blade, uint category, uint mask);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_blade_get_collision(IntPtr world, sinew_blade_id blade, uint* out_category, uint* out_mask);
+
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_blade_report
     {
@@ -622,7 +751,6 @@ public static unsafe class Sinew
         public double length;
         public double lag;
         public int status;
-        public uint reserved0;
         public double area;
     }
 
@@ -630,7 +758,10 @@ public static unsafe class Sinew
     public static extern int sinew_blade_get_report(IntPtr world, sinew_blade_id blade, sinew_blade_report* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_set_tear_limits(IntPtr world, sinew_body_id body, uint* pairs, UIntPtr count, float* strains, float* forces);
+    public static extern int sinew_body_set_tear_limits(IntPtr world, sinew_body_id body, uint* pairs, float* strains, float* forces, UIntPtr count);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_tear_limits(IntPtr world, sinew_body_id body, uint* pairs, UIntPtr count, float* out_strains, float* out_forces);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_tear_report
@@ -641,7 +772,6 @@ public static unsafe class Sinew
         public uint waiting;
         public uint small_pieces;
         public uint no_room;
-        public uint reserved;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -674,7 +804,7 @@ public static unsafe class Sinew
     public static extern void sinew_haptic_destroy(IntPtr haptic);
 
     [StructLayout(LayoutKind.Sequential)]
-    public struct sinew_haptic_result
+    public struct sinew_haptic_report
     {
         public UIntPtr struct_size;
         public fixed float force[3];
@@ -690,7 +820,7 @@ public static unsafe class Sinew
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_haptic_tick(IntPtr haptic, float* position, float* orientation, float* velocity, float* angular_velocity, float dt, sinew_haptic_result* @out);
+    public static extern int sinew_haptic_tick(IntPtr haptic, float* position, float* orientation, float* velocity, float* angular_velocity, float dt, sinew_haptic_report* @out);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_haptic_contact
@@ -703,7 +833,7 @@ public static unsafe class Sinew
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_haptic_get_contacts(IntPtr haptic, sinew_haptic_contact* contacts, UIntPtr capacity, UIntPtr* count);
+    public static extern int sinew_haptic_get_contacts(IntPtr haptic, sinew_haptic_contact* out_contacts, UIntPtr capacity, UIntPtr* out_count);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_mass_properties
@@ -727,7 +857,7 @@ public static unsafe class Sinew
     public static extern int sinew_tool_set_velocity(IntPtr world, sinew_tool_id tool, float* velocity, float* angular_velocity);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tool_get_velocity(IntPtr world, sinew_tool_id tool, float* velocity, float* angular_velocity);
+    public static extern int sinew_tool_get_velocity(IntPtr world, sinew_tool_id tool, float* out_velocity, float* out_angular_velocity);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_tool_apply_wrench(IntPtr world, sinew_tool_id tool, float* force, float* torque);
@@ -797,101 +927,6 @@ public static unsafe class Sinew
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_reader_read(IntPtr reader, sinew_frame* @out);
 
-    [StructLayout(LayoutKind.Sequential)]
-    public struct sinew_surface_point
-    {
-        public UIntPtr struct_size;
-        public sinew_body_id body;
-        public uint triangle;
-        public fixed float weights[3];
-        public fixed float position[3];
-        public fixed float normal[3];
-        public float distance;
-        public uint reserved;
-    }
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_cast_ray(IntPtr world, float* origin, float* direction, float max_distance, sinew_surface_point* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_find_nearest(IntPtr world, float* point, float max_distance, sinew_surface_point* @out);
-
-    public enum sinew_image_form { SINEW_IMAGE_FORM_INTERVALS = 0, SINEW_IMAGE_FORM_COUNTED = 1 }
-
-    [StructLayout(LayoutKind.Sequential)]
-    public struct sinew_detector_def
-    {
-        public UIntPtr struct_size;
-        public sinew_body_id bodies_0, bodies_1;
-        public uint detection;
-        public uint form;
-        public float pixel;
-        public fixed float direction[3];
-        public uint pixels;
-        public uint crossings;
-        public fixed float thickness[2];
-    }
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_detector_def_init(sinew_detector_def* def, UIntPtr struct_size);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_detector_create(IntPtr world, sinew_detector_def* def, IntPtr* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern void sinew_detector_destroy(IntPtr detector);
-
-    [StructLayout(LayoutKind.Sequential)]
-    public struct sinew_detector_report
-    {
-        public UIntPtr struct_size;
-        public double volume;
-        public fixed float normal[3];
-        public float depth;
-        public float pixel;
-        public fixed uint point_counts[2];
-        public fixed uint edge_counts[2];
-        public fixed uint unlisted[2];
-        public fixed uint closed[2];
-        public uint reserved;
-    }
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_detector_find(IntPtr detector, IntPtr world, sinew_detector_report* report);
-
-    [StructLayout(LayoutKind.Sequential)]
-    public struct sinew_point_inside
-    {
-        public uint node;
-        public uint triangle;
-        public float depth;
-        public fixed float normal[3];
-    }
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_detector_get_points(IntPtr detector, uint side, sinew_point_inside** points, UIntPtr* count);
-
-    [StructLayout(LayoutKind.Sequential)]
-    public struct sinew_edge_inside
-    {
-        public fixed uint nodes[2];
-        public float entry;
-        public float exit;
-        public float depth;
-    }
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_detector_get_edges(IntPtr detector, uint side, sinew_edge_inside** edges, UIntPtr* count);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_detector_get_gradient(IntPtr detector, uint side, sinew_dvec3_view* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_mesh_create(float* positions, UIntPtr node_count, uint* triangles, UIntPtr triangle_count, uint* tetrahedra, UIntPtr tetrahedron_count, IntPtr* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_mesh_create_filled(IntPtr surface, float spacing, IntPtr* @out);
-
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_def_set_mesh(sinew_body_def* def, IntPtr mesh);
 
@@ -902,10 +937,10 @@ public static unsafe class Sinew
     public static extern int sinew_body_get_bounds(IntPtr world, sinew_body_id body, float* out_min, float* out_max);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_normals(IntPtr world, sinew_body_id body, float* normals, UIntPtr node_count);
+    public static extern int sinew_body_get_normals(IntPtr world, sinew_body_id body, float* out_normals, UIntPtr node_count);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_masses(IntPtr world, sinew_body_id body, float* masses, UIntPtr node_count);
+    public static extern int sinew_body_get_masses(IntPtr world, sinew_body_id body, float* out_masses, UIntPtr node_count);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_apply_impulses(IntPtr world, sinew_body_id body, uint* nodes, float* impulses, UIntPtr count);
@@ -929,13 +964,13 @@ public static unsafe class Sinew
     public static extern int sinew_body_unpin_box(IntPtr world, sinew_body_id body, float* min, float* max, UIntPtr* out_count);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_pin_forces(IntPtr world, sinew_body_id body, float* forces, UIntPtr node_count);
+    public static extern int sinew_body_get_pin_forces(IntPtr world, sinew_body_id body, float* out_forces, UIntPtr node_count);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tool_get_target(IntPtr world, sinew_tool_id tool, float* position, float* orientation);
+    public static extern int sinew_tool_get_target(IntPtr world, sinew_tool_id tool, float* out_position, float* out_orientation);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tools_get_wrench(IntPtr world, sinew_tool_id* tools, UIntPtr count, float* point, float* force, float* torque);
+    public static extern int sinew_world_get_total_wrench(IntPtr world, sinew_tool_id* tools, UIntPtr count, float* point, float* out_force, float* out_torque);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_contact_change
@@ -943,11 +978,10 @@ public static unsafe class Sinew
         public sinew_tool_id tool;
         public sinew_body_id body;
         public uint begun;
-        public uint reserved;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_get_contact_changes(IntPtr world, sinew_contact_change* changes, UIntPtr capacity, UIntPtr* count);
+    public static extern int sinew_world_get_contact_changes(IntPtr world, sinew_contact_change* out_changes, UIntPtr capacity, UIntPtr* out_count);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_ray_hit
@@ -960,44 +994,10 @@ public static unsafe class Sinew
         public fixed float position[3];
         public fixed float normal[3];
         public float distance;
-        public uint reserved;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_world_cast_ray_filtered(IntPtr world, float* origin, float* direction, float max_distance, uint category, uint mask, sinew_ray_hit* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_get_time(IntPtr world, double* out_time, ulong* out_steps);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_get_gravity(IntPtr world, float* out_gravity);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_collision(IntPtr world, sinew_body_id body, uint* out_category, uint* out_mask);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_pressure(IntPtr world, sinew_body_id body, float* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tool_get_friction(IntPtr world, sinew_tool_id tool, float* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tool_get_force_limit(IntPtr world, sinew_tool_id tool, float* @out);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_tool_get_collision(IntPtr world, sinew_tool_id tool, uint* out_category, uint* out_mask);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_blade_get_pose(IntPtr world, sinew_blade_id blade, float* position, float* orientation);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_blade_set_collision(IntPtr world, sinew_blade_id blade, uint category, uint mask);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_set_substeps(IntPtr world, uint substeps, uint max_substeps);
-
-    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_get_substeps(IntPtr world, uint* out_substeps, uint* out_max_substeps);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_body_settings
@@ -1063,10 +1063,10 @@ public static unsafe class Sinew
     public static extern int sinew_world_get_snapshot_size(IntPtr world, UIntPtr* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_save_snapshot(IntPtr world, byte* bytes, UIntPtr size);
+    public static extern int sinew_world_save_snapshot(IntPtr world, byte* out_bytes, UIntPtr size);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_world_load_snapshot(byte* bytes, UIntPtr size, uint thread_count, IntPtr run_tasks, void* tasks_context, IntPtr* @out);
+    public static extern int sinew_world_load_snapshot(byte* bytes, UIntPtr size, sinew_world_def* def, IntPtr* @out);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_energy
@@ -1092,7 +1092,6 @@ public static unsafe class Sinew
         public uint solver;
         public uint auto_substeps;
         public float auto_step;
-        public uint reserved;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -1114,7 +1113,7 @@ public static unsafe class Sinew
     public static extern int sinew_body_get_storage_report(IntPtr world, sinew_body_id body, sinew_storage_report* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_spring_strains(IntPtr world, sinew_body_id body, uint* pairs, float* rest_lengths, UIntPtr count, float* strains);
+    public static extern int sinew_body_get_spring_strains(IntPtr world, sinew_body_id body, uint* pairs, float* rest_lengths, UIntPtr count, float* out_strains);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_strain
@@ -1125,13 +1124,13 @@ public static unsafe class Sinew
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_triangle_strains(IntPtr world, sinew_body_id body, float* rest_positions, UIntPtr node_count, uint* triangles, UIntPtr triangle_count, sinew_strain* strains);
+    public static extern int sinew_body_get_triangle_strains(IntPtr world, sinew_body_id body, float* rest_positions, UIntPtr node_count, uint* triangles, UIntPtr triangle_count, sinew_strain* out_strains);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_body_get_tetrahedron_strains(IntPtr world, sinew_body_id body, float* rest_positions, UIntPtr node_count, uint* tetrahedra, UIntPtr tetrahedron_count, sinew_strain* strains);
+    public static extern int sinew_body_get_tetrahedron_strains(IntPtr world, sinew_body_id body, float* rest_positions, UIntPtr node_count, uint* tetrahedra, UIntPtr tetrahedron_count, sinew_strain* out_strains);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-    public static extern int sinew_mean_at_nodes(uint* elements, uint corners, float* values, UIntPtr element_count, float* means, UIntPtr node_count);
+    public static extern int sinew_util_average_to_nodes(uint* elements, uint corners, float* values, UIntPtr element_count, float* out_means, UIntPtr node_count);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_picture_def
@@ -1164,7 +1163,6 @@ public static unsafe class Sinew
         public float low;
         public float high;
         public uint colours;
-        public uint reserved;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -1236,7 +1234,6 @@ public static unsafe class Sinew
         public ulong recorded_hash;
         public ulong replayed_hash;
         public uint cut_short;
-        public uint reserved;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]

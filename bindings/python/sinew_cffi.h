@@ -78,7 +78,6 @@ typedef struct sinew_world_def {
   sinew_run_tasks run_tasks;
   void *tasks_context;
   uint32_t kernel;
-  uint32_t reserved2;
 } sinew_world_def;
 sinew_status sinew_world_def_init(sinew_world_def *def, size_t struct_size);
 sinew_status sinew_world_create(const sinew_world_def *def, sinew_world **out);
@@ -101,6 +100,11 @@ typedef struct sinew_step_report {
 } sinew_step_report;
 sinew_status sinew_world_step(sinew_world *world, float dt, sinew_step_report *report);
 sinew_status sinew_world_set_gravity(sinew_world *world, const float *gravity);
+sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravity);
+sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uint32_t max_substeps);
+sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
+    uint32_t *out_max_substeps);
+sinew_status sinew_world_get_time(const sinew_world *world, double *out_time, uint64_t *out_steps);
 sinew_status sinew_world_get_state_hash(const sinew_world *world, uint64_t *out);
 typedef struct sinew_mesh sinew_mesh;
 typedef enum sinew_mesh_format {
@@ -116,6 +120,9 @@ sinew_status sinew_mesh_create_cloth(const float *size, const uint32_t *cells, s
 sinew_status sinew_mesh_create_block(const float *size, const uint32_t *cells, sinew_mesh **out);
 sinew_status sinew_mesh_create_lattice(float edge, const uint32_t *cells, sinew_mesh **out);
 sinew_status sinew_mesh_create_organ(float length, float spacing, sinew_mesh **out);
+sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
+    size_t triangle_count, const uint32_t *tetrahedra, size_t tetrahedron_count, sinew_mesh **out);
+sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, sinew_mesh **out);
 void sinew_mesh_destroy(sinew_mesh *mesh);
 typedef struct sinew_mesh_view {
   size_t struct_size;
@@ -135,7 +142,6 @@ typedef struct sinew_mesh_view {
   size_t dropped_tetrahedra;
   size_t flipped_tetrahedra;
   uint32_t closed;
-  uint32_t reserved;
   const uint32_t *cells;
   size_t cell_count;
 } sinew_mesh_view;
@@ -250,32 +256,34 @@ sinew_status sinew_body_def_init(sinew_body_def *def, size_t struct_size);
 sinew_status sinew_body_create(sinew_world *world, const sinew_body_def *def, sinew_body_id *out);
 sinew_status sinew_body_destroy(sinew_world *world, sinew_body_id body);
 sinew_status sinew_body_get_positions(const sinew_world *world, sinew_body_id body,
-                                      sinew_vec3_view *out);
+    sinew_vec3_view *out);
 sinew_status sinew_body_get_velocities(const sinew_world *world, sinew_body_id body,
-                                       sinew_vec3_view *out);
+    sinew_vec3_view *out);
 sinew_status sinew_body_set_positions(sinew_world *world, sinew_body_id body,
-                                      const float *positions, size_t node_count);
+    const float *positions, size_t node_count);
 sinew_status sinew_body_set_velocities(sinew_world *world, sinew_body_id body,
-                                       const float *velocities, size_t node_count);
+    const float *velocities, size_t node_count);
 sinew_status sinew_body_get_triangles(const sinew_world *world, sinew_body_id body,
-                                      sinew_triangle_view *out);
+    sinew_triangle_view *out);
 sinew_status sinew_body_is_closed(const sinew_world *world, sinew_body_id body, uint32_t *out);
 sinew_status sinew_body_get_node_mass(const sinew_world *world, sinew_body_id body, uint32_t node,
-                                      float *out);
+    float *out);
 sinew_status sinew_body_apply_force(sinew_world *world, sinew_body_id body, uint32_t node,
-                                    const float *force);
+    const float *force);
 sinew_status sinew_body_apply_forces(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     const float *forces, size_t count);
+    const float *forces, size_t count);
 sinew_status sinew_body_pin(sinew_world *world, sinew_body_id body, uint32_t node);
 sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_t node,
-                                 uint32_t axes);
+    uint32_t axes);
 sinew_status sinew_body_unpin(sinew_world *world, sinew_body_id body, uint32_t node);
 sinew_status sinew_body_move_pin(sinew_world *world, sinew_body_id body, uint32_t node,
-                                 const float *position);
+    const float *position);
 sinew_status sinew_body_get_pin_force(const sinew_world *world, sinew_body_id body, uint32_t node,
-                                      float *force);
+    float *force);
 sinew_status sinew_body_set_collision(sinew_world *world, sinew_body_id body, uint32_t category,
-                                      uint32_t mask);
+    uint32_t mask);
+sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_category, uint32_t *out_mask);
 sinew_status sinew_body_wake(sinew_world *world, sinew_body_id body);
 sinew_status sinew_body_get_awake_share(const sinew_world *world, sinew_body_id body, float *out);
 typedef enum sinew_shape {
@@ -305,21 +313,24 @@ typedef struct sinew_tool_def {
   uint32_t collision_category;
   uint32_t collision_mask;
   float half_extents[3];
-  uint32_t reserved1;
 } sinew_tool_def;
 sinew_status sinew_tool_def_init(sinew_tool_def *def, size_t struct_size);
 sinew_status sinew_tool_create(sinew_world *world, const sinew_tool_def *def, sinew_tool_id *out);
 sinew_status sinew_tool_destroy(sinew_world *world, sinew_tool_id tool);
 sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const float *position,
-                                 const float *orientation);
-sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *position,
-                                 float *orientation);
+    const float *orientation);
+sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *out_position,
+    float *out_orientation);
 sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, float friction);
+sinew_status sinew_tool_get_friction(const sinew_world *world, sinew_tool_id tool, float *out);
 sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, float force_limit);
+sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id tool, float *out);
 sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, uint32_t category,
-                                      uint32_t mask);
+    uint32_t mask);
+sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
+    uint32_t *out_category, uint32_t *out_mask);
 sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool, float *force,
-                                   float *torque);
+    float *torque);
 typedef struct sinew_contact {
   sinew_body_id body;
   uint32_t nodes[3];
@@ -329,7 +340,7 @@ typedef struct sinew_contact {
   float force[3];
 } sinew_contact;
 sinew_status sinew_tool_get_contacts(const sinew_world *world, sinew_tool_id tool,
-                                     sinew_contact *contacts, size_t capacity, size_t *count);
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
 typedef struct sinew_material_preset {
   size_t struct_size;
   const char *name;
@@ -337,7 +348,6 @@ typedef struct sinew_material_preset {
   float shear_modulus;
   float young_modulus;
   float density;
-  uint32_t reserved;
 } sinew_material_preset;
 typedef enum sinew_preset {
   SINEW_PRESET_LIVER = 0,
@@ -350,21 +360,19 @@ typedef enum sinew_preset {
 } sinew_preset;
 sinew_status sinew_material_get_preset(uint32_t preset, sinew_material_preset *out);
 sinew_status sinew_body_add_spring(sinew_world *world, sinew_body_id body, uint32_t a, uint32_t b,
-                                   float stiffness, float rest_length);
+    float stiffness, float rest_length);
 sinew_status sinew_body_remove_spring(sinew_world *world, sinew_body_id body, uint32_t a,
-                                      uint32_t b);
+    uint32_t b);
 sinew_status sinew_body_get_spring_pairs(const sinew_world *world, sinew_body_id body,
-                                         uint32_t *pairs, size_t count);
+    uint32_t *out_pairs, size_t count);
 sinew_status sinew_body_get_springs(const sinew_world *world, sinew_body_id body,
-                                    const uint32_t *pairs, size_t count, float *stiffnesses,
-                                    float *rest_lengths);
+    const uint32_t *pairs, size_t count, float *out_stiffnesses, float *out_rest_lengths);
 sinew_status sinew_body_set_springs(sinew_world *world, sinew_body_id body, const uint32_t *pairs,
-                                    size_t count, const float *stiffnesses,
-                                    const float *rest_lengths);
+    const float *stiffnesses, const float *rest_lengths, size_t count);
 sinew_status sinew_body_scale_region(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     size_t node_count, float stiffness_factor,
-                                     float length_factor);
+    size_t node_count, float stiffness_factor, float length_factor);
 sinew_status sinew_body_set_pressure(sinew_world *world, sinew_body_id body, float pressure);
+sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
 typedef struct sinew_enclosed_report {
   size_t struct_size;
   size_t cavity_count;
@@ -373,14 +381,14 @@ typedef struct sinew_enclosed_report {
   double pressure;
 } sinew_enclosed_report;
 sinew_status sinew_body_get_enclosed_report(const sinew_world *world, sinew_body_id body,
-                                            sinew_enclosed_report *out);
-typedef struct sinew_rest_state_def {
+    sinew_enclosed_report *out);
+typedef struct sinew_equilibrium_def {
   size_t struct_size;
   float tolerance;
   uint32_t iterations;
-} sinew_rest_state_def;
-sinew_status sinew_rest_state_def_init(sinew_rest_state_def *def, size_t struct_size);
-typedef struct sinew_rest_state_report {
+} sinew_equilibrium_def;
+sinew_status sinew_equilibrium_def_init(sinew_equilibrium_def *def, size_t struct_size);
+typedef struct sinew_equilibrium_report {
   size_t struct_size;
   uint32_t iterations;
   uint32_t products;
@@ -388,47 +396,99 @@ typedef struct sinew_rest_state_report {
   double error;
   double energy_before;
   double energy_after;
-} sinew_rest_state_report;
-sinew_status sinew_body_rest_state(sinew_world *world, sinew_body_id body,
-                                   const sinew_rest_state_def *def,
-                                   sinew_rest_state_report *report);
-sinew_status sinew_body_attach_node(sinew_world *world, sinew_body_id body, uint32_t node,
-                                    sinew_tool_id tool, float force_limit,
-                                    sinew_attachment_id *out);
-sinew_status sinew_body_attach_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     size_t count, sinew_tool_id tool, float force_limit,
-                                     sinew_attachment_id *out);
-sinew_status sinew_body_attach_points(sinew_world *world, sinew_body_id body,
-                                      const uint32_t *triangles, const float *weights, size_t count,
-                                      sinew_tool_id tool, float force_limit,
-                                      sinew_attachment_id *out);
-sinew_status sinew_body_attach_nodes_to_nodes(sinew_world *world, sinew_body_id body,
-                                              const uint32_t *nodes, size_t count,
-                                              sinew_body_id other, const uint32_t *other_nodes,
-                                              float force_limit, sinew_attachment_id *out);
-sinew_status sinew_body_attach_nodes_to_points(sinew_world *world, sinew_body_id body,
-                                               const uint32_t *nodes, size_t count,
-                                               sinew_body_id other, const uint32_t *other_triangles,
-                                               const float *other_weights, float force_limit,
-                                               sinew_attachment_id *out);
-sinew_status sinew_body_attach_points_to_points(sinew_world *world, sinew_body_id body,
-                                                const uint32_t *triangles, const float *weights,
-                                                size_t count, sinew_body_id other,
-                                                const uint32_t *other_triangles,
-                                                const float *other_weights, float force_limit,
-                                                sinew_attachment_id *out);
+} sinew_equilibrium_report;
+sinew_status sinew_body_solve_equilibrium(sinew_world *world, sinew_body_id body,
+    const sinew_equilibrium_def *def, sinew_equilibrium_report *out_report);
+typedef struct sinew_surface_point {
+  size_t struct_size;
+  sinew_body_id body;
+  uint32_t triangle;
+  float weights[3];
+  float position[3];
+  float normal[3];
+  float distance;
+} sinew_surface_point;
+sinew_status sinew_world_cast_ray(const sinew_world *world, const float *origin,
+    const float *direction, float max_distance, sinew_surface_point *out);
+sinew_status sinew_world_find_nearest(const sinew_world *world, const float *point,
+    float max_distance, sinew_surface_point *out);
+typedef enum sinew_image_form {
+  SINEW_IMAGE_FORM_INTERVALS = 0,
+  SINEW_IMAGE_FORM_COUNTED = 1
+} sinew_image_form;
+typedef struct sinew_detector_def {
+  size_t struct_size;
+  sinew_body_id bodies[2];
+  uint32_t detection;
+  uint32_t form;
+  float pixel;
+  float direction[3];
+  uint32_t pixels;
+  uint32_t crossings;
+  float thickness[2];
+} sinew_detector_def;
+sinew_status sinew_detector_def_init(sinew_detector_def *def, size_t struct_size);
+typedef struct sinew_detector sinew_detector;
+sinew_status sinew_detector_create(const sinew_world *world, const sinew_detector_def *def,
+    sinew_detector **out);
+void sinew_detector_destroy(sinew_detector *detector);
+typedef struct sinew_detector_report {
+  size_t struct_size;
+  double volume;
+  float normal[3];
+  float depth;
+  float pixel;
+  uint32_t point_counts[2];
+  uint32_t edge_counts[2];
+  uint32_t unlisted[2];
+  uint32_t closed[2];
+} sinew_detector_report;
+sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,
+    sinew_detector_report *out_report);
+typedef struct sinew_point_inside {
+  uint32_t node;
+  uint32_t triangle;
+  float depth;
+  float normal[3];
+} sinew_point_inside;
+sinew_status sinew_detector_get_points(const sinew_detector *detector, uint32_t side,
+    const sinew_point_inside **out_points, size_t *out_count);
+typedef struct sinew_edge_inside {
+  uint32_t nodes[2];
+  float entry;
+  float exit;
+  float depth;
+} sinew_edge_inside;
+sinew_status sinew_detector_get_edges(const sinew_detector *detector, uint32_t side,
+    const sinew_edge_inside **out_edges, size_t *out_count);
+sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_t side,
+    sinew_dvec3_view *out);
+typedef struct sinew_attachment_def {
+  size_t struct_size;
+  sinew_body_id body;
+  sinew_tool_id tool;
+  sinew_body_id other;
+  size_t count;
+  const uint32_t *nodes;
+  const uint32_t *triangles;
+  const float *weights;
+  const uint32_t *other_nodes;
+  const uint32_t *other_triangles;
+  const float *other_weights;
+  float force_limit;
+} sinew_attachment_def;
+sinew_status sinew_attachment_def_init(sinew_attachment_def *def, size_t struct_size);
+sinew_status sinew_attachment_create(sinew_world *world, const sinew_attachment_def *def,
+    sinew_attachment_id *out_attachments);
 typedef struct sinew_suture_def {
   size_t struct_size;
   float length;
   float stiffness;
   float force_limit;
-  uint32_t reserved0;
 } sinew_suture_def;
 sinew_status sinew_suture_def_init(sinew_suture_def *def, size_t struct_size);
-sinew_status sinew_body_suture_points(sinew_world *world, sinew_body_id body, uint32_t triangle,
-                                      const float *weights, sinew_body_id other,
-                                      uint32_t other_triangle, const float *other_weights,
-                                      const sinew_suture_def *def, sinew_attachment_id *out);
+sinew_status sinew_suture_create(sinew_world *world, const sinew_surface_point *point,
+    const sinew_surface_point *other_point, const sinew_suture_def *def, sinew_attachment_id *out);
 sinew_status sinew_suture_set_length(sinew_world *world, sinew_attachment_id suture, float length);
 typedef struct sinew_suture_report {
   size_t struct_size;
@@ -437,12 +497,12 @@ typedef struct sinew_suture_report {
   double energy;
 } sinew_suture_report;
 sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_id suture,
-                                     sinew_suture_report *report);
+    sinew_suture_report *out_report);
 sinew_status sinew_attachment_release(sinew_world *world, sinew_attachment_id attachment);
 sinew_status sinew_attachment_get_force(const sinew_world *world, sinew_attachment_id attachment,
-                                        float *force);
-sinew_status sinew_world_get_slipped(const sinew_world *world, sinew_attachment_id *out,
-                                     size_t capacity, size_t *count);
+    float *out_force);
+sinew_status sinew_world_get_broken_attachments(const sinew_world *world,
+    sinew_attachment_id *out_attachments, size_t capacity, size_t *out_count);
 typedef struct sinew_cut_report {
   size_t struct_size;
   uint32_t new_nodes;
@@ -453,7 +513,7 @@ typedef struct sinew_cut_report {
   double area;
 } sinew_cut_report;
 sinew_status sinew_body_cut(sinew_world *world, sinew_body_id body, const float *start,
-                            const float *end, sinew_cut_report *report);
+    const float *end, sinew_cut_report *out_report);
 typedef struct sinew_new_node {
   uint32_t node;
   uint32_t sources[3];
@@ -476,9 +536,9 @@ typedef struct sinew_topology_changes {
   size_t rim_count;
 } sinew_topology_changes;
 sinew_status sinew_body_get_topology_changes(const sinew_world *world, sinew_body_id body,
-                                             uint64_t since_version, sinew_topology_changes *out);
-sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body, uint32_t *pieces,
-                                   size_t count, uint32_t *piece_count);
+    uint64_t since_version, sinew_topology_changes *out);
+sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_pieces, size_t node_count, uint32_t *out_piece_count);
 typedef struct sinew_blade_def {
   size_t struct_size;
   float edge[6];
@@ -490,10 +550,16 @@ typedef struct sinew_blade_def {
 } sinew_blade_def;
 sinew_status sinew_blade_def_init(sinew_blade_def *def, size_t struct_size);
 sinew_status sinew_blade_create(sinew_world *world, const sinew_blade_def *def,
-                                sinew_blade_id *out);
+    sinew_blade_id *out);
 sinew_status sinew_blade_destroy(sinew_world *world, sinew_blade_id blade);
 sinew_status sinew_blade_set_pose(sinew_world *world, sinew_blade_id blade, const float *position,
-                                  const float *orientation);
+    const float *orientation);
+sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade,
+    float *out_position, float *out_orientation);
+sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
+    uint32_t mask);
+sinew_status sinew_blade_get_collision(const sinew_world *world, sinew_blade_id blade,
+    uint32_t *out_category, uint32_t *out_mask);
 typedef struct sinew_blade_report {
   size_t struct_size;
   float force[3];
@@ -502,14 +568,14 @@ typedef struct sinew_blade_report {
   double length;
   double lag;
   sinew_status status;
-  uint32_t reserved0;
   double area;
 } sinew_blade_report;
 sinew_status sinew_blade_get_report(const sinew_world *world, sinew_blade_id blade,
-                                    sinew_blade_report *out);
+    sinew_blade_report *out);
 sinew_status sinew_body_set_tear_limits(sinew_world *world, sinew_body_id body,
-                                        const uint32_t *pairs, size_t count, const float *strains,
-                                        const float *forces);
+    const uint32_t *pairs, const float *strains, const float *forces, size_t count);
+sinew_status sinew_body_get_tear_limits(const sinew_world *world, sinew_body_id body,
+    const uint32_t *pairs, size_t count, float *out_strains, float *out_forces);
 typedef struct sinew_tear_report {
   size_t struct_size;
   uint32_t tears;
@@ -517,10 +583,9 @@ typedef struct sinew_tear_report {
   uint32_t waiting;
   uint32_t small_pieces;
   uint32_t no_room;
-  uint32_t reserved;
 } sinew_tear_report;
 sinew_status sinew_body_get_tear_report(const sinew_world *world, sinew_body_id body,
-                                        sinew_tear_report *out);
+    sinew_tear_report *out);
 typedef struct sinew_haptic_def {
   size_t struct_size;
   sinew_tool_id tool;
@@ -538,9 +603,9 @@ typedef struct sinew_haptic_def {
 sinew_status sinew_haptic_def_init(sinew_haptic_def *def, size_t struct_size);
 typedef struct sinew_haptic sinew_haptic;
 sinew_status sinew_haptic_create(sinew_world *world, const sinew_haptic_def *def,
-                                 sinew_haptic **out);
+    sinew_haptic **out);
 void sinew_haptic_destroy(sinew_haptic *haptic);
-typedef struct sinew_haptic_result {
+typedef struct sinew_haptic_report {
   size_t struct_size;
   float force[3];
   float torque[3];
@@ -552,10 +617,10 @@ typedef struct sinew_haptic_result {
   float gain;
   uint32_t is_over;
   double lost;
-} sinew_haptic_result;
+} sinew_haptic_report;
 sinew_status sinew_haptic_tick(sinew_haptic *haptic, const float *position,
-                               const float *orientation, const float *velocity,
-                               const float *angular_velocity, float dt, sinew_haptic_result *out);
+    const float *orientation, const float *velocity, const float *angular_velocity, float dt,
+    sinew_haptic_report *out);
 typedef struct sinew_haptic_contact {
   sinew_body_id body;
   float point[3];
@@ -563,8 +628,8 @@ typedef struct sinew_haptic_contact {
   float velocity[3];
   float force[3];
 } sinew_haptic_contact;
-sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic, sinew_haptic_contact *contacts,
-                                       size_t capacity, size_t *count);
+sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic,
+    sinew_haptic_contact *out_contacts, size_t capacity, size_t *out_count);
 typedef struct sinew_mass_properties {
   size_t struct_size;
   float mass;
@@ -572,19 +637,19 @@ typedef struct sinew_mass_properties {
   float inertia[6];
 } sinew_mass_properties;
 sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool_id tool,
-                                            float density, sinew_mass_properties *out);
+    float density, sinew_mass_properties *out);
 sinew_status sinew_tool_set_mass(sinew_world *world, sinew_tool_id tool,
-                                 const sinew_mass_properties *mass);
+    const sinew_mass_properties *mass);
 sinew_status sinew_tool_get_mass(const sinew_world *world, sinew_tool_id tool,
-                                 sinew_mass_properties *out);
+    sinew_mass_properties *out);
 sinew_status sinew_tool_set_velocity(sinew_world *world, sinew_tool_id tool, const float *velocity,
-                                     const float *angular_velocity);
-sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool, float *velocity,
-                                     float *angular_velocity);
+    const float *angular_velocity);
+sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool,
+    float *out_velocity, float *out_angular_velocity);
 sinew_status sinew_tool_apply_wrench(sinew_world *world, sinew_tool_id tool, const float *force,
-                                     const float *torque);
+    const float *torque);
 sinew_status sinew_tool_teleport(sinew_world *world, sinew_tool_id tool, const float *position,
-                                 const float *orientation);
+    const float *orientation);
 typedef struct sinew_embedding_def {
   size_t struct_size;
   const float *vertices;
@@ -597,18 +662,17 @@ typedef struct sinew_embedding_def {
 sinew_status sinew_embedding_def_init(sinew_embedding_def *def, size_t struct_size);
 typedef struct sinew_embedding sinew_embedding;
 sinew_status sinew_embedding_create(const sinew_world *world, sinew_body_id body,
-                                    const sinew_embedding_def *def, sinew_embedding **out);
+    const sinew_embedding_def *def, sinew_embedding **out);
 void sinew_embedding_destroy(sinew_embedding *embedding);
 sinew_status sinew_embedding_update(sinew_embedding *embedding, const sinew_world *world);
 sinew_status sinew_embedding_update_from(sinew_embedding *embedding, const float *positions,
-                                         size_t node_count);
+    size_t node_count);
 sinew_status sinew_embedding_get_positions(const sinew_embedding *embedding, sinew_vec3_view *out);
 sinew_status sinew_embedding_get_triangles(const sinew_embedding *embedding,
-                                           sinew_triangle_view *out);
+    sinew_triangle_view *out);
 sinew_status sinew_embedding_get_normals(sinew_embedding *embedding, sinew_vec3_view *out);
 sinew_status sinew_body_create_from_surface(sinew_world *world, const sinew_body_def *def,
-                                            float spacing, sinew_body_id *out_body,
-                                            sinew_embedding **out_embedding);
+    float spacing, sinew_body_id *out_body, sinew_embedding **out_embedding);
 typedef struct sinew_reader sinew_reader;
 sinew_status sinew_reader_create(sinew_world *world, sinew_body_id body, sinew_reader **out);
 void sinew_reader_destroy(sinew_reader *reader);
@@ -624,113 +688,40 @@ typedef struct sinew_frame {
   uint32_t is_over;
 } sinew_frame;
 sinew_status sinew_reader_read(sinew_reader *reader, sinew_frame *out);
-typedef struct sinew_surface_point {
-  size_t struct_size;
-  sinew_body_id body;
-  uint32_t triangle;
-  float weights[3];
-  float position[3];
-  float normal[3];
-  float distance;
-  uint32_t reserved;
-} sinew_surface_point;
-sinew_status sinew_world_cast_ray(const sinew_world *world, const float *origin,
-                                  const float *direction, float max_distance,
-                                  sinew_surface_point *out);
-sinew_status sinew_world_find_nearest(const sinew_world *world, const float *point,
-                                      float max_distance, sinew_surface_point *out);
-typedef enum sinew_image_form {
-  SINEW_IMAGE_FORM_INTERVALS = 0,
-  SINEW_IMAGE_FORM_COUNTED = 1
-} sinew_image_form;
-typedef struct sinew_detector_def {
-  size_t struct_size;
-  sinew_body_id bodies[2];
-  uint32_t detection;
-  uint32_t form;
-  float pixel;
-  float direction[3];
-  uint32_t pixels;
-  uint32_t crossings;
-  float thickness[2];
-} sinew_detector_def;
-sinew_status sinew_detector_def_init(sinew_detector_def *def, size_t struct_size);
-typedef struct sinew_detector sinew_detector;
-sinew_status sinew_detector_create(const sinew_world *world, const sinew_detector_def *def,
-                                   sinew_detector **out);
-void sinew_detector_destroy(sinew_detector *detector);
-typedef struct sinew_detector_report {
-  size_t struct_size;
-  double volume;
-  float normal[3];
-  float depth;
-  float pixel;
-  uint32_t point_counts[2];
-  uint32_t edge_counts[2];
-  uint32_t unlisted[2];
-  uint32_t closed[2];
-  uint32_t reserved;
-} sinew_detector_report;
-sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,
-                                 sinew_detector_report *report);
-typedef struct sinew_point_inside {
-  uint32_t node;
-  uint32_t triangle;
-  float depth;
-  float normal[3];
-} sinew_point_inside;
-sinew_status sinew_detector_get_points(const sinew_detector *detector, uint32_t side,
-                                       const sinew_point_inside **points, size_t *count);
-typedef struct sinew_edge_inside {
-  uint32_t nodes[2];
-  float entry;
-  float exit;
-  float depth;
-} sinew_edge_inside;
-sinew_status sinew_detector_get_edges(const sinew_detector *detector, uint32_t side,
-                                      const sinew_edge_inside **edges, size_t *count);
-sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_t side,
-                                         sinew_dvec3_view *out);
-sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
-                               size_t triangle_count, const uint32_t *tetrahedra,
-                               size_t tetrahedron_count, sinew_mesh **out);
-sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, sinew_mesh **out);
 sinew_status sinew_body_def_set_mesh(sinew_body_def *def, const sinew_mesh *mesh);
 sinew_status sinew_body_transform(sinew_world *world, sinew_body_id body, const float *translation,
-                                  const float *rotation, const float *pivot);
+    const float *rotation, const float *pivot);
 sinew_status sinew_body_get_bounds(const sinew_world *world, sinew_body_id body, float *out_min,
-                                   float *out_max);
-sinew_status sinew_body_get_normals(const sinew_world *world, sinew_body_id body, float *normals,
-                                    size_t node_count);
-sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body, float *masses,
-                                   size_t node_count);
+    float *out_max);
+sinew_status sinew_body_get_normals(const sinew_world *world, sinew_body_id body,
+    float *out_normals, size_t node_count);
+sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body, float *out_masses,
+    size_t node_count);
 sinew_status sinew_body_apply_impulses(sinew_world *world, sinew_body_id body,
-                                       const uint32_t *nodes, const float *impulses, size_t count);
+    const uint32_t *nodes, const float *impulses, size_t count);
 sinew_status sinew_body_set_gravity_scale(sinew_world *world, sinew_body_id body, float scale);
 sinew_status sinew_body_get_gravity_scale(const sinew_world *world, sinew_body_id body, float *out);
 sinew_status sinew_body_pin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                  size_t count);
+    size_t count);
 sinew_status sinew_body_unpin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                    size_t count);
+    size_t count);
 sinew_status sinew_body_pin_box(sinew_world *world, sinew_body_id body, const float *min,
-                                const float *max, size_t *out_count);
+    const float *max, size_t *out_count);
 sinew_status sinew_body_unpin_box(sinew_world *world, sinew_body_id body, const float *min,
-                                  const float *max, size_t *out_count);
-sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body, float *forces,
-                                       size_t node_count);
-sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool, float *position,
-                                   float *orientation);
-sinew_status sinew_tools_get_wrench(const sinew_world *world, const sinew_tool_id *tools,
-                                    size_t count, const float *point, float *force, float *torque);
+    const float *max, size_t *out_count);
+sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body,
+    float *out_forces, size_t node_count);
+sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool,
+    float *out_position, float *out_orientation);
+sinew_status sinew_world_get_total_wrench(const sinew_world *world, const sinew_tool_id *tools,
+    size_t count, const float *point, float *out_force, float *out_torque);
 typedef struct sinew_contact_change {
   sinew_tool_id tool;
   sinew_body_id body;
   uint32_t begun;
-  uint32_t reserved;
 } sinew_contact_change;
 sinew_status sinew_world_get_contact_changes(const sinew_world *world,
-                                             sinew_contact_change *changes, size_t capacity,
-                                             size_t *count);
+    sinew_contact_change *out_changes, size_t capacity, size_t *out_count);
 typedef struct sinew_ray_hit {
   size_t struct_size;
   sinew_body_id body;
@@ -740,27 +731,10 @@ typedef struct sinew_ray_hit {
   float position[3];
   float normal[3];
   float distance;
-  uint32_t reserved;
 } sinew_ray_hit;
 sinew_status sinew_world_cast_ray_filtered(const sinew_world *world, const float *origin,
-                                           const float *direction, float max_distance,
-                                           uint32_t category, uint32_t mask, sinew_ray_hit *out);
-sinew_status sinew_world_get_time(const sinew_world *world, double *out_time, uint64_t *out_steps);
-sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravity);
-sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
-                                      uint32_t *out_category, uint32_t *out_mask);
-sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
-sinew_status sinew_tool_get_friction(const sinew_world *world, sinew_tool_id tool, float *out);
-sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id tool, float *out);
-sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
-                                      uint32_t *out_category, uint32_t *out_mask);
-sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade, float *position,
-                                  float *orientation);
-sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
-                                       uint32_t mask);
-sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uint32_t max_substeps);
-sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
-                                      uint32_t *out_max_substeps);
+    const float *direction, float max_distance, uint32_t category, uint32_t mask,
+    sinew_ray_hit *out);
 typedef struct sinew_body_settings {
   size_t struct_size;
   float contact_thickness;
@@ -771,17 +745,17 @@ typedef struct sinew_body_settings {
   float sleep_time;
 } sinew_body_settings;
 sinew_status sinew_body_set_settings(sinew_world *world, sinew_body_id body,
-                                     const sinew_body_settings *settings);
+    const sinew_body_settings *settings);
 sinew_status sinew_body_get_settings(const sinew_world *world, sinew_body_id body,
-                                     sinew_body_settings *out);
+    sinew_body_settings *out);
 sinew_status sinew_body_set_node_damping(sinew_world *world, sinew_body_id body,
-                                         float node_damping);
+    float node_damping);
 sinew_status sinew_body_get_node_damping(const sinew_world *world, sinew_body_id body,
-                                         uint32_t node, float *out);
+    uint32_t node, float *out);
 sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t work,
-                                          sinew_step_report *report);
+    sinew_step_report *report);
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
-                                     sinew_step_report *report);
+    sinew_step_report *report);
 uint32_t sinew_body_is_valid(const sinew_world *world, sinew_body_id body);
 uint32_t sinew_tool_is_valid(const sinew_world *world, sinew_tool_id tool);
 uint32_t sinew_blade_is_valid(const sinew_world *world, sinew_blade_id blade);
@@ -793,10 +767,9 @@ sinew_status sinew_body_get_user_data(const sinew_world *world, sinew_body_id bo
 sinew_status sinew_tool_set_user_data(sinew_world *world, sinew_tool_id tool, void *user_data);
 sinew_status sinew_tool_get_user_data(const sinew_world *world, sinew_tool_id tool, void **out);
 sinew_status sinew_world_get_snapshot_size(const sinew_world *world, size_t *out);
-sinew_status sinew_world_save_snapshot(const sinew_world *world, uint8_t *bytes, size_t size);
-sinew_status sinew_world_load_snapshot(const uint8_t *bytes, size_t size, uint32_t thread_count,
-                                       sinew_run_tasks run_tasks, void *tasks_context,
-                                       sinew_world **out);
+sinew_status sinew_world_save_snapshot(const sinew_world *world, uint8_t *out_bytes, size_t size);
+sinew_status sinew_world_load_snapshot(const uint8_t *bytes, size_t size,
+    const sinew_world_def *def, sinew_world **out);
 typedef struct sinew_energy {
   size_t struct_size;
   double kinetic;
@@ -814,10 +787,9 @@ typedef struct sinew_solver_report {
   uint32_t solver;
   uint32_t auto_substeps;
   float auto_step;
-  uint32_t reserved;
 } sinew_solver_report;
 sinew_status sinew_body_get_solver_report(const sinew_world *world, sinew_body_id body,
-                                          sinew_solver_report *out);
+    sinew_solver_report *out);
 typedef enum sinew_limit {
   SINEW_LIMIT_NONE = 0,
   SINEW_LIMIT_SPRING = 1,
@@ -835,25 +807,22 @@ typedef struct sinew_storage_report {
   size_t bytes_reserved;
 } sinew_storage_report;
 sinew_status sinew_body_get_storage_report(const sinew_world *world, sinew_body_id body,
-                                           sinew_storage_report *out);
+    sinew_storage_report *out);
 sinew_status sinew_body_get_spring_strains(const sinew_world *world, sinew_body_id body,
-                                           const uint32_t *pairs, const float *rest_lengths,
-                                           size_t count, float *strains);
+    const uint32_t *pairs, const float *rest_lengths, size_t count, float *out_strains);
 typedef struct sinew_strain {
   float largest;
   float smallest;
   float growth;
 } sinew_strain;
 sinew_status sinew_body_get_triangle_strains(const sinew_world *world, sinew_body_id body,
-                                             const float *rest_positions, size_t node_count,
-                                             const uint32_t *triangles, size_t triangle_count,
-                                             sinew_strain *strains);
+    const float *rest_positions, size_t node_count, const uint32_t *triangles,
+    size_t triangle_count, sinew_strain *out_strains);
 sinew_status sinew_body_get_tetrahedron_strains(const sinew_world *world, sinew_body_id body,
-                                                const float *rest_positions, size_t node_count,
-                                                const uint32_t *tetrahedra,
-                                                size_t tetrahedron_count, sinew_strain *strains);
-sinew_status sinew_mean_at_nodes(const uint32_t *elements, uint32_t corners, const float *values,
-                                 size_t element_count, float *means, size_t node_count);
+    const float *rest_positions, size_t node_count, const uint32_t *tetrahedra,
+    size_t tetrahedron_count, sinew_strain *out_strains);
+sinew_status sinew_util_average_to_nodes(const uint32_t *elements, uint32_t corners,
+    const float *values, size_t element_count, float *out_means, size_t node_count);
 typedef struct sinew_picture_def {
   size_t struct_size;
   uint32_t width;
@@ -867,7 +836,7 @@ typedef struct sinew_picture_def {
 } sinew_picture_def;
 sinew_status sinew_picture_def_init(sinew_picture_def *def, size_t struct_size);
 sinew_status sinew_world_save_picture(const sinew_world *world, const sinew_picture_def *def,
-                                      const char *path);
+    const char *path);
 typedef enum sinew_colours {
   SINEW_COLOURS_DIVERGING = 0,
   SINEW_COLOURS_SEQUENTIAL = 1
@@ -879,12 +848,10 @@ typedef struct sinew_body_values {
   float low;
   float high;
   uint32_t colours;
-  uint32_t reserved;
 } sinew_body_values;
 sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
-                                                const sinew_picture_def *def,
-                                                const sinew_body_values *coloured, size_t count,
-                                                const char *path);
+    const sinew_picture_def *def, const sinew_body_values *coloured, size_t count,
+    const char *path);
 sinew_status sinew_world_set_profiling(sinew_world *world, uint32_t enabled);
 typedef struct sinew_profile {
   size_t struct_size;
@@ -939,7 +906,6 @@ typedef struct sinew_replay_report {
   uint64_t recorded_hash;
   uint64_t replayed_hash;
   uint32_t cut_short;
-  uint32_t reserved;
 } sinew_replay_report;
 sinew_status sinew_replay(const char *path, uint32_t thread_count, sinew_replay_report *out);
 typedef void (*sinew_log)(void *context, uint32_t level, const char *message);

@@ -1,6 +1,6 @@
 /* Start in static equilibrium.
  *
- * A body that starts in its unloaded shape swings when gravity acts on it first. sinew_body_rest_state moves it to static
+ * A body that starts in its unloaded shape swings when gravity acts on it first. sinew_body_solve_equilibrium moves it to static
  * equilibrium under gravity, pins and forces in one call, before the first step.
  *
  * Output:
@@ -26,9 +26,9 @@ int main(void) {
   sinew_mesh_destroy(mesh);
   pin_below(world, beam, 0, -0.049f);
 
-  sinew_rest_state_report report;
+  sinew_equilibrium_report report;
   report.struct_size = sizeof report;
-  CHECK(sinew_body_rest_state(world, beam, NULL, &report)); /* NULL: default tolerance */
+  CHECK(sinew_body_solve_equilibrium(world, beam, NULL, &report)); /* NULL: default tolerance */
   printf("found: the largest force left is %s 1 mN\n", report.residual < 1e-3 ? "below" : "not below");
 
   sinew_vec3_view nodes;

@@ -43,7 +43,13 @@ int main(void) {
   for (size_t i = 0; i < nodes.count && count < 16; i++)
     if (node(nodes, i)[1] > 0.009f && distance(node(nodes, i), tool_def.position) < 0.015)
       grasped[count++] = (uint32_t)i;
-  CHECK(sinew_body_attach_nodes(world, tissue, grasped, count, tool, 0.0f, held));
+  sinew_attachment_def attachment;
+  CHECK(sinew_attachment_def_init(&attachment, sizeof attachment));
+  attachment.body = tissue;
+  attachment.tool = tool;
+  attachment.nodes = grasped;
+  attachment.count = count;
+  CHECK(sinew_attachment_create(world, &attachment, held));
   printf("%u nodes attached\n", (unsigned)count);
 
   float position[3] = {0, 0.0135f, 0}, force[3], torque[3];

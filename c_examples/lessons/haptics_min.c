@@ -39,7 +39,7 @@ int main(void) {
   sinew_haptic *haptic;
   CHECK(sinew_haptic_create(world, &haptic_def, &haptic));
 
-  sinew_haptic_result felt;
+  sinew_haptic_report felt;
   felt.struct_size = sizeof felt;
   double last = 0, largest_jump = 0, before_contact = 0;
   for (int tick = 0; tick < 1000; tick++) {

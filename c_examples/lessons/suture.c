@@ -11,7 +11,7 @@
  */
 #include "../example.h"
 
-static sinew_body_id create_flap(sinew_world *world, float center) {
+static void create_flap(sinew_world *world, float center) {
   const float size[2] = {0.05f, 0.05f};
   const uint32_t cells[2] = {10, 10};
   sinew_mesh *mesh;
@@ -29,12 +29,12 @@ static sinew_body_id create_flap(sinew_world *world, float center) {
   sinew_mesh_destroy(mesh);
   for (uint32_t i = 0; i < 121; i++) /* pin the side that is far from the wound */
     if (i % 11 == (center < 0 ? 0u : 10u)) CHECK(sinew_body_pin(world, flap, i));
-  return flap;
 }
 
 int main(void) {
   sinew_world *world = create_world(0.0f);
-  const sinew_body_id left = create_flap(world, -0.03f), right = create_flap(world, 0.03f);
+  create_flap(world, -0.03f);
+  create_flap(world, 0.03f);
 
   /* The nearest surface points on the left and right of the wound, which is 10 mm wide. */
   const float near_left[3] = {-0.005f, 0, 0}, near_right[3] = {0.005f, 0, 0};
@@ -44,7 +44,7 @@ int main(void) {
   CHECK(sinew_world_find_nearest(world, near_right, 0.01f, &b));
 
   sinew_attachment_id suture;
-  CHECK(sinew_body_suture_points(world, left, a.triangle, a.weights, right, b.triangle, b.weights, NULL, &suture));
+  CHECK(sinew_suture_create(world, &a, &b, NULL, &suture));
   sinew_suture_report report;
   report.struct_size = sizeof report;
   CHECK(sinew_suture_get_report(world, suture, &report));

@@ -45,7 +45,7 @@ int main(void) {
 
   /* Undo: load the snapshot as a new world, and destroy the old one. Readers and embeddings must be created again. */
   sinew_world *before;
-  CHECK(sinew_world_load_snapshot(bytes, size_of_snapshot, 1, NULL, NULL, &before));
+  CHECK(sinew_world_load_snapshot(bytes, size_of_snapshot, NULL, &before));
   sinew_world_destroy(world);
   world = before;
   CHECK(sinew_world_get_state_hash(world, &hash));

@@ -59,8 +59,15 @@ static sinew_status begin(sample *s) {
   point_on_ray(p, p->mode == SAMPLE_PULL ? p->reach : p->reach - 1.1f * BALL, start);
   TRY(create_tool(s, p->mode == SAMPLE_PULL ? HANDLE : BALL, start, p->mode == SAMPLE_PULL ? 0 : UINT32_MAX));
   if (p->mode == SAMPLE_PULL) {
+    sinew_attachment_def attachment;
     sinew_attachment_id held;
-    TRY(sinew_body_attach_points(s->world, hit.body, &hit.triangle, hit.weights, 1, p->tool, 0.0f, &held));
+    TRY(sinew_attachment_def_init(&attachment, sizeof attachment));
+    attachment.body = hit.body;
+    attachment.tool = p->tool;
+    attachment.count = 1;
+    attachment.triangles = &hit.triangle;
+    attachment.weights = hit.weights;
+    TRY(sinew_attachment_create(s->world, &attachment, &held));
   }
   return SINEW_STATUS_OK;
 }

@@ -46,7 +46,7 @@ sinew_status create_haptics(sample *s) {
 }
 
 sinew_status act_haptics(sample *s, float seconds) {
-  sinew_haptic_result felt;
+  sinew_haptic_report felt;
   float hand[3];
   felt.struct_size = sizeof felt;
   for (float t = TICK; t < seconds + TICK / 2; t += TICK) {

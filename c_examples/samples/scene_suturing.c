@@ -36,15 +36,13 @@ sinew_status create_suturing(sample *s) {
 static sinew_status put_thread(sample *s, uint32_t k) {
   const float along = SPACING * ((float)k - 0.5f * (float)(THREADS - 1));
   const float left[3] = {-0.012f, 0.01f, along}, right[3] = {0.014f, 0.01f, along};
-  const sinew_body_id skin = s->bodies[0].id;
   sinew_surface_point a, b;
   sinew_suture_report report;
   a.struct_size = b.struct_size = sizeof a;
   report.struct_size = sizeof report;
   TRY(sinew_world_find_nearest(s->world, left, 0.05f, &a));
   TRY(sinew_world_find_nearest(s->world, right, 0.05f, &b));
-  TRY(sinew_body_suture_points(s->world, skin, a.triangle, a.weights, skin, b.triangle, b.weights, NULL,
-                               &s->sutures[k]));
+  TRY(sinew_suture_create(s->world, &a, &b, NULL, &s->sutures[k]));
   TRY(sinew_suture_get_report(s->world, s->sutures[k], &report));
   s->suture_lengths[k] = report.distance;
   return SINEW_STATUS_OK;

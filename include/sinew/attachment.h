@@ -8,101 +8,66 @@
 #define SINEW_ATTACHMENT_H
 
 #include "base.h"
+#include "query.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
-// ---- Tissue to a tool ---------------------------------------------------------------------------
+// ---- Creation -----------------------------------------------------------------------------------
 
-/// Attaches one node of a body to a tool, like sinew_body_attach_nodes.
-sinew_status sinew_body_attach_node(sinew_world *world, sinew_body_id body, uint32_t node,
-                                    sinew_tool_id tool, float force_limit,
-                                    sinew_attachment_id *out);
+/// Nodes or surface points of a body that are attached to a tool or a body.
+/// Filled by sinew_attachment_def_init; read only during sinew_attachment_create.
+typedef struct sinew_attachment_def {
+  size_t struct_size;               ///< Size of this struct; sinew_attachment_def_init sets it.
+  sinew_body_id body;               ///< Body whose nodes or points are attached; no default.
+  sinew_tool_id tool;  ///< Tool that they are attached to; all zero (default): those of `other`.
+  sinew_body_id other;  ///< Body that they are attached to; all zero (default): the tool.
+  size_t count;                     ///< Number of attachments; default 0.
+  const uint32_t *nodes;            ///< `count` node indices; nullable: points.
+  const uint32_t *triangles;  ///< `count` surface triangle indices of points; nullable: nodes.
+  /// 3 * count corner weights of them, at least 0 with sum 1; nullable: nodes.
+  const float *weights;
+  const uint32_t *other_nodes;  ///< `count` node indices of `other`; nullable: points or a tool.
+  /// `count` surface triangle indices of `other`; nullable: nodes or a tool.
+  const uint32_t *other_triangles;
+  /// 3 * count corner weights of these points; nullable: nodes or a tool.
+  const float *other_weights;
+  float force_limit;  ///< [N] Mean force above which it breaks; infinity (default) or 0: unlimited.
+} sinew_attachment_def;
 
-/// Attaches nodes of a body rigidly to a tool, each by its own attachment.
-/// The nodes move with the tool until sinew_attachment_release; the tool does not collide with
-/// them. The holding force is part of the tool's wrench. `out` receives `count` ids. `force_limit`
-/// [N]: the attachment breaks after a step with a larger mean force; 0 or infinity: unlimited.
-/// Attachments end with the body or tool. On failure nothing is attached.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node is pinned, massless or held by another tool.
-sinew_status sinew_body_attach_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     size_t count, sinew_tool_id tool, float force_limit,
-                                     sinew_attachment_id *out);
+/// Fills an attachment definition with its defaults; `struct_size` is sizeof(sinew_attachment_def).
+sinew_status sinew_attachment_def_init(sinew_attachment_def *def, size_t struct_size);
 
-/// Attaches surface points of a body rigidly to a tool, each by its own attachment.
-/// `triangles` holds `count` indices into the body's surface, `weights` 3 * count corner weights,
-/// at least 0 with sum 1. Every corner with a weight is attached, so that the patch cannot rotate;
-/// its forces add up. Corners shared by points split their force by weight. Otherwise like
-/// sinew_body_attach_nodes.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a corner is pinned, massless or held by another tool.
-sinew_status sinew_body_attach_points(sinew_world *world, sinew_body_id body,
-                                      const uint32_t *triangles, const float *weights, size_t count,
-                                      sinew_tool_id tool, float force_limit,
-                                      sinew_attachment_id *out);
-
-// ---- Tissue to tissue ---------------------------------------------------------------------------
-
-/// Attaches nodes of a body to nodes of another or the same body, pair by pair.
-/// Each pair becomes one point, about which both may rotate; a gap closes at no more than 0.25 m/s.
-/// Momentum is conserved. Paired nodes and their features do not collide. `out` receives `count`
-/// ids. `force_limit` [N]: breaks after a step with a larger mean force; 0 or infinity: unlimited.
-/// Attachments end with either body. On failure nothing is attached.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if both nodes of a pair are the same.
-sinew_status sinew_body_attach_nodes_to_nodes(sinew_world *world, sinew_body_id body,
-                                              const uint32_t *nodes, size_t count,
-                                              sinew_body_id other, const uint32_t *other_nodes,
-                                              float force_limit, sinew_attachment_id *out);
-
-/// Attaches nodes of a body to surface points of another or the same body, pair by pair.
-/// `other_triangles` and `other_weights` are as in sinew_body_attach_points, but the surface may
-/// rotate about each point. Otherwise like sinew_body_attach_nodes_to_nodes.
-sinew_status sinew_body_attach_nodes_to_points(sinew_world *world, sinew_body_id body,
-                                               const uint32_t *nodes, size_t count,
-                                               sinew_body_id other, const uint32_t *other_triangles,
-                                               const float *other_weights, float force_limit,
-                                               sinew_attachment_id *out);
-
-/// Attaches surface points of a body to surface points of another or the same body, pair by pair.
-/// Points are as in sinew_body_attach_nodes_to_points, the rest as in
-/// sinew_body_attach_nodes_to_nodes.
-sinew_status sinew_body_attach_points_to_points(sinew_world *world, sinew_body_id body,
-                                                const uint32_t *triangles, const float *weights,
-                                                size_t count, sinew_body_id other,
-                                                const uint32_t *other_triangles,
-                                                const float *other_weights, float force_limit,
-                                                sinew_attachment_id *out);
+/// Attaches nodes or surface points of a body to a tool or to a body, each by its own attachment.
+/// A tool holds them rigidly and does not collide with them. Two bodies join at one point that both
+/// rotate about; a gap closes at no more than 0.25 m/s. `out_attachments` receives `count` ids.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node for a tool is pinned, massless or held, or both
+/// ends are the same.
+sinew_status sinew_attachment_create(sinew_world *world, const sinew_attachment_def *def,
+    sinew_attachment_id *out_attachments);
 
 // ---- Sutures ------------------------------------------------------------------------------------
 
 /// Settings of a suture, filled by sinew_suture_def_init.
 typedef struct sinew_suture_def {
   size_t struct_size;  ///< Size of this struct; sinew_suture_def_init sets it.
-  /// [m] Unloaded length of the thread, at least 0; -1 (default): the current distance.
-  float length;
-  /// [N/m] Stiffness of the thread, above 0; infinity (default): inextensible.
-  float stiffness;
-  /// [N] Mean force above which it tears out, at least 0; 0 (default) or infinity: unlimited.
-  float force_limit;
-  uint32_t reserved0;  ///< Reserved; must be 0.
+  float length;        ///< [m] Unloaded length of the thread; -1 (default): the current distance.
+  float stiffness;  ///< [N/m] Stiffness of the thread, above 0; infinity (default): inextensible.
+  float force_limit;   ///< [N] Mean force where it tears out; infinity (default) or 0: unlimited.
 } sinew_suture_def;
 
 /// Fills a suture definition with its defaults; `struct_size` is sizeof(sinew_suture_def).
 sinew_status sinew_suture_def_init(sinew_suture_def *def, size_t struct_size);
 
 /// Joins two surface points of bodies by a thread, which pulls and never pushes.
-/// A point is a surface triangle with 3 corner weights, at least 0 with sum 1. The bodies may be
-/// the same and still collide. `def` is nullable: the defaults. A thread shorter than the distance
-/// is drawn in at no more than 0.25 m/s. Release and force are those of an attachment; a torn
-/// suture is in sinew_world_get_slipped.
+/// Body, triangle and weights of the points count. The bodies may be the same and still collide.
+/// `def` is nullable: the defaults. The thread is drawn in at no more than 0.25 m/s. It is an
+/// attachment.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if both points are the same.
-sinew_status sinew_body_suture_points(sinew_world *world, sinew_body_id body, uint32_t triangle,
-                                      const float *weights, sinew_body_id other,
-                                      uint32_t other_triangle, const float *other_weights,
-                                      const sinew_suture_def *def, sinew_attachment_id *out);
+sinew_status sinew_suture_create(sinew_world *world, const sinew_surface_point *point,
+    const sinew_surface_point *other_point, const sinew_suture_def *def, sinew_attachment_id *out);
 
-/// Changes the length [m] of a suture's thread evenly over the next step.
-/// The length is at least 0. It shortens by at most 0.25 m/s, over as many steps as that takes.
+/// Changes the length [m] of a suture's thread over the next step, by at most 0.25 m/s.
+/// A longer change goes on over the following steps.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
 sinew_status sinew_suture_set_length(sinew_world *world, sinew_attachment_id suture, float length);
 
@@ -111,14 +76,13 @@ typedef struct sinew_suture_report {
   size_t struct_size;  ///< Set to sizeof(sinew_suture_report) before the call.
   float length;        ///< [m] Unloaded length of the thread.
   float distance;      ///< [m] Distance of its points; larger than the length under load.
-  /// [J] Energy stored in the thread, not part of the bodies' energy; 0 if inextensible.
-  double energy;
+  double energy;       ///< [J] Energy of the thread, not of the bodies; 0 if inextensible.
 } sinew_suture_report;
 
 /// Writes the current state of a suture.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
 sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_id suture,
-                                     sinew_suture_report *report);
+    sinew_suture_report *out_report);
 
 // ---- All attachments ----------------------------------------------------------------------------
 
@@ -126,20 +90,17 @@ sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_
 /// Errors: SINEW_STATUS_STALE_ID also if it broke, or if a body or the tool was destroyed.
 sinew_status sinew_attachment_release(sinew_world *world, sinew_attachment_id attachment);
 
-/// Writes the force of an attachment on its body, averaged over the last step.
-/// `force` [N] receives 3 floats in world axes, 0 before the first step. After
-/// sinew_body_rest_state it is the force of the tool in equilibrium.
+/// Writes the force [N] of an attachment on its body, averaged over the last step.
+/// `out_force` receives 3 floats in world axes. After sinew_body_solve_equilibrium it is the force
+/// of the tool in equilibrium.
 sinew_status sinew_attachment_get_force(const sinew_world *world, sinew_attachment_id attachment,
-                                        float *force);
+    float *out_force);
 
 /// Writes the attachments that broke in the last step because of their force_limit.
-/// `out` receives at most `capacity` ids, `count` the number that broke. The ids are stale: compare
-/// them with those you stored.
-sinew_status sinew_world_get_slipped(const sinew_world *world, sinew_attachment_id *out,
-                                     size_t capacity, size_t *count);
+/// `out_attachments` receives at most `capacity` ids, which are stale, `out_count` their number.
+sinew_status sinew_world_get_broken_attachments(const sinew_world *world,
+    sinew_attachment_id *out_attachments, size_t capacity, size_t *out_count);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

@@ -9,7 +9,7 @@
 // lists only errors that are special. Every call may return
 //   SINEW_STATUS_INVALID_ARGUMENT for NULL where a comment does not say "nullable", NaN or infinity
 //     where a comment does not allow it, an index out of range, an unknown enum value, a negative
-//     mass or stiffness, a reserved field that is not 0, or an unknown struct_size;
+//     mass or stiffness, a field `reserved` that is not 0, or an unknown struct_size;
 //   SINEW_STATUS_STALE_ID for the id of a destroyed object;
 //   SINEW_STATUS_OUT_OF_MEMORY if it allocates;
 //   SINEW_STATUS_INTERNAL after a fault inside the library.
@@ -20,6 +20,11 @@
 // struct_size: call the _init function of a definition (a _def struct). In a struct that the
 // library fills, set struct_size to sizeof the struct before the call. A struct_size that no header
 // gave the struct, such as 0, is refused.
+//
+// Values: a number of a definition is at least 0, and 0 by default, unless its comment says
+// otherwise. An orientation is not zero; the library normalizes it. Coordinates of tools and blades
+// are within 1e9 m. A node_count beside a body must be its number of nodes. Two objects collide if
+// each has a collision category in the mask of the other.
 //
 // Threads: any number of threads may use a const sinew_world * at the same time. A sinew_world *
 // needs exclusive access to that world. Worlds are independent of each other. Readers and haptic
@@ -38,8 +43,14 @@
 #include <stdint.h>
 
 #ifdef __cplusplus
-extern "C" {
+#define SINEW_BEGIN extern "C" {
+#define SINEW_END }
+#else
+#define SINEW_BEGIN
+#define SINEW_END
 #endif
+
+SINEW_BEGIN
 
 // ---- Version ------------------------------------------------------------------------------------
 
@@ -61,13 +72,10 @@ typedef enum sinew_status_code {
   SINEW_STATUS_STALE_ID = 2,          ///< The id refers to a destroyed object, or to none.
   SINEW_STATUS_CAPACITY = 3,          ///< A storage of fixed capacity is full.
   SINEW_STATUS_OUT_OF_MEMORY = 4,     ///< Memory could not be allocated; nothing changed.
-  /// The step or the equilibrium failed: nothing moved, forces and poses stay pending.
-  SINEW_STATUS_UNSTABLE = 5,
-  /// The request is valid, but this build or combination does not offer it.
-  SINEW_STATUS_UNSUPPORTED = 6,
+  SINEW_STATUS_UNSTABLE = 5,  ///< Step or equilibrium failed: nothing moved; forces and poses stay.
+  SINEW_STATUS_UNSUPPORTED = 6,       ///< Valid, but this build or combination does not offer it.
   SINEW_STATUS_IO = 7,                ///< A file could not be read or written.
-  /// Fault inside the library; the world then accepts only sinew_world_destroy.
-  SINEW_STATUS_INTERNAL = 8
+  SINEW_STATUS_INTERNAL = 8  ///< Fault in the library; the world accepts only sinew_world_destroy.
 } sinew_status_code;
 
 /// Result of every function that can fail: a sinew_status_code value.
@@ -143,8 +151,6 @@ typedef enum sinew_detection {
   SINEW_DETECTION_DISTANCE_FIELD = 2  ///< Sampled signed distance; only for mesh and box tools.
 } sinew_detection;
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

@@ -8,42 +8,34 @@
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 // ---- Creation -----------------------------------------------------------------------------------
 
 /// Memory layout of the springs of a body.
 typedef enum sinew_storage {
   SINEW_STORAGE_PACKED = 0,       ///< Layout optimized for the processor; default.
-  /// Linked list per node, one allocation per link; for comparison.
-  SINEW_STORAGE_EFFICIENT = 1,
-  /// One array with springs_per_node slots per node; for comparison.
-  SINEW_STORAGE_FAST_LINK = 2,
-  /// Chain of arrays of springs_per_node slots per node; for comparison.
-  SINEW_STORAGE_DYNAMIC_BULK = 3
+  SINEW_STORAGE_EFFICIENT = 1,  ///< Linked list per node, one allocation per link; for comparison.
+  SINEW_STORAGE_FAST_LINK = 2,  ///< One array with springs_per_node slots per node; for comparison.
+  SINEW_STORAGE_DYNAMIC_BULK = 3  ///< Chain of arrays of springs_per_node slots; for comparison.
 } sinew_storage;
 
 /// Time integrator of a body.
 typedef enum sinew_solver {
   SINEW_SOLVER_VERLET = 0,    ///< Explicit; takes as many substeps as stability needs.
   SINEW_SOLVER_IMPLICIT = 1,  ///< Implicit; stable at any step size.
-  /// Reference solver: the equations of IMPLICIT solved to double precision; slow.
-  SINEW_SOLVER_NEWTON = 2,
-  /// VERLET or IMPLICIT, chosen on creation; see sinew_solver_report. Default.
-  SINEW_SOLVER_AUTO = 3
+  SINEW_SOLVER_NEWTON = 2,    ///< Reference: IMPLICIT solved to double precision; slow.
+  SINEW_SOLVER_AUTO = 3       ///< VERLET or IMPLICIT, see sinew_solver_report; default.
 } sinew_solver;
 
 /// Source of the forces between the nodes of elements.
 typedef enum sinew_material {
   SINEW_MATERIAL_NONE = 0,       ///< Springs as given, or one stiffness for all. Default.
-  /// Springs along the element edges, with stiffnesses computed from young_modulus. They imply a
-  /// Poisson's ratio of 1/4 for tetrahedra and cells, and of 1/3 in the plane for triangles.
+  /// Springs along element edges, of young_modulus. Poisson's ratio is 1/4 for tetrahedra and
+  /// cells, 1/3 in the plane for triangles.
   SINEW_MATERIAL_SPRINGS = 1,
-  /// Finite elements of element_law. Accepts a Poisson's ratio from 0 to 0.49. Accurate up to a
-  /// compression of about 20 %, stable beyond. The body has no springs but those given.
-  /// sinew_body_remove_spring removes the tetrahedra that have the edge.
+  /// Finite elements of element_law, with the springs given. Accurate up to a compression of about
+  /// 20 %, stable beyond.
   SINEW_MATERIAL_TETRAHEDRA = 2
 } sinew_material;
 
@@ -73,188 +65,148 @@ typedef struct sinew_body_def {
   /// [kg] node_count floats, each at least 1e-37, or 0 for a permanent pin; nullable: node_mass.
   /// IMPLICIT rolls a body back if mass / dt^2 is not a finite float.
   const float *masses;
-  /// [N s/m] node_count floats, the drag per node; nullable: node_damping.
-  const float *node_dampings;
-  /// [kg] Mass of each node, at least 1e-37; no default. Must be 0 if density is set.
-  float node_mass;
-  /// [N s/m] Drag on each node: force = -node_damping * velocity; default 0.
-  float node_damping;
+  const float *node_dampings;      ///< [N s/m] node_count floats of drag; nullable: node_damping.
+  float node_mass;  ///< [kg] Mass of each node, at least 1e-37; no default. 0 with a density.
+  float node_damping;              ///< [N s/m] Drag on each node: force = -node_damping * velocity.
   /// 2 * spring_count node indices, each pair once; nullable: the element edges, each once. NULL
   /// excludes the arrays with one value per spring. A pointer with spring_count 0 means no springs.
   const uint32_t *springs;
   size_t spring_count;             ///< Number of springs given.
   const float *stiffnesses;        ///< [N/m] spring_count floats; nullable: stiffness.
   const float *rest_lengths;       ///< [m] spring_count floats; nullable: from the rest positions.
-  /// [N s/m] spring_count floats, along the spring; nullable: spring_damping.
-  const float *spring_dampings;
-  /// [N/m] Stiffness of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
-  float stiffness;
-  /// [N s/m] Damping of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
-  float spring_damping;
-  /// 3 * triangle_count node indices, outward: the render and contact surface; nullable. NULL takes
-  /// the boundary of the tetrahedra or cells.
+  const float *spring_dampings;    ///< [N s/m] spring_count floats; nullable: spring_damping.
+  float stiffness;  ///< [N/m] Stiffness of each spring; 0 for TETRAHEDRA without springs.
+  float spring_damping;  ///< [N s/m] Damping of each spring; 0 for TETRAHEDRA without springs.
+  /// 3 * triangle_count node indices, outward: the render and contact surface. Nullable: the
+  /// boundary of the tetrahedra or cells.
   const uint32_t *triangles;
   size_t triangle_count;           ///< Number of triangles given.
   const uint32_t *tetrahedra;      ///< 4 * tetrahedron_count node indices; nullable: no tetrahedra.
   size_t tetrahedron_count;        ///< Number of tetrahedra given.
   uint32_t storage;                ///< Spring storage, a sinew_storage value.
-  /// Slots per node (FAST_LINK) or per array (DYNAMIC_BULK); 0 (default) derives them from the
-  /// springs. A node with more springs than slots is SINEW_STATUS_CAPACITY with FAST_LINK. Other
-  /// storages ignore it.
+  /// Slots per node (FAST_LINK) or per array (DYNAMIC_BULK); 0 (default): from the springs given.
   uint32_t springs_per_node;
-  uint32_t solver;                 ///< Time integrator, a sinew_solver value.
+  uint32_t solver;                 ///< Time integrator, a sinew_solver value; default AUTO.
   uint32_t reserved;               ///< Reserved; must be 0.
-  /// IMPLICIT, NEWTON: 1 is implicit Euler, 2 is BDF2, which is far more accurate; 0 (default): 2.
-  uint32_t order;
+  uint32_t order;  ///< IMPLICIT, NEWTON: 1 is implicit Euler; 2 or 0 is BDF2, far more accurate.
   /// IMPLICIT, NEWTON: largest number of matrix-vector products per step, at most 1,000,000. 0
-  /// (default) is 1000 for IMPLICIT, where a product costs about one VERLET substep, and 100,000
-  /// for NEWTON. Each part of a subdivided step gets at least 1/32 of it. If less than 256, a step
-  /// beside a tool may take seven times as many, at most 128 more, before it is subdivided.
+  /// (default) is 1000 for IMPLICIT, 100,000 for NEWTON. Each part of a subdivided step gets at
+  /// least 1/32 of it. If less than 256, a step beside a tool may take seven times as many, at most
+  /// 128 more, before it is subdivided.
   uint32_t iterations;
-  /// IMPLICIT, NEWTON: relative tolerance of the linear solve, 1e-6 to 1. It bounds the error
-  /// relative to the displacement that forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for
-  /// NEWTON.
+  /// IMPLICIT, NEWTON: error of the linear solve, 1e-6 to 1, relative to the displacement that
+  /// forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
   float accuracy;
   uint32_t reserved1;              ///< Reserved; must be 0.
-  /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to
-  /// 1; as much as it takes where a step would be refused. Default 0.001; 0 is off. Mass is added
-  /// only if it saves at least 1/4 of the substeps, and never with fixed substeps or a tolerance.
-  /// It adds inertia but no weight. See sinew_solver_report.
+  /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1;
+  /// default 0.001. A step that would be refused may add more. Mass is added only if it saves 1/4
+  /// of the substeps, never with fixed substeps or a tolerance. It adds inertia but no weight. See
+  /// sinew_solver_report.
   float mass_scaling;
   uint32_t reserved2;              ///< Reserved; must be 0.
   /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells. Corner bits: x 1, y 2,
-  /// z 4. Their springs are the edges and the face diagonals.
+  /// z 4. Springs are the edges and face diagonals.
   const uint32_t *cells;
   size_t cell_count;               ///< Number of cells given.
-  /// How elements make forces, a sinew_material value; default NONE. Other values fill the
-  /// tetrahedra or cells, or else the triangles, and need springs NULL and stiffness 0, except for
-  /// TETRAHEDRA with springs of its own. Cells must be cubes of one size within 0.1 %.
+  /// A sinew_material value: how tetrahedra or cells, or else triangles, make forces; default NONE.
+  /// SPRINGS needs springs NULL and stiffness 0. Cells must be cubes of one size within 0.1 %.
   uint32_t material;
   /// [Pa] Young's modulus at small strain, above 0 with a material, else 0. Exact for cells and
-  /// equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, a mesh of one or two
-  /// layers of tetrahedra much softer.
+  /// equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, one or two layers of
+  /// tetrahedra are much softer.
   float young_modulus;
-  /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value +- 0.001.
-  float poisson_ratio;
+  float poisson_ratio;  ///< TETRAHEDRA: 0 to 0.49; SPRINGS: 0 or the implied value +- 0.001.
   /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
-  /// Every node must then belong to an element, masses must be NULL and node_mass 0.
+  /// Every node must then belong to an element, masses be NULL and node_mass 0.
   float density;
-  /// [m] Thickness of a material that fills triangles, above 0; else 0.
-  float thickness;
-  /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0. 0.3
-  /// to 0.6 of Young's modulus lets a body of springs recover from inversion. 0 with TETRAHEDRA.
+  float thickness;  ///< [m] Thickness of a material that fills triangles, above 0; else 0.
+  /// [Pa] Resistance of each tetrahedron to volume change and inversion; 0 with TETRAHEDRA. 0.3 to
+  /// 0.6 of Young's modulus lets a body of springs recover from inversion.
   float volume_stiffness;
-  /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness. An
-  /// anchor spring pulls a node to its rest position in the world.
-  const float *home_stiffnesses;
-  /// [N/m] Stiffness of each anchor spring; default 0: no anchor springs.
-  float home_stiffness;
-  /// [N m] Flexural rigidity of the triangles, at least 0; default 0. A sheet of thickness t has E
-  /// t^3 / (12 (1 - nu^2)). The rest angle of each edge may be any. An edge of more than two
-  /// triangles is refused. Exact for equilateral triangles. sinew_body_remove_spring removes the
-  /// bending of the triangles that have the edge.
+  const float *home_stiffnesses;   ///< [N/m] node_count floats; nullable: home_stiffness.
+  float home_stiffness;  ///< [N/m] Stiffness of anchor springs, which pull nodes to rest positions.
+  /// [N m] Flexural rigidity of triangles: E t^3 / (12 (1 - nu^2)) for a sheet of thickness t.
+  /// Exact for equilateral triangles. An edge of more than two triangles is refused.
   float bending_stiffness;
-  /// Force law of springs, a sinew_spring_law value; default LINEAR. Later springs are linear.
-  uint32_t spring_law;
+  uint32_t spring_law;  ///< Force law, a sinew_spring_law value; later springs are linear.
   float spring_steepness;          ///< EXPONENTIAL: above 0, at most 13.8 / spring_limit; else 0.
   float spring_quadratic;          ///< CUBIC: its square is at most 3 * spring_cubic; else 0.
   float spring_cubic;              ///< CUBIC: cubic coefficient, at least 0; else 0.
   /// EXPONENTIAL, CUBIC: strain beyond which the law is linear, above 0; else 0.
   float spring_limit;
-  /// [Pa] Fiber stiffness of each tetrahedron, at least 0; default 0.
-  float fibre_stiffness;
+  float fibre_stiffness;           ///< [Pa] Fiber stiffness of each tetrahedron.
   /// 3 * tetrahedron_count floats: unit fiber directions at rest, or 0 for no fibers; nullable.
-  /// Fibers pull in proportion to their extension, over the cross section at rest. They never push.
+  /// Fibers pull in proportion to their extension and never push.
   const float *fibre_directions;
-  /// [Pa] tetrahedron_count floats, at least 0; nullable: fibre_stiffness.
-  const float *fibre_stiffnesses;
-  /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6; default 0: none.
-  /// It acts in parallel with the stiffness. Springs added later have none. VERLET needs short
-  /// substeps from about 0.01 s on; use IMPLICIT there.
+  const float *fibre_stiffnesses;  ///< [Pa] tetrahedron_count floats; nullable: fibre_stiffness.
+  /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6. It acts in
+  /// parallel with the stiffness. Later springs have none. From about 0.01 s on use IMPLICIT:
+  /// VERLET needs short substeps.
   float retardation_time;
-  /// [s] Relaxation time of the Maxwell branch (spring in series with the dashpot), 1e-9 to 1e6.
-  /// After a strain step the stress is E (1 + retardation_time / relaxation_time exp(-t /
-  /// relaxation_time)). 0 (default) leaves a Kelvin-Voigt solid. Bodies start relaxed;
-  /// sinew_body_set_positions relaxes them.
+  /// [s] Relaxation time of the Maxwell branch, 1e-9 to 1e6; 0: a Kelvin-Voigt solid. After a
+  /// strain step the stress is E (1 + retardation_time / relaxation_time exp(-t /
+  /// relaxation_time)). Bodies start relaxed; sinew_body_set_positions relaxes them.
   float relaxation_time;
-  /// Strain at which springs and elements yield, in tension and compression; 0 (default): never.
-  /// Strain beyond it is permanent. Requires SINEW_SPRING_LAW_LINEAR; springs added later do not
-  /// yield. Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so long
-  /// steps slow it.
+  /// Strain at which springs and elements yield; 0: never. Strain beyond it is permanent. It needs
+  /// SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow the yielding of
+  /// tetrahedra.
   float yield_strain;
-  /// Maximum plastic strain, above 0 and below 1 with yield_strain; default 0.5. Elastic beyond.
+  /// With yield_strain: maximum plastic strain, above 0 and below 1; default 0.5. Elastic beyond.
   float largest_set;
-  /// Strain above which springs stiffen, at least 0; default 0: none. Springs added later do not.
-  float strain_limit;
+  float strain_limit;  ///< Strain above which springs stiffen; 0: none. Later springs do not.
   /// Added stiffness beyond strain_limit as a multiple, above 0, at most 1e6; default 100.
   float limit_stiffening;
-  /// [Pa] Stiffness of the volume inside closed surfaces, at least 0; default 0. Energy of a
-  /// cavity: enclosed_stiffness / 2 * V0 (V / V0 - 1)^2 - pressure (V - V0). Each connected surface
-  /// component must be closed and is a cavity; if some are inverted, like the inner wall of a
-  /// hollow organ, only those are. Cutting or removing a surface edge opens its cavity permanently.
+  /// [Pa] Stiffness of the volume inside closed surfaces. Energy of a cavity: enclosed_stiffness /
+  /// 2 * V0 (V / V0 - 1)^2 - pressure (V - V0). Each connected surface component must be closed and
+  /// is a cavity; if some are inverted, like the inner wall of a hollow organ, only those are.
+  /// Cutting or removing a surface edge opens its cavity.
   float enclosed_stiffness;
-  /// [Pa] Overpressure in each cavity at rest volume; may be negative; default 0. It is constant
-  /// without an enclosed_stiffness. See sinew_body_set_pressure.
+  /// [Pa] Overpressure in cavities at rest volume, of any sign. It is constant without
+  /// enclosed_stiffness. See sinew_body_set_pressure.
   float pressure;
-  /// [m] Distance that tools and other tissue keep from the surface, 0 to 1e9; default 0.
-  float contact_thickness;
-  /// Coulomb coefficient for tissue contact, at least 0; default 0. The larger of two bodies
-  /// applies. Contact with a tool uses the friction of the tool.
+  float contact_thickness;  ///< [m] Distance that tools and tissue keep from the surface, 0 to 1e9.
+  /// Coulomb coefficient for tissue contact; the larger of two bodies' applies. Contact with a tool
+  /// uses the friction of the tool.
   float contact_friction;
-  /// 1: collides with other bodies that also have 1; 0 (default): does not.
-  uint32_t meets_bodies;
+  uint32_t meets_bodies;  ///< 1: collides with other bodies that have 1; 0 (default): does not.
   /// 1: collides with itself; 0 (default): does not. The two sides of a cut then rest against each
-  /// other with no gap. The cut-boundary edges of a sheet may slide over each other until
-  /// separated.
+  /// other; cut edges of a sheet may slide over each other.
   uint32_t meets_itself;
-  /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE. IMAGE_SPACE applies
-  /// if either of two bodies asks for it. Self-collision is always exact.
-  /// SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
+  /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE, if either asks for
+  /// it. Self-collision is exact. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
   uint32_t contact_detection;
   /// [m] IMAGE_SPACE: pixel size; 0 (default): half of the mean surface edge. At most 2^24 pixels.
   float contact_resolution;
-  /// Bits of the categories that this body belongs to; default 1. Two objects collide if each has a
-  /// category in the mask of the other.
-  uint32_t collision_category;
-  /// Bits of the categories that this body collides with; default 0xffffffff.
-  uint32_t collision_mask;
+  uint32_t collision_category;     ///< Collision categories of this body; default 1. See base.h.
+  uint32_t collision_mask;         ///< Categories that it collides with; default 0xffffffff.
   /// Number of nodes that cuts may add, about 5 per cut element; 0 (default): cannot be cut. Needs
   /// a consistently oriented 2-manifold surface, or tetrahedra connected through faces around each
-  /// node, with triangles that are their boundary, if given. For a body of springs alone 1 is
-  /// enough. See sinew_body_cut.
+  /// node; triangles, if given, are their boundary. 1 is enough for a body of springs alone.
   uint32_t spare_nodes;
-  /// Fracture energy of a blade's cut, at least 0: [J/m] for a surface, [J/m^2] for a solid. For a
-  /// surface it is the toughness times the thickness. Default 0: no resistance. Above 0 it needs
-  /// spare_nodes. SINEW_STATUS_UNSUPPORTED for a body of springs alone.
+  /// Fracture energy of a blade's cut: [J/m^2] for a solid; [J/m] for a surface, with its
+  /// thickness. Above 0 it needs spare_nodes. SINEW_STATUS_UNSUPPORTED for a body of springs alone.
   float toughness;
-  /// Strain above which a spring or an element edge tears, at least 0; 0 (default): never. A
-  /// surface tears at the end node with the larger separating force, across that force, to the next
-  /// triangle. A solid tears along faces of its tetrahedra. A step that tears may allocate. See
-  /// sinew_body_set_tear_limits.
+  /// Strain above which a spring or an element edge tears; 0: never. A surface tears at the node
+  /// with the larger separating force, across it; a solid along faces. A step that tears may
+  /// allocate. See sinew_body_set_tear_limits.
   float tear_strain;
-  /// [N] Force above which a spring tears, at least 0; 0 (default): never. SINEW_STATUS_UNSUPPORTED
-  /// for a body of elements without springs.
+  /// [N] Force above which a spring tears; 0: never. For bodies of elements alone it is
+  /// SINEW_STATUS_UNSUPPORTED.
   float tear_force;
-  /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes.
-  uint32_t most_tears;
-  /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. No tear goes below.
-  float smallest_piece;
-  /// [m/s] Speed below which a node counts as at rest, at least 0; 0 (default): never sleeps. Parts
-  /// that stay slower for sleep_time, and that no force would accelerate to that speed in that
-  /// time, are not stepped until something affects them. Only VERLET bodies without cuts sleep in
-  /// parts. Bodies in contact with or sutured to other tissue stay awake. See
+  uint32_t most_tears;  ///< Maximum number of tears per step; 0: does not tear. Needs spare_nodes.
+  float smallest_piece;            ///< Minimum fragment size at rest: [m^2], or [m^3] for solids.
+  /// [m/s] Speed below which a node counts as at rest; 0 (default): never sleeps. Parts slower for
+  /// sleep_time, which no force would make faster, are not stepped until something affects them.
+  /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake. See
   /// sinew_body_get_awake_share.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
-  /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
+  /// Law of TETRAHEDRA, a sinew_element_law value; not 0: no viscosity or yield.
   uint32_t element_law;
   float mooney_ratio;              ///< MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
-  /// [m] Translation of all positions, after the rotation; default 0 0 0.
-  float position[3];
-  /// Rotation of all positions and fibers about the origin, x y z w, not zero; default 0 0 0 1.
-  float orientation[4];
-  /// Factor of the world's gravity on this body, finite; default 1.
-  float gravity_scale;
+  float position[3];  ///< [m] Translation of all positions, after the rotation; default 0 0 0.
+  float orientation[4];  ///< Rotation of positions and fibers about the origin; default 0 0 0 1.
+  float gravity_scale;  ///< Factor of the world's gravity on this body, finite; default 1.
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
@@ -271,32 +223,30 @@ sinew_status sinew_body_destroy(sinew_world *world, sinew_body_id body);
 
 /// Writes a view of the node positions [m] without copying.
 /// Lifetime: until the next step, sinew_body_set_positions, sinew_body_set_velocities,
-/// sinew_body_rest_state or topology change of the body, or its destruction.
+/// sinew_body_solve_equilibrium or topology change of the body, or its destruction.
 sinew_status sinew_body_get_positions(const sinew_world *world, sinew_body_id body,
-                                      sinew_vec3_view *out);
+    sinew_vec3_view *out);
 
 /// Writes a view of the node velocities [m/s] at the time of the positions.
-/// A pinned node has the velocity of its pin in the last step. The first call after a step computes
-/// the velocities, at the cost of about one substep. Lifetime: as for sinew_body_get_positions.
+/// A pinned node has that of its pin in the last step. The first call after a step costs about one
+/// substep. Lifetime: as for sinew_body_get_positions.
 sinew_status sinew_body_get_velocities(const sinew_world *world, sinew_body_id body,
-                                       sinew_vec3_view *out);
+    sinew_vec3_view *out);
 
-/// Moves all nodes to new positions without a sweep.
-/// `positions` [m] holds 3 * node_count floats. Velocities stay. Pinned nodes move too, and
-/// attached nodes stay attached at their new positions. `node_count` must be the body's.
+/// Moves all nodes to new positions [m], 3 * node_count floats, without a sweep.
+/// Velocities stay. Pinned nodes move too, and attached nodes stay attached.
 sinew_status sinew_body_set_positions(sinew_world *world, sinew_body_id body,
-                                      const float *positions, size_t node_count);
+    const float *positions, size_t node_count);
 
-/// Sets the velocities of all nodes.
-/// `velocities` [m/s] holds 3 * node_count floats. Pinned nodes and pinned axes keep theirs.
-/// `node_count` must be the body's number of nodes.
+/// Sets the velocities [m/s] of all nodes, 3 * node_count floats.
+/// Pinned nodes and pinned axes keep theirs.
 sinew_status sinew_body_set_velocities(sinew_world *world, sinew_body_id body,
-                                       const float *velocities, size_t node_count);
+    const float *velocities, size_t node_count);
 
 /// Writes a view of the render and contact surface: the triangles of a body after all cuts.
 /// Lifetime: until the next topology change of the body, or its destruction.
 sinew_status sinew_body_get_triangles(const sinew_world *world, sinew_body_id body,
-                                      sinew_triangle_view *out);
+    sinew_triangle_view *out);
 
 /// Writes 1 if the surface of a body is closed, else 0.
 /// Only a closed body pushes out what is inside it. Removing a spring on its surface opens it.
@@ -304,21 +254,19 @@ sinew_status sinew_body_is_closed(const sinew_world *world, sinew_body_id body, 
 
 /// Writes the mass of a node [kg]; 0 for a permanent pin or a node bound to others.
 sinew_status sinew_body_get_node_mass(const sinew_world *world, sinew_body_id body, uint32_t node,
-                                      float *out);
+    float *out);
 
 // ---- Forces -------------------------------------------------------------------------------------
 
-/// Adds a force to a node for the whole next step.
-/// `force` [N] points to 3 floats. Forces are constant during the step and cleared when it
-/// succeeds. They have no effect on a pinned or attached node, nor along a pinned axis.
+/// Adds a force [N], 3 floats, to a node for the whole next step; cleared when that succeeds.
+/// It has no effect on a pinned or attached node, nor along a pinned axis.
 sinew_status sinew_body_apply_force(sinew_world *world, sinew_body_id body, uint32_t node,
-                                    const float *force);
+    const float *force);
 
-/// Adds a force to each of many nodes for the whole next step.
-/// `nodes` holds `count` indices, which may repeat; `forces` [N] holds 3 * count floats. See
-/// sinew_body_apply_force. On failure no force is added.
+/// Adds forces [N], 3 * count floats, to nodes for the whole next step; see sinew_body_apply_force.
+/// `nodes` holds `count` indices, which may repeat.
 sinew_status sinew_body_apply_forces(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     const float *forces, size_t count);
+    const float *forces, size_t count);
 
 // ---- Pins ---------------------------------------------------------------------------------------
 
@@ -331,47 +279,45 @@ sinew_status sinew_body_pin(sinew_world *world, sinew_body_id body, uint32_t nod
 #define SINEW_AXIS_Z 4  ///< Bit of the z axis.
 
 /// Pins a node along some axes and frees it along the others.
-/// `axes` is a sum of SINEW_AXIS_X, SINEW_AXIS_Y and SINEW_AXIS_Z; 0 unpins the node. A freed axis
-/// keeps the velocity of its pin. Changing the axes cancels a pending sinew_body_move_pin.
+/// `axes` is a sum of SINEW_AXIS_ values; 0 unpins the node. A freed axis keeps the velocity of its
+/// pin. Changing the axes cancels a pending sinew_body_move_pin.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds it, or a node of mass 0 would be free.
 sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_t node,
-                                 uint32_t axes);
+    uint32_t axes);
 
-/// Unpins a node along all axes; no effect on a free node.
-/// The node keeps the velocity of its pin in the last step.
+/// Unpins a node along all axes; it keeps the velocity of its pin.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or its mass is 0.
 sinew_status sinew_body_unpin(sinew_world *world, sinew_body_id body, uint32_t node);
 
-/// Moves a pinned node to a new position during the next step.
-/// The node moves along a straight line, and only along its pinned axes. `position` [m] is 3
-/// floats.
+/// Moves a pinned node along a line to a position [m], 3 floats, during the next step.
+/// Free axes do not follow.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_move_pin(sinew_world *world, sinew_body_id body, uint32_t node,
-                                 const float *position);
+    const float *position);
 
-/// Writes the reaction force on a pinned node, averaged over the last step.
-/// `force` [N] receives 3 floats, 0 along free axes.
+/// Writes the reaction force [N] on a pinned node, 3 floats, averaged over the last step.
+/// It is 0 along free axes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_get_pin_force(const sinew_world *world, sinew_body_id body, uint32_t node,
-                                      float *force);
+    float *force);
 
 // ---- Collision and sleep ------------------------------------------------------------------------
 
 /// Sets the collision category and mask of a body from the next step on.
-/// See sinew_body_def. Tools and bodies inside it are pushed out once they collide with it.
+/// Tools and bodies inside it are pushed out once they collide with it.
 sinew_status sinew_body_set_collision(sinew_world *world, sinew_body_id body, uint32_t category,
-                                      uint32_t mask);
+    uint32_t mask);
 
-/// Wakes all nodes of a body until they come to rest again.
-/// Forces, contacts, cuts and property changes wake a body automatically.
+/// Writes the collision category and mask of a body.
+sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_category, uint32_t *out_mask);
+
+/// Wakes all nodes of a body until they come to rest again; whatever affects a body does too.
 sinew_status sinew_body_wake(sinew_world *world, sinew_body_id body);
 
-/// Writes the fraction of the nodes that are awake, from 0 to 1.
-/// It is 1 for a body that never sleeps.
+/// Writes the fraction of the nodes that are awake; 1 for a body that never sleeps.
 sinew_status sinew_body_get_awake_share(const sinew_world *world, sinew_body_id body, float *out);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

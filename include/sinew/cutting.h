@@ -8,9 +8,7 @@
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 // ---- Cuts ---------------------------------------------------------------------------------------
 
@@ -19,32 +17,27 @@ typedef struct sinew_cut_report {
   size_t struct_size;        ///< Set to sizeof(sinew_cut_report) before the call.
   uint32_t new_nodes;        ///< Number of new nodes: copies, and surface points bound to nodes.
   uint32_t new_triangles;    ///< Number of new surface triangles.
-  /// Number of springs removed by the blade or replaced by springs of copies.
-  uint32_t springs_removed;
+  uint32_t springs_removed;  ///< Number of springs removed, or replaced by springs of copies.
   uint32_t pieces_parted;    ///< Increase of the number of connected surface components.
-  /// [m] Length of the cut in the rest shape; for a solid on its surface.
-  double length;
-  /// [m^2] Area of the opened faces of a solid in the rest shape, counted on one side. A cell in
-  /// which the cut ends stays whole, so the area can be less than the blade swept.
+  double length;  ///< [m] Length of the cut in the rest shape; for a solid on its surface.
+  /// [m^2] Area of one side of the opened faces of a solid at rest; a cell where the cut ends stays
+  /// whole.
   double area;
 } sinew_cut_report;
 
 /// Cuts a body along the surface that a blade's edge swept, at the current positions.
-/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `report` is nullable. A
-/// sweep that starts where the body's last one ended continues it. New nodes are appended; mass,
-/// momentum and energy are conserved. The call ends views of positions and triangles; see
-/// sinew_body_get_topology_changes. On failure nothing changes.
+/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `out_report` is
+/// nullable. A sweep that starts where the last one ended continues it. New nodes are appended, and
+/// views end; see sinew_body_get_topology_changes.
 /// Errors: SINEW_STATUS_UNSUPPORTED without spare_nodes; SINEW_STATUS_CAPACITY if too few are left.
 sinew_status sinew_body_cut(sinew_world *world, sinew_body_id body, const float *start,
-                            const float *end, sinew_cut_report *report);
+    const float *end, sinew_cut_report *out_report);
 
 /// Origin of a node that a cut added; vertex attributes interpolate by its weights.
 typedef struct sinew_new_node {
   uint32_t node;        ///< Index of the new node; indices increase by 1 per entry.
-  /// Source nodes, each with a lower index than the new node; an unused entry has weight 0.
-  uint32_t sources[3];
-  /// Weights of the sources, at least 0, with sum 1; a copy has a single source.
-  float weights[3];
+  uint32_t sources[3];  ///< Source nodes, lower than the new node; an unused entry has weight 0.
+  float weights[3];     ///< Weights of the sources, with sum 1; a copy has a single source.
 } sinew_new_node;
 
 /// Cut-boundary edge; each cut edge has one on either side.
@@ -60,29 +53,26 @@ typedef struct sinew_topology_changes {
   uint64_t version;                 ///< Current topology version; pass it to the next call.
   const sinew_new_node *nodes;      ///< New nodes in ascending order of index.
   size_t node_count;                ///< Number of new nodes.
-  /// Indices of changed and new triangles in sinew_body_get_triangles; may repeat.
-  const uint32_t *triangles;
+  const uint32_t *triangles;        ///< Changed and new triangles of the surface; may repeat.
   size_t triangle_count;            ///< Number of triangle indices.
   const uint32_t *removed_springs;  ///< 2 * removed_spring_count nodes of removed springs.
   size_t removed_spring_count;      ///< Number of removed springs.
-  /// New cut-boundary edges as they were when they were made; later cuts may change them.
-  const sinew_rim_edge *rim;
+  const sinew_rim_edge *rim;  ///< New cut-boundary edges as they were made; later cuts change them.
   size_t rim_count;                 ///< Number of cut-boundary edges.
 } sinew_topology_changes;
 
 /// Writes the topology changes of a body since a version.
-/// Pass 0 for all changes since creation, then the `version` of the previous call. A renderer
-/// interpolates the attributes of new nodes from their sources and reads the listed triangles
-/// again.
+/// Pass 0 for all changes, then the `version` of the previous call. Interpolate the attributes of
+/// new nodes from their sources and read the listed triangles again.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the version is in the future.
 sinew_status sinew_body_get_topology_changes(const sinew_world *world, sinew_body_id body,
-                                             uint64_t since_version, sinew_topology_changes *out);
+    uint64_t since_version, sinew_topology_changes *out);
 
-/// Writes the connected component of each node, and the number of components.
-/// Nodes are connected by springs, elements and the surface. `pieces` receives `count` numbers from
-/// 0, where `count` is the number of nodes. `pieces` and `piece_count` are nullable.
-sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body, uint32_t *pieces,
-                                   size_t count, uint32_t *piece_count);
+/// Writes the connected component of each node, from 0, and the number of components.
+/// Nodes are connected by springs, elements and the surface. `out_pieces` receives `node_count`
+/// numbers; both outputs are nullable.
+sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_pieces, size_t node_count, uint32_t *out_piece_count);
 
 // ---- Blades -------------------------------------------------------------------------------------
 
@@ -90,41 +80,45 @@ sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body,
 /// Filled by sinew_blade_def_init; read only during sinew_blade_create.
 typedef struct sinew_blade_def {
   size_t struct_size;           ///< Size of this struct; sinew_blade_def_init sets it.
-  /// [m] Two different end points of the edge about the blade's origin, within 1e9; no default.
-  float edge[6];
-  /// [N/m] Coupling stiffness between the blade and its proxy in each body, above 0; default 1000.
-  /// Before cutting, tissue of toughness T deforms by about T / stiffness.
+  float edge[6];  ///< [m] Two different end points of the edge about the origin, within 1e9.
+  /// [N/m] Coupling stiffness between blade and proxy, above 0; default 1000. Before cutting,
+  /// tissue of toughness T deforms by about T / stiffness.
   float stiffness;
-  /// Bits of the categories that this blade belongs to; default 1. It cuts a body if each has a
-  /// category in the mask of the other.
-  uint32_t collision_category;
-  /// Bits of the categories that this blade cuts; default 0xffffffff.
-  uint32_t collision_mask;
-  /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
-  float position[3];
-  /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
-  float orientation[4];
+  uint32_t collision_category;  ///< Collision categories of this blade; default 1. See base.h.
+  uint32_t collision_mask;      ///< Categories that it cuts; default 0xffffffff.
+  float position[3];            ///< [m] Initial position; default 0 0 0.
+  float orientation[4];         ///< Initial orientation; default 0 0 0 1.
 } sinew_blade_def;
 
 /// Fills a blade definition with its defaults; `struct_size` is sizeof(sinew_blade_def).
 sinew_status sinew_blade_def_init(sinew_blade_def *def, size_t struct_size);
 
 /// Creates a blade: an edge that cuts bodies with spare_nodes as its pose moves.
-/// It has no volume; add a tool for the flat of a scalpel. Tissue resists with its toughness; a
-/// failed cut is reported in sinew_blade_report and leaves the step successful. Tissue that moves
-/// onto the edge is cut too. Moving along the edge or back through the cut meets no resistance. A
-/// triangle needs about 10 spare_nodes. A step that cuts may allocate.
+/// It has no volume. Tissue resists with its toughness; tissue that moves onto the edge is cut too.
+/// Moving along the edge or back meets no resistance. A triangle needs about 10 spare_nodes. A step
+/// that cuts may allocate; sinew_blade_report tells of a failed cut.
 sinew_status sinew_blade_create(sinew_world *world, const sinew_blade_def *def,
-                                sinew_blade_id *out);
+    sinew_blade_id *out);
 
 /// Destroys a blade; its cuts remain.
 sinew_status sinew_blade_destroy(sinew_world *world, sinew_blade_id blade);
 
-/// Moves a blade to a new pose during the next step.
-/// The blade moves along a straight line at constant speed. `position` [m] is 3 floats, each within
-/// 1e9; `orientation` is x y z w, not zero, nullable: unchanged.
+/// Moves a blade to a new pose during the next step, along a line at constant speed.
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged.
 sinew_status sinew_blade_set_pose(sinew_world *world, sinew_blade_id blade, const float *position,
-                                  const float *orientation);
+    const float *orientation);
+
+/// Writes the current pose of a blade; see sinew_tool_get_pose.
+sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade,
+    float *out_position, float *out_orientation);
+
+/// Sets the collision category and mask of a blade; bodies outside of them let go of it.
+sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
+    uint32_t mask);
+
+/// Writes the collision category and mask of a blade.
+sinew_status sinew_blade_get_collision(const sinew_world *world, sinew_blade_id blade,
+    uint32_t *out_category, uint32_t *out_mask);
 
 /// Report of the cuts of a blade and the load on it in the last step.
 typedef struct sinew_blade_report {
@@ -133,55 +127,46 @@ typedef struct sinew_blade_report {
   float torque[3];      ///< [N m] Mean torque on the blade about its position, in world axes.
   double work;          ///< [J] Work that moving the blade did on tissue in the step.
   double length;        ///< [m] Length of the cuts in the rest shape; for solids on their surface.
-  /// [m] Distance of the blade ahead of its cut; 0 without tissue in its path.
-  double lag;
-  /// SINEW_STATUS_OK, or CAPACITY or OUT_OF_MEMORY if a cut failed; the next step retries.
-  sinew_status status;
-  uint32_t reserved0;   ///< Reserved; set to 0 by the library.
-  /// [m^2] Area of the opened faces of solids in the rest shape. A cell in which the cut ends stays
-  /// whole, so the area can be less than the blade swept.
-  double area;
+  double lag;  ///< [m] Distance of the blade ahead of its cut; 0 without tissue in its path.
+  sinew_status status;  ///< SINEW_STATUS_OK, or CAPACITY or OUT_OF_MEMORY if a cut is retried.
+  double area;          ///< [m^2] Area of one side of the opened faces of solids at rest.
 } sinew_blade_report;
 
 /// Writes the cuts of a blade and the load on it in the last step.
 sinew_status sinew_blade_get_report(const sinew_world *world, sinew_blade_id blade,
-                                    sinew_blade_report *out);
+    sinew_blade_report *out);
 
 // ---- Tears --------------------------------------------------------------------------------------
 
 /// Sets tear limits of single springs or element edges, in place of the body's.
-/// `pairs` holds 2 * count indices; `strains` and `forces` [N] hold `count` floats each, at least
-/// 0, where 0 means no limit; both are nullable: unchanged. If a pair repeats, its last entry
-/// counts. On failure no limit changes. Springs added later have no limits.
+/// `pairs` holds 2 * count indices; `strains` and `forces` [N] `count` floats each, 0: no limit;
+/// both are nullable: unchanged. If a pair repeats, its last entry counts. Later springs have none.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a pair without spring and edge;
 /// SINEW_STATUS_UNSUPPORTED if most_tears is 0.
 sinew_status sinew_body_set_tear_limits(sinew_world *world, sinew_body_id body,
-                                        const uint32_t *pairs, size_t count, const float *strains,
-                                        const float *forces);
+    const uint32_t *pairs, const float *strains, const float *forces, size_t count);
+
+/// Writes the tear limits of springs or element edges between pairs of nodes.
+/// `pairs` holds 2 * count indices. `out_strains` and `out_forces` [N] receive `count` floats each,
+/// 0: no limit, and are nullable. Errors are those of sinew_body_set_tear_limits.
+sinew_status sinew_body_get_tear_limits(const sinew_world *world, sinew_body_id body,
+    const uint32_t *pairs, size_t count, float *out_strains, float *out_forces);
 
 /// Report of the tears in the last step; all 0 for a body that does not tear.
+/// Springs of small_pieces and no_room are retried after a topology change.
 typedef struct sinew_tear_report {
   size_t struct_size;      ///< Set to sizeof(sinew_tear_report) before the call.
   uint32_t tears;          ///< Number of tears made.
   uint32_t pieces_parted;  ///< Increase of the number of connected surface components.
-  /// Overloaded springs that wait: most_tears was reached, a neighbor tore, or no force separates
-  /// their nodes.
-  uint32_t waiting;
-  /// Overloaded springs that would make a fragment below smallest_piece; retried after a topology
-  /// change.
-  uint32_t small_pieces;
-  /// Overloaded springs without spare nodes, FAST_LINK slots or memory; retried after a topology
-  /// change.
-  uint32_t no_room;
-  uint32_t reserved;       ///< Reserved; set to 0 by the library.
+  uint32_t waiting;  ///< Overloaded springs that wait: beyond most_tears, or not pulled apart.
+  uint32_t small_pieces;   ///< Overloaded springs whose fragment would be below smallest_piece.
+  uint32_t no_room;        ///< Overloaded springs without spare nodes, FAST_LINK slots or memory.
 } sinew_tear_report;
 
 /// Writes which tears the last step of a body made or refused.
 sinew_status sinew_body_get_tear_report(const sinew_world *world, sinew_body_id body,
-                                        sinew_tear_report *out);
+    sinew_tear_report *out);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

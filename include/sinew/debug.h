@@ -6,9 +6,7 @@
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 // ---- Profile ------------------------------------------------------------------------------------
 
@@ -22,10 +20,8 @@ typedef struct sinew_profile {
   size_t struct_size;        ///< Set to sizeof(sinew_profile) before the call.
   double step;               ///< [s] Whole step.
   double plan;               ///< [s] Targets and paths of tools and blades.
-  /// [s] VERLET: forces and integration, which are one pass over the nodes.
-  double forces;
-  /// [s] IMPLICIT, NEWTON: equations and their solution, with the forces.
-  double solver;
+  double forces;             ///< [s] VERLET: forces and integration.
+  double solver;  ///< [s] IMPLICIT, NEWTON: equations with the forces, and their solution.
   double broad_phase;        ///< [s] Search for what is near a tool or other tissue.
   double narrow_phase;       ///< [s] Search for contacts among what is near.
   double contact_solver;     ///< [s] Impulses of contacts, attachments and sutures.
@@ -47,8 +43,7 @@ sinew_status sinew_world_get_profile(const sinew_world *world, sinew_profile *ou
 
 // ---- Debug drawing ------------------------------------------------------------------------------
 
-/// Callback that draws a line, point or triangle: 2, 1 or 3 vectors of 3 floats [m], color
-/// 0xRRGGBBAA.
+/// Callback that draws a line, point or triangle: 2, 1 or 3 vectors [m], color 0xRRGGBBAA.
 typedef void (*sinew_draw)(void *context, const float *points, uint32_t rgba);
 
 /// What sinew_world_debug_draw draws; flags to be added.
@@ -85,16 +80,14 @@ sinew_status sinew_world_debug_draw(const sinew_world *world, const sinew_debug_
 // ---- Recording ----------------------------------------------------------------------------------
 
 /// Records all steps from the next one on into a file, for sinew_replay.
-/// The file holds the snapshot at the first step, the changes before each step and a state hash
-/// after each. A file that exists is replaced. `path` is UTF-8. A recorded step writes to the file
-/// and may allocate; a full disk ends the recording, not the step.
+/// It holds the snapshot at the first step, the changes before each step and a state hash after
+/// each. A file that exists is replaced. `path` is UTF-8. A recorded step may allocate; a full disk
+/// ends the recording, not the step.
 /// Errors: SINEW_STATUS_IO.
 sinew_status sinew_world_start_recording(sinew_world *world, const char *path);
 
-/// Stops a recording and writes the number of recorded steps.
-/// `out_steps` is nullable.
-/// Errors: SINEW_STATUS_IO or SINEW_STATUS_OUT_OF_MEMORY if the recording ended earlier; it is
-/// stopped in any case.
+/// Stops a recording and writes the number of recorded steps; `out_steps` is nullable.
+/// Errors: SINEW_STATUS_IO or SINEW_STATUS_OUT_OF_MEMORY if it ended earlier; it stops anyway.
 sinew_status sinew_world_stop_recording(sinew_world *world, uint64_t *out_steps);
 
 /// Report of sinew_replay.
@@ -105,7 +98,6 @@ typedef struct sinew_replay_report {
   uint64_t recorded_hash;     ///< State hash after that step in the recording; else 0.
   uint64_t replayed_hash;     ///< State hash after that step in the replay; else 0.
   uint32_t cut_short;         ///< 1 if the file ends within a step, else 0.
-  uint32_t reserved;          ///< Reserved; set to 0 by the library.
 } sinew_replay_report;
 
 /// Replays a recording and compares the state hash after each step, up to the first difference.
@@ -117,7 +109,7 @@ sinew_status sinew_replay(const char *path, uint32_t thread_count, sinew_replay_
 
 // ---- Log ----------------------------------------------------------------------------------------
 
-/// Callback that receives a message; `message` is valid during the call only.
+/// Callback that receives a message, which is valid during the call only.
 /// It may run on any thread that calls the library. It must not call the library.
 typedef void (*sinew_log)(void *context, uint32_t level, const char *message);
 
@@ -130,12 +122,10 @@ typedef enum sinew_log_level {
 } sinew_log_level;
 
 /// Sets the callback that receives messages up to a level, for the whole process.
-/// `level` is a sinew_log_level value. `callback` and `context` are nullable; without a callback
-/// there are no messages. Other threads may still be in the callback that it replaces.
+/// `level` is a sinew_log_level value. `callback` (none) and `context` are nullable. Other threads
+/// may still be in the callback that it replaces.
 sinew_status sinew_set_log_callback(uint32_t level, sinew_log callback, void *context);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

@@ -7,20 +7,15 @@
 #include "base.h"
 #include "body.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 // ---- Reports ------------------------------------------------------------------------------------
 
 /// Energy of a body [J] at the time of the positions.
 typedef struct sinew_energy {
   size_t struct_size;    ///< Set to sizeof(sinew_energy) before the call.
-  /// [J] Kinetic energy of the free nodes, without the mass that mass_scaling adds.
-  double kinetic;
-  /// [J] Energy of springs, elements and other internal terms, minus the work of a constant
-  /// pressure.
-  double elastic;
+  double kinetic;  ///< [J] Kinetic energy of the free nodes, without the mass of mass_scaling.
+  double elastic;  ///< [J] Energy of all internal terms, minus the work of a constant pressure.
   double gravitational;  ///< [J] Gravitational energy, 0 at the origin.
 } sinew_energy;
 
@@ -30,38 +25,31 @@ sinew_status sinew_body_get_energy(const sinew_world *world, sinew_body_id body,
 /// Report of the solver of a body for its last successful step.
 typedef struct sinew_solver_report {
   size_t struct_size;      ///< Set to sizeof(sinew_solver_report) before the call.
-  uint32_t iterations;     ///< IMPLICIT, NEWTON: matrix-vector products of the step; 0 for VERLET.
-  /// [m] Remaining error of the solved equations; 0 for VERLET. IMPLICIT: mass-weighted root mean
-  /// square. NEWTON: largest displacement of the last correction; about 1/100 of it remains. It
-  /// does not include the time discretization error.
+  uint32_t iterations;     ///< IMPLICIT, NEWTON: matrix-vector products of the step.
+  /// [m] Remaining error of the solved equations, without that of time steps; 0 for VERLET.
+  /// IMPLICIT: mass-weighted root mean square. NEWTON: largest displacement of the last correction;
+  /// about 1/100 of it remains.
   float error;
   double added_mass;       ///< [kg] VERLET: total mass that mass_scaling adds.
-  uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved; 0 for VERLET.
-  /// IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding level; 0 for VERLET.
-  uint32_t converged;
+  uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved.
+  uint32_t converged;  ///< IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding.
   uint32_t solver;         ///< Solver in use, a sinew_solver value; never AUTO.
-  /// AUTO took IMPLICIT if VERLET needs more than 150 substeps; this is their number on creation,
-  /// else 0.
-  uint32_t auto_substeps;
-  /// [s] AUTO: step length of the choice, the mean of the world so far or 1/60 s; else 0.
-  float auto_step;
-  uint32_t reserved;       ///< Reserved; set to 0 by the library.
+  uint32_t auto_substeps;  ///< Substeps of VERLET on creation; above 150 AUTO takes IMPLICIT.
+  float auto_step;  ///< [s] AUTO: step length of the choice, the mean so far or 1/60 s; else 0.
 } sinew_solver_report;
 
 /// Writes how the solver of a body took the last step.
 sinew_status sinew_body_get_solver_report(const sinew_world *world, sinew_body_id body,
-                                          sinew_solver_report *out);
+    sinew_solver_report *out);
 
 /// Limit of the substep of a step that was refused.
 typedef enum sinew_limit {
   SINEW_LIMIT_NONE = 0,      ///< The step was not refused.
   SINEW_LIMIT_SPRING = 1,    ///< Springs of a node; the nodes are the stiffest spring.
   SINEW_LIMIT_ELEMENT = 2,   ///< Elements of a node; the nodes are the stiffest tetrahedron.
-  /// Anchor, bending, fiber, Maxwell or strain-limiting terms of a node.
-  SINEW_LIMIT_TERM = 3,
+  SINEW_LIMIT_TERM = 3,  ///< Anchor, bending, fiber, Maxwell or strain-limiting terms of a node.
   SINEW_LIMIT_CAVITY = 4,    ///< Pressure in a cavity.
-  /// Number of parts of a step of IMPLICIT or NEWTON in contact or attached.
-  SINEW_LIMIT_PARTS = 5,
+  SINEW_LIMIT_PARTS = 5,     ///< Parts of a step of IMPLICIT or NEWTON in contact or attached.
   SINEW_LIMIT_TOLERANCE = 6  ///< Tolerance of the world.
 } sinew_limit;
 
@@ -76,49 +64,41 @@ typedef struct sinew_storage_report {
 
 /// Writes the memory use of the springs of a body.
 sinew_status sinew_body_get_storage_report(const sinew_world *world, sinew_body_id body,
-                                           sinew_storage_report *out);
+    sinew_storage_report *out);
 
 // ---- Strain -------------------------------------------------------------------------------------
 
 /// Writes the strain L / L0 - 1 between pairs of nodes; 0 where L0 is 0.
-/// `pairs` holds 2 * count indices. `rest_lengths` [m] holds `count` floats; it is nullable: the
-/// rest lengths of the springs, which takes longer. `strains` receives `count` floats.
+/// `pairs` holds 2 * count indices, `rest_lengths` [m] `count` floats; nullable: those of the
+/// springs, which takes longer. `out_strains` receives `count` floats.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring and `rest_lengths` is NULL.
 sinew_status sinew_body_get_spring_strains(const sinew_world *world, sinew_body_id body,
-                                           const uint32_t *pairs, const float *rest_lengths,
-                                           size_t count, float *strains);
+    const uint32_t *pairs, const float *rest_lengths, size_t count, float *out_strains);
 
 /// Strain of a triangle or tetrahedron; 0 for a rigid motion, or if it has no size at rest.
 typedef struct sinew_strain {
   float largest;   ///< Largest principal stretch minus 1.
   float smallest;  ///< Smallest principal stretch minus 1, at least -1.
-  float growth;    ///< Volumetric (or areal) strain J - 1; below -1 for an inverted tetrahedron.
+  float growth;    ///< Volumetric (or areal) strain J - 1; below -1 if inverted.
 } sinew_strain;
 
-/// Writes the strains of any triangles between nodes of a body.
-/// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `triangles` holds 3 *
-/// triangle_count indices; `strains` receives one entry per triangle. `node_count` must be the
-/// body's.
+/// Writes the strains of any triangles between nodes of a body, one per triangle.
+/// `rest_positions` [m] holds 3 * node_count floats; `triangles` holds 3 * triangle_count indices.
 sinew_status sinew_body_get_triangle_strains(const sinew_world *world, sinew_body_id body,
-                                             const float *rest_positions, size_t node_count,
-                                             const uint32_t *triangles, size_t triangle_count,
-                                             sinew_strain *strains);
+    const float *rest_positions, size_t node_count, const uint32_t *triangles,
+    size_t triangle_count, sinew_strain *out_strains);
 
-/// Writes the strains of any tetrahedra between nodes of a body.
-/// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `tetrahedra` holds 4 *
-/// tetrahedron_count indices; `strains` receives one entry per tetrahedron. `node_count` must be
-/// the body's.
+/// Writes the strains of any tetrahedra between nodes of a body, one per tetrahedron.
+/// `rest_positions` [m] holds 3 * node_count floats; `tetrahedra` 4 * tetrahedron_count indices.
 sinew_status sinew_body_get_tetrahedron_strains(const sinew_world *world, sinew_body_id body,
-                                                const float *rest_positions, size_t node_count,
-                                                const uint32_t *tetrahedra,
-                                                size_t tetrahedron_count, sinew_strain *strains);
+    const float *rest_positions, size_t node_count, const uint32_t *tetrahedra,
+    size_t tetrahedron_count, sinew_strain *out_strains);
 
 /// Averages values of elements at their nodes; 0 at a node without elements.
 /// `elements` holds corners * element_count node indices, `corners` is 2, 3 or 4, `values` holds
-/// element_count finite floats, and `means` receives node_count floats. Use it to color an image by
-/// strain.
-sinew_status sinew_mean_at_nodes(const uint32_t *elements, uint32_t corners, const float *values,
-                                 size_t element_count, float *means, size_t node_count);
+/// element_count finite floats, and `out_means` receives node_count floats.
+sinew_status sinew_util_average_to_nodes(const uint32_t *elements, uint32_t corners,
+    const float *values, size_t element_count, float *out_means, size_t node_count);
 
 // ---- Images -------------------------------------------------------------------------------------
 
@@ -128,25 +108,21 @@ typedef struct sinew_picture_def {
   uint32_t width;          ///< [pixels] Width of the image, 1 to 16384; default 1280.
   uint32_t height;         ///< [pixels] Height of the image, 1 to 16384; default 960.
   float eye[3];            ///< [m] Position of the camera.
-  /// [m] Point at the center of the view. eye equal to target (default): the view is fitted to the
-  /// bodies along `direction`.
-  float target[3];
+  float target[3];  ///< [m] Center of the view; equal to eye (default): fitted along `direction`.
   float up[3];             ///< Up direction of the image; default 0 1 0.
-  /// Fitted view: direction from the scene to the camera; default 1 0.6 1.4.
-  float direction[3];
-  float field_of_view;     ///< [rad] Vertical field of view, above 0 and below pi; default 0.6.
-  uint32_t show_contacts;  ///< 1: draws contact points and forces on tools; 0 (default): does not.
+  float direction[3];      ///< Fitted view: direction to the camera; default 1 0.6 1.4.
+  float field_of_view;     ///< [rad] Vertical angle, above 0 and below pi; default 0.6.
+  uint32_t show_contacts;  ///< 1: draws contact points and forces on tools; 0 (default).
 } sinew_picture_def;
 
 /// Fills an image definition with its defaults; `struct_size` is sizeof(sinew_picture_def).
 sinew_status sinew_picture_def_init(sinew_picture_def *def, size_t struct_size);
 
-/// Draws all bodies and tools into a PNG file.
-/// A body without surface shows its springs. `def` is nullable: the defaults. `path` is UTF-8; an
-/// existing file is replaced once the image is complete.
+/// Draws all bodies and tools into a PNG file, which replaces one that exists.
+/// A body without surface shows its springs. `def` is nullable: the defaults. `path` is UTF-8.
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
 sinew_status sinew_world_save_picture(const sinew_world *world, const sinew_picture_def *def,
-                                      const char *path);
+    const char *path);
 
 /// Color map of values.
 typedef enum sinew_colours {
@@ -155,7 +131,6 @@ typedef enum sinew_colours {
 } sinew_colours;
 
 /// Values per node that color a body, such as strain or force.
-/// The color maps are perceptually uniform.
 typedef struct sinew_body_values {
   sinew_body_id body;   ///< Body that is colored.
   const float *values;  ///< node_count finite floats in the caller's order.
@@ -163,20 +138,14 @@ typedef struct sinew_body_values {
   float low;            ///< Value of the first color; also used below it.
   float high;           ///< Value of the last color, above low; also used above it.
   uint32_t colours;     ///< Color map, a sinew_colours value.
-  uint32_t reserved;    ///< Reserved; must be 0.
 } sinew_body_values;
 
-/// Draws all bodies and tools into a PNG file, with some bodies colored by values.
-/// `coloured` holds `count` entries, each for another body. `def` is nullable: the defaults. `path`
-/// is as in sinew_world_save_picture.
-/// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
+/// Draws like sinew_world_save_picture, with some bodies colored by values.
+/// `coloured` holds `count` entries, each for another body.
 sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
-                                                const sinew_picture_def *def,
-                                                const sinew_body_values *coloured, size_t count,
-                                                const char *path);
+    const sinew_picture_def *def, const sinew_body_values *coloured, size_t count,
+    const char *path);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

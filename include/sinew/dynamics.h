@@ -6,70 +6,59 @@
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 /// Mass, center of mass and inertia of a rigid tool, in the tool's own axes.
 typedef struct sinew_mass_properties {
   size_t struct_size;       ///< Set to sizeof(sinew_mass_properties) before the call.
   float mass;               ///< [kg] Mass, 1e-12 to 1e12.
-  /// [m] Center of mass, from the tool's position; each coordinate is within 1e9.
-  float center_of_mass[3];
-  /// [kg m^2] Inertia tensor xx yy zz xy xz yz about the center of mass. It is positive definite,
-  /// and no principal moment exceeds the sum of the other two.
+  float center_of_mass[3];  ///< [m] Center of mass, from the tool's position; within 1e9.
+  /// [kg m^2] Inertia tensor xx yy zz xy xz yz about the center of mass. It is positive definite;
+  /// no principal moment exceeds the sum of the others.
   float inertia[6];
 } sinew_mass_properties;
 
-/// Writes the mass properties of a tool that is filled evenly with material.
-/// `density` [kg/m^3] is above 0. `out` sets struct_size.
+/// Writes the mass properties of a tool of a density [kg/m^3], above 0; `out` sets struct_size.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane.
 sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool_id tool,
-                                            float density, sinew_mass_properties *out);
+    float density, sinew_mass_properties *out);
 
 /// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
-/// `mass` is nullable: the tool becomes kinematic again, as it is created. A dynamic tool starts at
-/// rest; a new mass leaves its velocity. Contact keeps momentum and, with VERLET, is stable for any
-/// mass. Pinned nodes are obstacles; other tools are not. Bodies near a dynamic tool do not sleep.
+/// `mass` is nullable: kinematic again, as it is created. It starts at rest; a new mass leaves its
+/// velocity. Pinned nodes are obstacles; other tools are not. Bodies near it do not sleep.
 /// force_limit has no effect.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if attachments or a haptic handle use the
-/// tool.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if an attachment or haptic handle uses it.
 sinew_status sinew_tool_set_mass(sinew_world *world, sinew_tool_id tool,
-                                 const sinew_mass_properties *mass);
+    const sinew_mass_properties *mass);
 
 /// Writes the mass properties of a dynamic tool; all zero if the tool is kinematic.
 sinew_status sinew_tool_get_mass(const sinew_world *world, sinew_tool_id tool,
-                                 sinew_mass_properties *out);
+    sinew_mass_properties *out);
 
 /// Sets the velocity of a dynamic tool, in world axes.
 /// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] are 3 floats each.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
 sinew_status sinew_tool_set_velocity(sinew_world *world, sinew_tool_id tool, const float *velocity,
-                                     const float *angular_velocity);
+    const float *angular_velocity);
 
-/// Writes the velocity of a dynamic tool, in world axes.
-/// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] receive 3 floats each;
-/// both are nullable.
+/// Writes the velocity of a dynamic tool, as sinew_tool_set_velocity takes it; both are nullable.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
-sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool, float *velocity,
-                                     float *angular_velocity);
+sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool,
+    float *out_velocity, float *out_angular_velocity);
 
 /// Adds a force and a torque on a dynamic tool throughout the next step, in world axes.
 /// `force` [N] acts at the center of mass, `torque` [N m] about it; they are 3 floats each.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
 sinew_status sinew_tool_apply_wrench(sinew_world *world, sinew_tool_id tool, const float *force,
-                                     const float *torque);
+    const float *torque);
 
-/// Moves a tool to a new pose at once, without a sweep.
-/// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable:
-/// unchanged. Tissue inside is pushed out over the next steps. A dynamic tool keeps its velocity; a
-/// pending sinew_tool_set_pose is dropped.
+/// Moves a tool to a new pose at once, without a sweep; a dynamic tool keeps its velocity.
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged. Tissue inside is pushed out
+/// over the next steps. A pending sinew_tool_set_pose is dropped.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if attachments or a haptic handle use the tool.
 sinew_status sinew_tool_teleport(sinew_world *world, sinew_tool_id tool, const float *position,
-                                 const float *orientation);
+    const float *orientation);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

@@ -6,36 +6,29 @@
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 /// Coupling of a haptic device to a tool.
 /// Filled by sinew_haptic_def_init; read only during sinew_haptic_create.
 typedef struct sinew_haptic_def {
   size_t struct_size;       ///< Size of this struct; sinew_haptic_def_init sets it.
   sinew_tool_id tool;       ///< Tool that the device drives; no default.
-  /// [N/m] Coupling stiffness between device and tool, above 0; default 1000. A device is stable up
-  /// to about half of its damping [N s/m] divided by the tick time.
+  /// [N/m] Coupling stiffness between device and tool, above 0; default 1000. Stable up to about
+  /// half of the device's damping [N s/m] divided by the tick time.
   float stiffness;
   /// [N m/rad] Angular coupling stiffness; 0 (default): stiffness at half of the tool's length. It
   /// is at least 1e-6 of that value.
   float angular_stiffness;
-  /// Damping of the coupling while tissue resists, at least 0; 1 (default) is critical for
-  /// device_mass.
-  float damping_ratio;
+  float damping_ratio;  ///< Damping while tissue resists; 1 (default): critical for device_mass.
   float device_mass;        ///< [kg] Effective mass of the device, above 0; default 0.05.
-  /// [N] Largest force on the device, at least 0; infinity (default) or 0: unlimited.
-  float force_limit;
-  /// [N m] Largest torque on the device, at least 0; infinity (default) or 0: unlimited.
-  float torque_limit;
-  /// [N/s] Largest rate of change of the force, at least 0; infinity (default) or 0: unlimited. The
-  /// coupling is passive only while this limit is not reached.
+  float force_limit;  ///< [N] Largest force on the device; infinity (default) or 0: unlimited.
+  float torque_limit;  ///< [N m] Largest torque on the device; infinity (default) or 0: unlimited.
+  /// [N/s] Largest rate of change of the force; infinity (default) or 0: unlimited. The coupling is
+  /// passive only while this limit is not reached.
   float force_rate_limit;
-  /// [N m/s] Largest rate of change of the torque, at least 0; infinity (default) or 0: unlimited.
+  /// [N m/s] Largest rate of change of the torque; infinity (default) or 0: unlimited.
   float torque_rate_limit;
-  /// [s] Age at which the model is stale and the force fades to 0, above 0; default 0.1.
-  float stale_after;
+  float stale_after;  ///< [s] Age at which the model's force fades to 0, above 0; default 0.1.
   float ramp;               ///< [s] Duration of that fade, and of the return, above 0; default 0.1.
 } sinew_haptic_def;
 
@@ -46,43 +39,39 @@ sinew_status sinew_haptic_def_init(sinew_haptic_def *def, size_t struct_size);
 /// One thread at a time may use it, while other threads step or use the world.
 typedef struct sinew_haptic sinew_haptic;
 
-/// Creates a haptic handle that drives a tool.
-/// Destroy it with sinew_haptic_destroy. Until then sinew_tool_set_pose refuses the tool, and each
-/// step moves it to the latest proxy pose. The tool should start at the device's pose.
+/// Creates a haptic handle that drives a tool; destroy it with sinew_haptic_destroy.
+/// Until then sinew_tool_set_pose refuses the tool, and each step moves it to the latest proxy
+/// pose. The tool should start at the device's pose.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if another handle drives the tool.
 sinew_status sinew_haptic_create(sinew_world *world, const sinew_haptic_def *def,
-                                 sinew_haptic **out);
+    sinew_haptic **out);
 
 /// Destroys a haptic handle, before or after its world; NULL has no effect.
 /// The tool is then moved by sinew_tool_set_pose again.
 void sinew_haptic_destroy(sinew_haptic *haptic);
 
 /// Result of a haptic tick.
-typedef struct sinew_haptic_result {
-  size_t struct_size;          ///< Set to sizeof(sinew_haptic_result) before the call.
+typedef struct sinew_haptic_report {
+  size_t struct_size;          ///< Set to sizeof(sinew_haptic_report) before the call.
   float force[3];              ///< [N] Force on the device until the next tick, in world axes.
   float torque[3];             ///< [N m] Torque on the device about its position, in world axes.
-  /// [m] Position that the tool is driven to: the device minus the coupling extension.
-  float proxy_position[3];
+  float proxy_position[3];     ///< [m] Position that the tool is driven to, behind the device.
   float proxy_orientation[4];  ///< Orientation that the tool is driven to, x y z w.
   uint32_t contact_count;      ///< Number of contacts of the model; see sinew_haptic_get_contacts.
-  /// [s] Age of the model by tick time; infinity before the first model.
-  float age;
+  float age;  ///< [s] Age of the model by tick time; infinity before the first model.
   uint64_t version;            ///< Number of world steps published to this handle.
-  /// Fraction of the model's force that is applied; below 1 if the model is stale.
-  float gain;
+  float gain;                  ///< Fraction of the model's force that is applied; below 1 if stale.
   uint32_t is_over;            ///< 1: the tool or its world was destroyed.
-  /// [J] Energy that the coupling dissipated; kept at least 0 as far as damping can.
-  double lost;
-} sinew_haptic_result;
+  double lost;  ///< [J] Energy that the coupling dissipated, at least 0 as far as damping can.
+} sinew_haptic_report;
 
 /// Computes the force on the device from its current pose, without waiting, locking or allocating.
-/// `position` [m] is 3 floats; `orientation` is x y z w, nullable: unchanged. `velocity` [m/s] and
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged. `velocity` [m/s] and
 /// `angular_velocity` [rad/s] are 3 floats each in world axes, nullable: estimated. `dt` [s] is the
-/// time since the last tick, above 0, at most 1. After an error apply no force to the device.
+/// time since the last tick, above 0, at most 1. After an error apply no force.
 sinew_status sinew_haptic_tick(sinew_haptic *haptic, const float *position,
-                               const float *orientation, const float *velocity,
-                               const float *angular_velocity, float dt, sinew_haptic_result *out);
+    const float *orientation, const float *velocity, const float *angular_velocity, float dt,
+    sinew_haptic_report *out);
 
 /// Contact of the tool in the model of a haptic handle.
 typedef struct sinew_haptic_contact {
@@ -94,13 +83,11 @@ typedef struct sinew_haptic_contact {
 } sinew_haptic_contact;
 
 /// Writes the contacts of the model that the last tick used, without waiting.
-/// `contacts` receives at most `capacity` entries, `count` the number that exist, at most 32; with
-/// more, those with the largest force.
-sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic, sinew_haptic_contact *contacts,
-                                       size_t capacity, size_t *count);
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist, at most
+/// 32; with more, those with the largest force.
+sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic,
+    sinew_haptic_contact *out_contacts, size_t capacity, size_t *out_count);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

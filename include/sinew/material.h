@@ -7,9 +7,7 @@
 #include "base.h"
 #include "body.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 // ---- Tissue values ------------------------------------------------------------------------------
 
@@ -22,7 +20,6 @@ typedef struct sinew_material_preset {
   float shear_modulus;  ///< [Pa] Shear modulus as the source gives it.
   float young_modulus;  ///< [Pa] Young's modulus: 3 times the shear modulus (incompressible).
   float density;        ///< [kg/m^3] Mass density.
-  uint32_t reserved;    ///< Reserved; set to 0 by the library.
 } sinew_material_preset;
 
 /// Tissues with values from the literature.
@@ -43,58 +40,57 @@ sinew_status sinew_material_get_preset(uint32_t preset, sinew_material_preset *o
 // ---- Springs ------------------------------------------------------------------------------------
 
 /// Connects two nodes by a spring without damping.
-/// `stiffness` is in [N/m], `rest_length` in [m]; a negative rest length means the current
-/// distance.
+/// `stiffness` is in [N/m], `rest_length` in [m]; negative: the current distance.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the pair has a spring; SINEW_STATUS_CAPACITY if a node
 /// has no free slot (FAST_LINK).
 sinew_status sinew_body_add_spring(sinew_world *world, sinew_body_id body, uint32_t a, uint32_t b,
-                                   float stiffness, float rest_length);
+    float stiffness, float rest_length);
 
-/// Removes the spring between two nodes, with the elements and the bending of that edge.
-/// Elements are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the edge.
+/// Removes the spring between two nodes, and the tetrahedra and the bending that have this edge.
+/// The tetrahedra are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the
+/// edge.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if there is nothing between the nodes.
 sinew_status sinew_body_remove_spring(sinew_world *world, sinew_body_id body, uint32_t a,
-                                      uint32_t b);
+    uint32_t b);
 
 /// Writes the two nodes of each spring, each spring once, the lower node first.
-/// `pairs` receives 2 * count indices; `count` must be spring_count of
+/// `out_pairs` receives 2 * count indices; `count` is spring_count of
 /// sinew_body_get_storage_report. The order stays until springs are added or removed.
 sinew_status sinew_body_get_spring_pairs(const sinew_world *world, sinew_body_id body,
-                                         uint32_t *pairs, size_t count);
+    uint32_t *out_pairs, size_t count);
 
 /// Writes the stiffnesses and rest lengths of the springs between pairs of nodes.
-/// `pairs` holds 2 * count indices. `stiffnesses` [N/m] and `rest_lengths` [m] receive `count`
-/// floats each and are nullable. PACKED merges rest lengths that differ only by rounding.
+/// `pairs` holds 2 * count indices. `out_stiffnesses` [N/m] and `out_rest_lengths` [m] receive
+/// `count` floats each and are nullable.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 sinew_status sinew_body_get_springs(const sinew_world *world, sinew_body_id body,
-                                    const uint32_t *pairs, size_t count, float *stiffnesses,
-                                    float *rest_lengths);
+    const uint32_t *pairs, size_t count, float *out_stiffnesses, float *out_rest_lengths);
 
 /// Sets stiffnesses, rest lengths or both of the springs between pairs of nodes.
-/// `pairs` holds 2 * count indices, the arrays `count` floats each: `stiffnesses` [N/m],
-/// `rest_lengths` [m], both nullable: unchanged. If a pair repeats, its last entry counts. Damping,
-/// force law, positions and velocities stay. On failure no spring changes.
+/// `pairs` holds 2 * count indices, `stiffnesses` [N/m] and `rest_lengths` [m] `count` floats each,
+/// nullable: unchanged. If a pair repeats, its last entry counts. Damping, force law and motion
+/// stay.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 sinew_status sinew_body_set_springs(sinew_world *world, sinew_body_id body, const uint32_t *pairs,
-                                    size_t count, const float *stiffnesses,
-                                    const float *rest_lengths);
+    const float *stiffnesses, const float *rest_lengths, size_t count);
 
 /// Multiplies the stiffness and the rest length of the material between given nodes.
 /// It changes springs, tetrahedra, bending and fibers whose nodes are all among `nodes`, which may
-/// repeat; anchor springs change only their stiffness. `stiffness_factor` is at least 0, where 0 is
-/// permanent; `length_factor` is above 0. Repeated calls multiply. Masses, damping, positions and
-/// velocities stay. On failure nothing changes.
+/// repeat, and the stiffness of anchor springs. `stiffness_factor` is at least 0, where 0 is
+/// permanent; `length_factor` is above 0. Masses, damping and motion stay.
 sinew_status sinew_body_scale_region(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     size_t node_count, float stiffness_factor,
-                                     float length_factor);
+    size_t node_count, float stiffness_factor, float length_factor);
 
 // ---- Cavities -----------------------------------------------------------------------------------
 
-/// Sets the overpressure of the cavities at rest volume from the next step on.
-/// `pressure` is in [Pa]; see sinew_body_def. Open cavities stay without pressure.
+/// Sets the overpressure [Pa] of the cavities at rest volume from the next step on.
+/// Open cavities stay without pressure.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body was created with neither pressure nor
 /// enclosed_stiffness.
 sinew_status sinew_body_set_pressure(sinew_world *world, sinew_body_id body, float pressure);
+
+/// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
+sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
 
 /// Sums over the closed cavities of a body; all 0 without enclosed_stiffness and pressure.
 typedef struct sinew_enclosed_report {
@@ -107,47 +103,40 @@ typedef struct sinew_enclosed_report {
 
 /// Writes the volume and the pressure of the cavities of a body.
 sinew_status sinew_body_get_enclosed_report(const sinew_world *world, sinew_body_id body,
-                                            sinew_enclosed_report *out);
+    sinew_enclosed_report *out);
 
 // ---- Static equilibrium -------------------------------------------------------------------------
 
-/// Settings of the search for static equilibrium, filled by sinew_rest_state_def_init.
-typedef struct sinew_rest_state_def {
-  size_t struct_size;   ///< Size of this struct; sinew_rest_state_def_init sets it.
-  /// [m] Estimated position error allowed; 0 (default): 1e-6 of the body's extent.
-  float tolerance;
+/// Settings of the search for static equilibrium, filled by sinew_equilibrium_def_init.
+typedef struct sinew_equilibrium_def {
+  size_t struct_size;   ///< Size of this struct; sinew_equilibrium_def_init sets it.
+  float tolerance;      ///< [m] Estimated position error allowed; 0: 1e-6 of the body's extent.
   uint32_t iterations;  ///< Largest number of matrix-vector products; 0 (default): 1,000,000.
-} sinew_rest_state_def;
+} sinew_equilibrium_def;
 
-/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_rest_state_def).
-sinew_status sinew_rest_state_def_init(sinew_rest_state_def *def, size_t struct_size);
+/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_equilibrium_def).
+sinew_status sinew_equilibrium_def_init(sinew_equilibrium_def *def, size_t struct_size);
 
 /// Report of the search for static equilibrium.
-typedef struct sinew_rest_state_report {
-  size_t struct_size;    ///< Set to sizeof(sinew_rest_state_report) before the call.
+typedef struct sinew_equilibrium_report {
+  size_t struct_size;    ///< Set to sizeof(sinew_equilibrium_report) before the call.
   uint32_t iterations;   ///< Number of linear systems solved.
   uint32_t products;     ///< Number of matrix-vector products.
-  /// [N] Largest force left on a free node, before positions are rounded to float.
-  double residual;
-  double error;          ///< [m] Estimated position error, before positions are rounded to float.
-  /// [J] Energy of springs, gravity and forces before the search, 0 at the origin.
-  double energy_before;
+  double residual;       ///< [N] Largest force left on a free node, before positions become floats.
+  double error;          ///< [m] Estimated position error, before positions become floats.
+  double energy_before;  ///< [J] Energy of springs, gravity and forces before the search.
   double energy_after;   ///< [J] Energy of springs, gravity and forces after the search.
-} sinew_rest_state_report;
+} sinew_equilibrium_report;
 
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
-/// It is not a step: it allocates and may take seconds. It ignores tools. Velocities become 0,
-/// pending forces stay. The rigid position of unpinned parts is unspecified. `def` (defaults) and
-/// `report` are nullable. It ends the views of the body's positions and velocities. On failure
-/// nothing changes.
+/// It may take seconds, ignores tools and ends views. Velocities become 0, pending forces stay.
+/// `def` (defaults) and `out_report` are nullable. The rigid position of unpinned parts is
+/// unspecified.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part;
 /// SINEW_STATUS_UNSTABLE if not found.
-sinew_status sinew_body_rest_state(sinew_world *world, sinew_body_id body,
-                                   const sinew_rest_state_def *def,
-                                   sinew_rest_state_report *report);
+sinew_status sinew_body_solve_equilibrium(sinew_world *world, sinew_body_id body,
+    const sinew_equilibrium_def *def, sinew_equilibrium_report *out_report);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

@@ -10,9 +10,7 @@
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 // ---- Creation -----------------------------------------------------------------------------------
 
@@ -25,8 +23,7 @@ typedef enum sinew_mesh_format {
   SINEW_MESH_FORMAT_AUTO = 0,   ///< By file name: .obj .stl .vtk .msh .node .ele.
   SINEW_MESH_FORMAT_OBJ = 1,    ///< Wavefront OBJ.
   SINEW_MESH_FORMAT_STL = 2,    ///< STL, binary or ASCII.
-  /// VTK legacy: unstructured grid or polygonal data, ASCII or binary.
-  SINEW_MESH_FORMAT_VTK = 3,
+  SINEW_MESH_FORMAT_VTK = 3,  ///< VTK legacy, ASCII or binary: unstructured grid or polygonal data.
   SINEW_MESH_FORMAT_GMSH = 4,   ///< Gmsh 1, 2 and 4.1, ASCII.
   SINEW_MESH_FORMAT_TETGEN = 5  ///< TetGen .node and .ele with the same base name; name either.
 } sinew_mesh_format;
@@ -35,12 +32,11 @@ typedef enum sinew_mesh_format {
 /// It welds coincident vertices, drops degenerate and duplicate elements and unused vertices, and
 /// corrects inverted tetrahedra. `path` is UTF-8, `format` a sinew_mesh_format value, `scale` [m]
 /// the length of one file unit, above 0.
-/// Errors: SINEW_STATUS_IO if the file is missing or malformed; the message names the line or byte.
+/// Errors: SINEW_STATUS_IO for a missing or malformed file; the message names the line or byte.
 sinew_status sinew_mesh_load(const char *path, uint32_t format, float scale, sinew_mesh **out);
 
 /// Creates a cloth of triangles in the plane y = 0, centered at the origin, with normals along +y.
-/// `size` [m] holds the 2 extents along x and z, above 0; `cells` the 2 cell counts, at least 1, of
-/// two triangles each.
+/// `size` [m] holds the extents along x and z, above 0; `cells` the 2 counts of squares, above 0.
 sinew_status sinew_mesh_create_cloth(const float *size, const uint32_t *cells, sinew_mesh **out);
 
 /// Creates a box of tetrahedra, centered at the origin.
@@ -55,6 +51,18 @@ sinew_status sinew_mesh_create_lattice(float edge, const uint32_t *cells, sinew_
 /// `length` [m] is its extent along x and `spacing` [m] the node spacing, both above 0.
 sinew_status sinew_mesh_create_organ(float length, float spacing, sinew_mesh **out);
 
+/// Creates a mesh from arrays and cleans it like sinew_mesh_load.
+/// `positions` [m] holds 3 * node_count floats, `triangles` 3 * triangle_count and `tetrahedra` 4 *
+/// tetrahedron_count node indices. node_of_vertex of sinew_mesh_view maps the given nodes.
+sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
+    size_t triangle_count, const uint32_t *tetrahedra, size_t tetrahedron_count, sinew_mesh **out);
+
+/// Creates a mesh of tetrahedra that fills the closed surface of a mesh.
+/// `spacing` [m] is the mean edge length. The result is that of sinew_body_create_from_surface.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` too fine
+/// or too coarse.
+sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, sinew_mesh **out);
+
 /// Destroys a mesh and ends its views; NULL has no effect.
 void sinew_mesh_destroy(sinew_mesh *mesh);
 
@@ -68,38 +76,29 @@ typedef struct sinew_mesh_view {
   size_t struct_size;              ///< Set to sizeof(sinew_mesh_view) before the call.
   const float *positions;          ///< [m] 3 * node_count floats.
   size_t node_count;               ///< Number of nodes; every node is used.
-  /// 3 * triangle_count node indices: the triangles of the file or shape.
-  const uint32_t *triangles;
+  const uint32_t *triangles;  ///< 3 * triangle_count node indices: triangles of the file or shape.
   size_t triangle_count;           ///< Number of triangles.
   const uint32_t *tetrahedra;      ///< 4 * tetrahedron_count node indices, of positive volume.
   size_t tetrahedron_count;        ///< Number of tetrahedra.
-  /// 3 * surface_triangle_count node indices, outward. The boundary of the tetrahedra or cells;
-  /// without them the triangles.
+  /// 3 * surface_triangle_count node indices, outward: the boundary of the tetrahedra or cells, if
+  /// any, else the triangles.
   const uint32_t *surface;
   size_t surface_triangle_count;   ///< Number of surface triangles.
-  /// vertex_count node indices: the node of each vertex of the file, or SINEW_NO_NODE.
-  const uint32_t *node_of_vertex;
+  const uint32_t *node_of_vertex;  ///< vertex_count nodes, one of each vertex, or SINEW_NO_NODE.
   size_t vertex_count;             ///< Number of vertices in the file; for a shape its nodes.
   size_t welded_vertices;          ///< Number of vertices merged into an earlier one.
   size_t dropped_vertices;         ///< Number of unused vertices dropped.
   size_t dropped_triangles;        ///< Number of degenerate or duplicate triangles dropped.
   size_t dropped_tetrahedra;       ///< Number of degenerate or duplicate tetrahedra dropped.
-  /// Number of inverted tetrahedra corrected by swapping two nodes.
-  size_t flipped_tetrahedra;
-  /// 1: every surface edge is used equally often in both directions; 0: open.
-  uint32_t closed;
-  uint32_t reserved;               ///< Reserved; set to 0 by the library.
-  /// 8 * cell_count node indices of lattice cubes; corner bits: x 1, y 2, z 4.
-  const uint32_t *cells;
+  size_t flipped_tetrahedra;       ///< Number of inverted tetrahedra corrected.
+  uint32_t closed;  ///< 1: every surface edge is used equally often in both directions; 0: open.
+  const uint32_t *cells;  ///< 8 * cell_count node indices of cubes; corner bits: x 1, y 2, z 4.
   size_t cell_count;               ///< Number of cells.
 } sinew_mesh_view;
 
-/// Writes a view of the contents of a mesh without copying.
-/// Lifetime: until the mesh is destroyed.
+/// Writes a view of the contents of a mesh, which ends with the mesh.
 sinew_status sinew_mesh_get_view(const sinew_mesh *mesh, sinew_mesh_view *out);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

@@ -6,48 +6,40 @@
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 // ---- Surface points -----------------------------------------------------------------------------
 
 /// Point on the surface of a body.
 typedef struct sinew_surface_point {
   size_t struct_size;  ///< Set to sizeof(sinew_surface_point) before the call.
-  sinew_body_id body;  ///< Body of the point; all zero if nothing was found, and the rest is 0.
+  sinew_body_id body;  ///< Body of the point; all zero if none was found.
   uint32_t triangle;   ///< Index of the triangle in the body's surface.
   float weights[3];    ///< Weights of the triangle's corners, with sum 1.
   float position[3];   ///< [m] Position of the point.
   float normal[3];     ///< Outward unit normal of the triangle; 0 if it has no area.
   float distance;      ///< [m] Distance from the query point.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
 } sinew_surface_point;
 
-/// Finds the first body surface point that a ray hits.
-/// `origin` [m] and `direction` are 3 floats each; the direction may have any length but 0.
-/// `max_distance` [m] is at least 0. Without a hit out->body is all zero. A triangle parallel to
-/// the ray is not hit. The first query near a body builds a tree, which may allocate; nodes that
-/// moved refit it.
+/// Finds the first body surface point that a ray hits; without one out->body is all zero.
+/// `origin` [m] and `direction`, of any length but 0, are 3 floats each; `max_distance` [m] is at
+/// least 0. A triangle parallel to the ray is not hit. The first query near a body may allocate.
 sinew_status sinew_world_cast_ray(const sinew_world *world, const float *origin,
-                                  const float *direction, float max_distance,
-                                  sinew_surface_point *out);
+    const float *direction, float max_distance, sinew_surface_point *out);
 
-/// Finds the body surface point that is nearest to a point.
-/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. If no surface is within it out->body
-/// is all zero. It uses the trees of sinew_world_cast_ray.
+/// Finds the body surface point nearest to a point; without one out->body is all zero.
+/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. The first query may allocate.
 sinew_status sinew_world_find_nearest(const sinew_world *world, const float *point,
-                                      float max_distance, sinew_surface_point *out);
+    float max_distance, sinew_surface_point *out);
 
 // ---- Overlap ------------------------------------------------------------------------------------
 
 /// Contents of the images of a detector.
 typedef enum sinew_image_form {
-  /// Intervals of each pixel's ray inside a body; finds every edge, and points deeper than 0.71
-  /// pixels.
+  /// Intervals of rays inside; finds all edges, points deeper than 0.71 pixels.
   SINEW_IMAGE_FORM_INTERVALS = 0,
-  /// CInDeR (Halic et al., section 2.1): edges in a depth buffer, faces in front counted; for
-  /// comparison. Of edges that share a pixel only the nearest is found. No points and no volume.
+  /// CInDeR (Halic et al.): edges in a depth buffer, faces in front counted; for comparison. Of
+  /// edges that share a pixel only the nearest is found. No points, no volume.
   SINEW_IMAGE_FORM_COUNTED = 1
 } sinew_image_form;
 
@@ -55,18 +47,14 @@ typedef enum sinew_image_form {
 /// Filled by sinew_detector_def_init; read only during sinew_detector_create.
 typedef struct sinew_detector_def {
   size_t struct_size;       ///< Size of this struct; sinew_detector_def_init sets it.
-  /// First and second body with surfaces, at least one of them closed; no default.
-  sinew_body_id bodies[2];
-  /// SINEW_DETECTION_EXACT (default) or IMAGE_SPACE. EXACT ignores the other settings, but
-  /// thickness must be 0. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
+  sinew_body_id bodies[2];  ///< First and second body with surfaces, one of them at least closed.
+  /// SINEW_DETECTION_EXACT (default), where only `bodies` count, or IMAGE_SPACE. thickness must be
+  /// 0 with EXACT. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
   uint32_t detection;
-  /// IMAGE_SPACE: a sinew_image_form value; default SINEW_IMAGE_FORM_INTERVALS.
-  uint32_t form;
-  /// [m] IMAGE_SPACE: pixel size, above 0; no default. 1/256 of the body finds 99.9 % of edges.
-  float pixel;
-  /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes in turn. Depths are
-  /// measured along the view. They exceed the shortest distance by about 2 % of the size with three
-  /// axes and by about 6 % with one.
+  uint32_t form;            ///< IMAGE_SPACE: a sinew_image_form value; default INTERVALS.
+  float pixel;  ///< [m] IMAGE_SPACE: pixel size, above 0. 1/256 of the body finds 99.9 % of edges.
+  /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes. Depths along the
+  /// view exceed the shortest distance by about 2 % of the size with three axes, by 6 % with one.
   float direction[3];
   /// IMAGE_SPACE: capacity of an image in pixels, 1 to 2^24; default 2^18. If it is too small, the
   /// pixel size doubles until the image fits.
@@ -74,26 +62,24 @@ typedef struct sinew_detector_def {
   /// INTERVALS: capacity of ray-face crossings per body and image, at least 1; default 2^20. If it
   /// is too small, the pixel size doubles. The default capacities take about 18 MB.
   uint32_t crossings;
-  /// [m] IMAGE_SPACE: added thickness of each body along the view, at least 0; default 0 0. It
-  /// keeps thin parts from being missed, and adds to depths and volume.
+  /// [m] IMAGE_SPACE: thickness added along the view, so that thin parts are found.
   float thickness[2];
 } sinew_detector_def;
 
 /// Fills a detector definition with its defaults; `struct_size` is sizeof(sinew_detector_def).
 sinew_status sinew_detector_def_init(sinew_detector_def *def, size_t struct_size);
 
-/// Detector of the overlap of two bodies; it applies no forces.
-/// The caller owns it; it may outlive its world. Any number of threads may use a `const
-/// sinew_detector *` at the same time; a `sinew_detector *` needs exclusive access.
+/// Detector of the overlap of two bodies; it applies no forces and may outlive its world.
+/// Any number of threads may use a `const sinew_detector *` at the same time; a `sinew_detector *`
+/// needs exclusive access.
 typedef struct sinew_detector sinew_detector;
 
 /// Creates a detector for two bodies and allocates its memory, without a first search.
 /// Destroy it with sinew_detector_destroy.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bodies are the same, one has no surface, or both
 /// are open; with EXACT also if a closed surface is inverted, self-intersecting or degenerate.
-/// SINEW_STATUS_UNSUPPORTED for SINEW_DETECTION_DISTANCE_FIELD.
 sinew_status sinew_detector_create(const sinew_world *world, const sinew_detector_def *def,
-                                   sinew_detector **out);
+    sinew_detector **out);
 
 /// Destroys a detector and ends its lists and views; NULL has no effect.
 void sinew_detector_destroy(sinew_detector *detector);
@@ -101,50 +87,39 @@ void sinew_detector_destroy(sinew_detector *detector);
 /// Overlap that a detector found; index 0 is the first body, 1 the second.
 typedef struct sinew_detector_report {
   size_t struct_size;        ///< Set to sizeof(sinew_detector_report) before the call.
-  /// [m^3] INTERVALS: overlap volume, mean over the views; 0 with an open body, COUNTED or EXACT.
-  double volume;
-  /// Unit direction that moves the first body out of the second fastest; 0 without volume.
-  float normal[3];
+  double volume;  ///< [m^3] INTERVALS: overlap volume, mean over the views; 0 with an open body.
+  float normal[3];  ///< Unit direction that moves the first body out fastest; 0 without volume.
   float depth;               ///< [m] Linear estimate of the distance to move it.
   float pixel;               ///< [m] Largest pixel size used; 0 with EXACT.
   uint32_t point_counts[2];  ///< Number of entries of sinew_detector_get_points.
   uint32_t edge_counts[2];   ///< Number of entries of sinew_detector_get_edges.
-  /// Number of edge parts beyond the capacity of four per edge on average.
-  uint32_t unlisted[2];
-  /// 1: the body is closed; 0: it is open, and nothing is found inside it. A detector made for an
-  /// open body does not check again.
-  uint32_t closed[2];
-  uint32_t reserved;         ///< Reserved; set to 0 by the library.
+  uint32_t unlisted[2];      ///< Number of edge parts beyond four per edge on average.
+  uint32_t closed[2];  ///< 1: closed; 0: open, and nothing is found inside; not checked again.
 } sinew_detector_report;
 
 /// Finds the overlap of the two bodies at their current positions.
-/// You may pass another world, such as a loaded snapshot, if both ids refer there to bodies with
-/// identical surfaces. An open body reports only edges (EXACT: also points). Image space does not
-/// allocate. On failure the previous result stays.
+/// You may pass another world if both ids refer there to bodies with identical surfaces. An open
+/// body reports only edges (EXACT: also points). Image space does not allocate.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface;
 /// SINEW_STATUS_CAPACITY if one ray has more than `crossings`.
 sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,
-                                 sinew_detector_report *report);
+    sinew_detector_report *out_report);
 
 #define SINEW_NO_TRIANGLE UINT32_MAX  ///< Value of `triangle` if there is none.
 
 /// Node of a body that lies inside the other body.
 typedef struct sinew_point_inside {
   uint32_t node;      ///< Index of the node.
-  /// IMAGE_SPACE: triangle of the other surface where the node would leave; EXACT:
-  /// SINEW_NO_TRIANGLE.
-  uint32_t triangle;
-  /// [m] IMAGE_SPACE: shortest distance out along the views; EXACT: distance to the surface.
-  float depth;
+  uint32_t triangle;  ///< IMAGE_SPACE: triangle to leave through; EXACT: SINEW_NO_TRIANGLE.
+  float depth;  ///< [m] IMAGE_SPACE: shortest distance out along the views; EXACT: to the surface.
   float normal[3];    ///< EXACT: unit direction of the shortest distance out; IMAGE_SPACE: 0.
 } sinew_point_inside;
 
 /// Writes the list of nodes of one body that lie inside the other, in ascending order.
-/// `side` 0 is the first body, 1 the second. The list is empty before the first search and with
-/// COUNTED.
+/// `side` 0 is the first body, 1 the second. It is empty before the first search and with COUNTED.
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
 sinew_status sinew_detector_get_points(const sinew_detector *detector, uint32_t side,
-                                       const sinew_point_inside **points, size_t *count);
+    const sinew_point_inside **out_points, size_t *out_count);
 
 /// Part of an edge of a body that lies inside the other body.
 typedef struct sinew_edge_inside {
@@ -156,22 +131,17 @@ typedef struct sinew_edge_inside {
   float depth;
 } sinew_edge_inside;
 
-/// Writes the list of surface edge parts of one body that lie inside the other.
-/// `side` 0 is the first body, 1 the second. The list is ordered by edge and along it, and empty
-/// before the first search.
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
+/// Writes the list of surface edge parts of one body that lie inside the other, by edge.
+/// `side` and lifetime are as for sinew_detector_get_points. It is empty before the first search.
 sinew_status sinew_detector_get_edges(const sinew_detector *detector, uint32_t side,
-                                      const sinew_edge_inside **edges, size_t *count);
+    const sinew_edge_inside **out_edges, size_t *out_count);
 
 /// Writes a view of the gradient [m^2] of the overlap volume at each node of one body.
-/// `side` 0 is the first body, 1 the second. Moving the nodes against it separates the bodies. It
-/// is empty before the first search, with COUNTED or EXACT, and if a body is open.
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
+/// Moving the nodes against it separates the bodies. It is empty with COUNTED, EXACT or an open
+/// body. `side` and lifetime are as for sinew_detector_get_points.
 sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_t side,
-                                         sinew_dvec3_view *out);
+    sinew_dvec3_view *out);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

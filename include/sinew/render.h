@@ -7,9 +7,7 @@
 #include "base.h"
 #include "body.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 // ---- Render surfaces ----------------------------------------------------------------------------
 
@@ -17,15 +15,13 @@ extern "C" {
 /// Filled by sinew_embedding_def_init; read only during sinew_embedding_create.
 typedef struct sinew_embedding_def {
   size_t struct_size;          ///< Size of this struct; sinew_embedding_def_init sets it.
-  /// [m] 3 * vertex_count floats for the body's current positions, within 1e9; no default.
-  const float *vertices;
+  const float *vertices;       ///< [m] 3 * vertex_count floats for the body's current positions.
   size_t vertex_count;         ///< Number of vertices, at least 1.
-  /// 3 * triangle_count vertex indices, outward, for the normals; nullable: no normals.
-  const uint32_t *triangles;
+  const uint32_t *triangles;  ///< 3 * triangle_count vertex indices, outward; nullable: no normals.
   size_t triangle_count;       ///< Number of triangles.
   /// 4 * tetrahedron_count nodes: the body's tetrahedra at its creation; nullable. Each vertex
-  /// keeps its barycentric weights in the nearest one; a cut body uses its current tetrahedra. NULL
-  /// binds each vertex to the nearest surface triangle, at a constant distance.
+  /// keeps its weights in the nearest one, or, with NULL, its distance to the nearest surface
+  /// triangle. A cut body uses its current tetrahedra.
   const uint32_t *tetrahedra;
   size_t tetrahedron_count;    ///< Number of tetrahedra.
 } sinew_embedding_def;
@@ -38,57 +34,50 @@ sinew_status sinew_embedding_def_init(sinew_embedding_def *def, size_t struct_si
 typedef struct sinew_embedding sinew_embedding;
 
 /// Creates an embedding: binds a render surface to a body at its current positions.
-/// It copies everything that `def` points to, and costs about as much as 100 updates. Destroy it
-/// with sinew_embedding_destroy, before or after the body and its world.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if no tetrahedron has a volume, or the body has no
-/// surface.
+/// It copies what `def` points to, and costs about 100 updates. Destroy it with
+/// sinew_embedding_destroy, before or after the body and its world.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if no tetrahedron has a volume, or without a surface.
 sinew_status sinew_embedding_create(const sinew_world *world, sinew_body_id body,
-                                    const sinew_embedding_def *def, sinew_embedding **out);
+    const sinew_embedding_def *def, sinew_embedding **out);
 
 /// Destroys an embedding and ends its views; NULL has no effect.
 void sinew_embedding_destroy(sinew_embedding *embedding);
 
 /// Moves the vertices of an embedding to the body's current positions.
-/// It allocates only after a cut or tear; then vertices follow their side, and triangles across the
-/// cut are dropped from sinew_embedding_get_triangles. On failure the vertices stay.
+/// After a cut or tear it allocates; vertices then follow their side, and triangles across the cut
+/// are dropped.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the nodes are not those it is bound to;
-/// SINEW_STATUS_UNSUPPORTED if the body was cut, and it is bound to triangles or to part of the
-/// tetrahedra.
+/// SINEW_STATUS_UNSUPPORTED for a cut body, if it is bound to triangles or some of the tetrahedra.
 sinew_status sinew_embedding_update(sinew_embedding *embedding, const sinew_world *world);
 
-/// Moves the vertices of an embedding to given node positions, such as those of a reader's frame.
-/// `positions` [m] holds 3 * node_count packed floats. It does not use the world, so it may run
-/// beside a step.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body had another number of nodes at the last
-/// sinew_embedding_update.
+/// Moves the vertices of an embedding to node positions [m], 3 * node_count packed floats.
+/// They are, for example, those of a reader's frame. It may run beside a step.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT for another number of nodes than at the last update.
 sinew_status sinew_embedding_update_from(sinew_embedding *embedding, const float *positions,
-                                         size_t node_count);
+    size_t node_count);
 
-/// Writes a view of the vertex positions [m], in the given order.
-/// Lifetime: until the embedding is destroyed; updates change its contents.
+/// Writes a view of the vertex positions [m], which updates change.
+/// Lifetime: until the embedding is destroyed.
 sinew_status sinew_embedding_get_positions(const sinew_embedding *embedding, sinew_vec3_view *out);
 
 /// Writes a view of the triangles, in the given order, without those across a cut.
 /// Lifetime: until the first update after the next cut, or the embedding's destruction.
 sinew_status sinew_embedding_get_triangles(const sinew_embedding *embedding,
-                                           sinew_triangle_view *out);
+    sinew_triangle_view *out);
 
 /// Computes the unit vertex normals if needed, and writes a view of them.
 /// They are area-weighted and point outward; 0 without area. The view is empty without triangles.
-/// It needs exclusive access. Lifetime: until the embedding is destroyed; the next call after an
-/// update changes them.
+/// Lifetime: until the embedding is destroyed; the next call after an update changes them.
 sinew_status sinew_embedding_get_normals(sinew_embedding *embedding, sinew_vec3_view *out);
 
 /// Creates a body of tetrahedra that fills a closed surface, and binds the surface to it.
 /// positions and triangles of `def` are the surface, outward; vertices may repeat. `spacing` [m] is
-/// the mean edge length. Features thinner than about half of it are lost. The rest of `def` is as
-/// for sinew_body_create, with one value for all nodes. `out_embedding` is nullable; the caller
-/// destroys it.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` is too fine
-/// or too coarse, or elements, springs, rest positions or lists of values are given.
+/// the mean edge length; features thinner than half of it are lost. `out_embedding` is nullable;
+/// the caller destroys it.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` too fine or
+/// too coarse, or `def` lists elements, springs or values.
 sinew_status sinew_body_create_from_surface(sinew_world *world, const sinew_body_def *def,
-                                            float spacing, sinew_body_id *out_body,
-                                            sinew_embedding **out_embedding);
+    float spacing, sinew_body_id *out_body, sinew_embedding **out_embedding);
 
 // ---- Readers ------------------------------------------------------------------------------------
 
@@ -97,10 +86,9 @@ sinew_status sinew_body_create_from_surface(sinew_world *world, const sinew_body
 /// body and the world. Create one reader per reading thread.
 typedef struct sinew_reader sinew_reader;
 
-/// Creates a reader of a body.
-/// Destroy it with sinew_reader_destroy. Each successful step and each change between steps is
-/// published to it; an incomplete step never is. A body with readers keeps two copies of its
-/// positions more than it has readers.
+/// Creates a reader of a body; destroy it with sinew_reader_destroy.
+/// Each successful step and each change between steps is published to it. A body with readers keeps
+/// two copies of its positions more than it has readers.
 /// Errors: SINEW_STATUS_CAPACITY if the body has 126 readers.
 sinew_status sinew_reader_create(sinew_world *world, sinew_body_id body, sinew_reader **out);
 
@@ -112,25 +100,19 @@ void sinew_reader_destroy(sinew_reader *reader);
 typedef struct sinew_frame {
   size_t struct_size;             ///< Set to sizeof(sinew_frame) before the call.
   sinew_vec3_view positions;      ///< [m] Node positions, with the nodes added by cuts.
-  /// Triangles of sinew_body_get_triangles; they change only with topology_version.
-  sinew_triangle_view triangles;
-  /// Number of the frame; larger than before if the body was moved.
-  uint64_t version;
+  sinew_triangle_view triangles;  ///< Triangles of the body, which change with topology_version.
+  uint64_t version;  ///< Number of the frame; larger than before if the body was moved.
   uint64_t topology_version;      ///< Version of sinew_body_get_topology_changes at that moment.
   uint64_t step;                  ///< Number of steps that the world had taken.
   double time;                    ///< [s] Sum of the lengths of these steps.
   uint32_t is_new;                ///< 1: this reader did not read this frame before.
-  /// 1: the body or its world was destroyed, and this is its last frame.
-  uint32_t is_over;
+  uint32_t is_over;  ///< 1: the body or its world was destroyed; this is its last frame.
 } sinew_frame;
 
 /// Writes the latest frame of the body without copying, allocating, locking or waiting.
-/// It returns the same frame again if there is no newer one. It ends the views of the previous
-/// frame.
+/// Without a newer one it is the same again. It ends the views of the previous frame.
 sinew_status sinew_reader_read(sinew_reader *reader, sinew_frame *out);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

@@ -9,12 +9,12 @@
 #define SINEW_BODY_H
 #define SINEW_TOOL_H
 #define SINEW_MATERIAL_H
+#define SINEW_QUERY_H
 #define SINEW_ATTACHMENT_H
 #define SINEW_CUTTING_H
 #define SINEW_HAPTICS_H
 #define SINEW_DYNAMICS_H
 #define SINEW_RENDER_H
-#define SINEW_QUERY_H
 #define SINEW_MORE_H
 #define SINEW_SNAPSHOT_H
 #define SINEW_DIAGNOSTICS_H
@@ -38,7 +38,7 @@ extern "C" {
 // lists only errors that are special. Every call may return
 //   SINEW_STATUS_INVALID_ARGUMENT for NULL where a comment does not say "nullable", NaN or infinity
 //     where a comment does not allow it, an index out of range, an unknown enum value, a negative
-//     mass or stiffness, a reserved field that is not 0, or an unknown struct_size;
+//     mass or stiffness, a field `reserved` that is not 0, or an unknown struct_size;
 //   SINEW_STATUS_STALE_ID for the id of a destroyed object;
 //   SINEW_STATUS_OUT_OF_MEMORY if it allocates;
 //   SINEW_STATUS_INTERNAL after a fault inside the library.
@@ -49,6 +49,11 @@ extern "C" {
 // struct_size: call the _init function of a definition (a _def struct). In a struct that the
 // library fills, set struct_size to sizeof the struct before the call. A struct_size that no header
 // gave the struct, such as 0, is refused.
+//
+// Values: a number of a definition is at least 0, and 0 by default, unless its comment says
+// otherwise. An orientation is not zero; the library normalizes it. Coordinates of tools and blades
+// are within 1e9 m. A node_count beside a body must be its number of nodes. Two objects collide if
+// each has a collision category in the mask of the other.
 //
 // Threads: any number of threads may use a const sinew_world * at the same time. A sinew_world *
 // needs exclusive access to that world. Worlds are independent of each other. Readers and haptic
@@ -79,13 +84,10 @@ typedef enum sinew_status_code {
   SINEW_STATUS_STALE_ID = 2,          ///< The id refers to a destroyed object, or to none.
   SINEW_STATUS_CAPACITY = 3,          ///< A storage of fixed capacity is full.
   SINEW_STATUS_OUT_OF_MEMORY = 4,     ///< Memory could not be allocated; nothing changed.
-  /// The step or the equilibrium failed: nothing moved, forces and poses stay pending.
-  SINEW_STATUS_UNSTABLE = 5,
-  /// The request is valid, but this build or combination does not offer it.
-  SINEW_STATUS_UNSUPPORTED = 6,
+  SINEW_STATUS_UNSTABLE = 5,  ///< Step or equilibrium failed: nothing moved; forces and poses stay.
+  SINEW_STATUS_UNSUPPORTED = 6,       ///< Valid, but this build or combination does not offer it.
   SINEW_STATUS_IO = 7,                ///< A file could not be read or written.
-  /// Fault inside the library; the world then accepts only sinew_world_destroy.
-  SINEW_STATUS_INTERNAL = 8
+  SINEW_STATUS_INTERNAL = 8  ///< Fault in the library; the world accepts only sinew_world_destroy.
 } sinew_status_code;
 
 /// Result of every function that can fail: a sinew_status_code value.
@@ -170,10 +172,9 @@ typedef enum sinew_detection {
 typedef void (*sinew_task)(void *task_data, uint32_t index);
 
 /// Callback that runs the tasks of a step on a job system.
-/// Call task(task_data, index) once for every index from 0 to count - 1, on any threads and in any
-/// order. Return when all these calls have returned; returning earlier is not detected. Start no
-/// more tasks at once than there are free cores. The callback runs inside sinew_world_step and must
-/// not use the world.
+/// Call task(task_data, index) once for every index from 0 to count - 1, on any threads, in any
+/// order, and return when all have returned. Start no more tasks at once than there are free cores.
+/// The callback runs inside sinew_world_step and must not use the world.
 typedef void (*sinew_run_tasks)(void *context, sinew_task task, void *task_data, uint32_t count);
 
 /// SIMD level of the kernels that step springs and nodes.
@@ -189,36 +190,32 @@ typedef enum sinew_kernel {
 typedef struct sinew_world_def {
   size_t struct_size;         ///< Size of this struct; sinew_world_def_init sets it.
   float gravity[3];           ///< [m/s^2] Acceleration of all nodes; default 0 -9.81 0.
-  /// Threads of a step, at most 256: 1 (default) uses the calling thread, 0 one thread per core.
-  /// The results do not depend on it. The world owns its threads; they sleep between steps.
+  /// Threads of a step, at most 256: 1 (default) is the caller's, 0 is one per core. Results do not
+  /// depend on it. The world's own threads sleep between steps.
   uint32_t thread_count;
   /// Substeps per step: 0 (default) takes as many as stability needs; n takes exactly n. IMPLICIT
   /// and NEWTON take at most 1 ms near a tool and at most 0.25 ms while attached to another body,
   /// and subdivide a substep that gains energy; at most 4096 substeps in total.
   uint32_t substeps;
-  /// Largest number of substeps per step, at least 1; default 1000. A step that needs more returns
-  /// SINEW_STATUS_UNSTABLE. The subdivisions of IMPLICIT and NEWTON have their own limit of 4096: a
-  /// step beyond it (4 s near a tool, 1 s while attached) is unstable too.
+  /// Largest number of substeps per step, at least 1; default 1000. Beyond it a step is
+  /// SINEW_STATUS_UNSTABLE. The limit of 4096 of IMPLICIT and NEWTON makes a step of 4 s near a
+  /// tool, or of 1 s while attached, unstable too.
   uint32_t max_substeps;
-  /// [m] Bound on the position error of a step; 0 (default) turns it off. It has no effect with
-  /// fixed substeps.
+  /// [m] Bound on the position error of a step; 0: none. No effect with fixed substeps.
   float tolerance;
   uint32_t reserved;          ///< Reserved; must be 0.
   /// Job system that runs thread_count tasks per step; nullable (default): the world's own threads.
-  /// It must stay valid while the world lives. It is not called if thread_count is 1, or in small
-  /// steps.
+  /// It must stay valid while the world lives. A thread_count of 1 and small steps do not call it.
   sinew_run_tasks run_tasks;
   void *tasks_context;        ///< First argument of run_tasks; nullable.
   uint32_t kernel;            ///< SIMD level, a sinew_kernel value; default SINEW_KERNEL_BEST.
-  uint32_t reserved2;         ///< Reserved; must be 0.
 } sinew_world_def;
 
 /// Fills a world definition with its defaults; `struct_size` is sizeof(sinew_world_def).
 sinew_status sinew_world_def_init(sinew_world_def *def, size_t struct_size);
 
 /// Creates an empty world; destroy it with sinew_world_destroy.
-/// Errors: SINEW_STATUS_UNSUPPORTED if a thread could not be started or the processor lacks the
-/// kernel.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a thread cannot start or the processor lacks the kernel.
 sinew_status sinew_world_create(const sinew_world_def *def, sinew_world **out);
 
 /// Destroys a world with all its bodies, tools and blades; NULL has no effect.
@@ -230,17 +227,16 @@ void sinew_world_destroy(sinew_world *world);
 typedef struct sinew_step_report {
   size_t struct_size;        ///< Set to sizeof(sinew_step_report) before the call.
   uint32_t substeps;         ///< Largest number of substeps that a body took.
-  /// [s] Longest stable explicit substep over all bodies; infinity: no limit, as with IMPLICIT and
-  /// NEWTON.
+  /// [s] Longest stable explicit substep over all bodies; infinity with IMPLICIT and NEWTON.
   float stable_substep;
   /// Number of bodies that became non-finite and were rolled back; the others were stepped.
   uint32_t bodies_restored;
   /// [m] Position error of this step; 0 without a tolerance, infinity if the step was refused
   /// before it could be estimated.
   float error_estimate;
-  /// Number of interpenetrating surface edges that contact could not separate. It counts edges
-  /// inside other tissue, and inside their own body where that collides with itself. Contact pushes
-  /// edges of another body out of a closed one in later steps.
+  /// Number of interpenetrating surface edges that contact could not separate. Edges inside their
+  /// own body count if that collides with itself. Later steps push edges of another body out of a
+  /// closed one.
   uint32_t crossings;
   uint32_t limit;            ///< Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
   sinew_body_id limit_body;  ///< UNSTABLE: body with the shortest substep.
@@ -258,12 +254,23 @@ typedef struct sinew_step_report {
 /// number of substeps.
 sinew_status sinew_world_step(sinew_world *world, float dt, sinew_step_report *report);
 
-/// Sets the gravitational acceleration from the next step on.
-/// `gravity` [m/s^2] points to 3 floats.
+/// Sets the gravitational acceleration [m/s^2], 3 floats, from the next step on.
 sinew_status sinew_world_set_gravity(sinew_world *world, const float *gravity);
 
-/// Computes a hash over everything that the next step depends on.
-/// Compare hashes only between worlds of the same library version.
+/// Writes the gravitational acceleration [m/s^2] of a world, 3 floats.
+sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravity);
+
+/// Sets the substeps per step and their limit, from the next step on; see sinew_world_def.
+sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uint32_t max_substeps);
+
+/// Writes the number of substeps per step and its limit; both outputs are nullable.
+sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
+    uint32_t *out_max_substeps);
+
+/// Writes the time [s] that a world has been stepped, and the number of steps; both are nullable.
+sinew_status sinew_world_get_time(const sinew_world *world, double *out_time, uint64_t *out_steps);
+
+/// Computes a hash over all that the next step depends on; compare it within one version.
 sinew_status sinew_world_get_state_hash(const sinew_world *world, uint64_t *out);
 
 // sinew/mesh.h: meshes from files and basic shapes.
@@ -283,8 +290,7 @@ typedef enum sinew_mesh_format {
   SINEW_MESH_FORMAT_AUTO = 0,   ///< By file name: .obj .stl .vtk .msh .node .ele.
   SINEW_MESH_FORMAT_OBJ = 1,    ///< Wavefront OBJ.
   SINEW_MESH_FORMAT_STL = 2,    ///< STL, binary or ASCII.
-  /// VTK legacy: unstructured grid or polygonal data, ASCII or binary.
-  SINEW_MESH_FORMAT_VTK = 3,
+  SINEW_MESH_FORMAT_VTK = 3,  ///< VTK legacy, ASCII or binary: unstructured grid or polygonal data.
   SINEW_MESH_FORMAT_GMSH = 4,   ///< Gmsh 1, 2 and 4.1, ASCII.
   SINEW_MESH_FORMAT_TETGEN = 5  ///< TetGen .node and .ele with the same base name; name either.
 } sinew_mesh_format;
@@ -293,12 +299,11 @@ typedef enum sinew_mesh_format {
 /// It welds coincident vertices, drops degenerate and duplicate elements and unused vertices, and
 /// corrects inverted tetrahedra. `path` is UTF-8, `format` a sinew_mesh_format value, `scale` [m]
 /// the length of one file unit, above 0.
-/// Errors: SINEW_STATUS_IO if the file is missing or malformed; the message names the line or byte.
+/// Errors: SINEW_STATUS_IO for a missing or malformed file; the message names the line or byte.
 sinew_status sinew_mesh_load(const char *path, uint32_t format, float scale, sinew_mesh **out);
 
 /// Creates a cloth of triangles in the plane y = 0, centered at the origin, with normals along +y.
-/// `size` [m] holds the 2 extents along x and z, above 0; `cells` the 2 cell counts, at least 1, of
-/// two triangles each.
+/// `size` [m] holds the extents along x and z, above 0; `cells` the 2 counts of squares, above 0.
 sinew_status sinew_mesh_create_cloth(const float *size, const uint32_t *cells, sinew_mesh **out);
 
 /// Creates a box of tetrahedra, centered at the origin.
@@ -313,6 +318,18 @@ sinew_status sinew_mesh_create_lattice(float edge, const uint32_t *cells, sinew_
 /// `length` [m] is its extent along x and `spacing` [m] the node spacing, both above 0.
 sinew_status sinew_mesh_create_organ(float length, float spacing, sinew_mesh **out);
 
+/// Creates a mesh from arrays and cleans it like sinew_mesh_load.
+/// `positions` [m] holds 3 * node_count floats, `triangles` 3 * triangle_count and `tetrahedra` 4 *
+/// tetrahedron_count node indices. node_of_vertex of sinew_mesh_view maps the given nodes.
+sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
+    size_t triangle_count, const uint32_t *tetrahedra, size_t tetrahedron_count, sinew_mesh **out);
+
+/// Creates a mesh of tetrahedra that fills the closed surface of a mesh.
+/// `spacing` [m] is the mean edge length. The result is that of sinew_body_create_from_surface.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` too fine
+/// or too coarse.
+sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, sinew_mesh **out);
+
 /// Destroys a mesh and ends its views; NULL has no effect.
 void sinew_mesh_destroy(sinew_mesh *mesh);
 
@@ -326,34 +343,27 @@ typedef struct sinew_mesh_view {
   size_t struct_size;              ///< Set to sizeof(sinew_mesh_view) before the call.
   const float *positions;          ///< [m] 3 * node_count floats.
   size_t node_count;               ///< Number of nodes; every node is used.
-  /// 3 * triangle_count node indices: the triangles of the file or shape.
-  const uint32_t *triangles;
+  const uint32_t *triangles;  ///< 3 * triangle_count node indices: triangles of the file or shape.
   size_t triangle_count;           ///< Number of triangles.
   const uint32_t *tetrahedra;      ///< 4 * tetrahedron_count node indices, of positive volume.
   size_t tetrahedron_count;        ///< Number of tetrahedra.
-  /// 3 * surface_triangle_count node indices, outward. The boundary of the tetrahedra or cells;
-  /// without them the triangles.
+  /// 3 * surface_triangle_count node indices, outward: the boundary of the tetrahedra or cells, if
+  /// any, else the triangles.
   const uint32_t *surface;
   size_t surface_triangle_count;   ///< Number of surface triangles.
-  /// vertex_count node indices: the node of each vertex of the file, or SINEW_NO_NODE.
-  const uint32_t *node_of_vertex;
+  const uint32_t *node_of_vertex;  ///< vertex_count nodes, one of each vertex, or SINEW_NO_NODE.
   size_t vertex_count;             ///< Number of vertices in the file; for a shape its nodes.
   size_t welded_vertices;          ///< Number of vertices merged into an earlier one.
   size_t dropped_vertices;         ///< Number of unused vertices dropped.
   size_t dropped_triangles;        ///< Number of degenerate or duplicate triangles dropped.
   size_t dropped_tetrahedra;       ///< Number of degenerate or duplicate tetrahedra dropped.
-  /// Number of inverted tetrahedra corrected by swapping two nodes.
-  size_t flipped_tetrahedra;
-  /// 1: every surface edge is used equally often in both directions; 0: open.
-  uint32_t closed;
-  uint32_t reserved;               ///< Reserved; set to 0 by the library.
-  /// 8 * cell_count node indices of lattice cubes; corner bits: x 1, y 2, z 4.
-  const uint32_t *cells;
+  size_t flipped_tetrahedra;       ///< Number of inverted tetrahedra corrected.
+  uint32_t closed;  ///< 1: every surface edge is used equally often in both directions; 0: open.
+  const uint32_t *cells;  ///< 8 * cell_count node indices of cubes; corner bits: x 1, y 2, z 4.
   size_t cell_count;               ///< Number of cells.
 } sinew_mesh_view;
 
-/// Writes a view of the contents of a mesh without copying.
-/// Lifetime: until the mesh is destroyed.
+/// Writes a view of the contents of a mesh, which ends with the mesh.
 sinew_status sinew_mesh_get_view(const sinew_mesh *mesh, sinew_mesh_view *out);
 
 // sinew/body.h: soft bodies, their positions, forces and pins.
@@ -365,33 +375,27 @@ sinew_status sinew_mesh_get_view(const sinew_mesh *mesh, sinew_mesh_view *out);
 /// Memory layout of the springs of a body.
 typedef enum sinew_storage {
   SINEW_STORAGE_PACKED = 0,       ///< Layout optimized for the processor; default.
-  /// Linked list per node, one allocation per link; for comparison.
-  SINEW_STORAGE_EFFICIENT = 1,
-  /// One array with springs_per_node slots per node; for comparison.
-  SINEW_STORAGE_FAST_LINK = 2,
-  /// Chain of arrays of springs_per_node slots per node; for comparison.
-  SINEW_STORAGE_DYNAMIC_BULK = 3
+  SINEW_STORAGE_EFFICIENT = 1,  ///< Linked list per node, one allocation per link; for comparison.
+  SINEW_STORAGE_FAST_LINK = 2,  ///< One array with springs_per_node slots per node; for comparison.
+  SINEW_STORAGE_DYNAMIC_BULK = 3  ///< Chain of arrays of springs_per_node slots; for comparison.
 } sinew_storage;
 
 /// Time integrator of a body.
 typedef enum sinew_solver {
   SINEW_SOLVER_VERLET = 0,    ///< Explicit; takes as many substeps as stability needs.
   SINEW_SOLVER_IMPLICIT = 1,  ///< Implicit; stable at any step size.
-  /// Reference solver: the equations of IMPLICIT solved to double precision; slow.
-  SINEW_SOLVER_NEWTON = 2,
-  /// VERLET or IMPLICIT, chosen on creation; see sinew_solver_report. Default.
-  SINEW_SOLVER_AUTO = 3
+  SINEW_SOLVER_NEWTON = 2,    ///< Reference: IMPLICIT solved to double precision; slow.
+  SINEW_SOLVER_AUTO = 3       ///< VERLET or IMPLICIT, see sinew_solver_report; default.
 } sinew_solver;
 
 /// Source of the forces between the nodes of elements.
 typedef enum sinew_material {
   SINEW_MATERIAL_NONE = 0,       ///< Springs as given, or one stiffness for all. Default.
-  /// Springs along the element edges, with stiffnesses computed from young_modulus. They imply a
-  /// Poisson's ratio of 1/4 for tetrahedra and cells, and of 1/3 in the plane for triangles.
+  /// Springs along element edges, of young_modulus. Poisson's ratio is 1/4 for tetrahedra and
+  /// cells, 1/3 in the plane for triangles.
   SINEW_MATERIAL_SPRINGS = 1,
-  /// Finite elements of element_law. Accepts a Poisson's ratio from 0 to 0.49. Accurate up to a
-  /// compression of about 20 %, stable beyond. The body has no springs but those given.
-  /// sinew_body_remove_spring removes the tetrahedra that have the edge.
+  /// Finite elements of element_law, with the springs given. Accurate up to a compression of about
+  /// 20 %, stable beyond.
   SINEW_MATERIAL_TETRAHEDRA = 2
 } sinew_material;
 
@@ -421,188 +425,148 @@ typedef struct sinew_body_def {
   /// [kg] node_count floats, each at least 1e-37, or 0 for a permanent pin; nullable: node_mass.
   /// IMPLICIT rolls a body back if mass / dt^2 is not a finite float.
   const float *masses;
-  /// [N s/m] node_count floats, the drag per node; nullable: node_damping.
-  const float *node_dampings;
-  /// [kg] Mass of each node, at least 1e-37; no default. Must be 0 if density is set.
-  float node_mass;
-  /// [N s/m] Drag on each node: force = -node_damping * velocity; default 0.
-  float node_damping;
+  const float *node_dampings;      ///< [N s/m] node_count floats of drag; nullable: node_damping.
+  float node_mass;  ///< [kg] Mass of each node, at least 1e-37; no default. 0 with a density.
+  float node_damping;              ///< [N s/m] Drag on each node: force = -node_damping * velocity.
   /// 2 * spring_count node indices, each pair once; nullable: the element edges, each once. NULL
   /// excludes the arrays with one value per spring. A pointer with spring_count 0 means no springs.
   const uint32_t *springs;
   size_t spring_count;             ///< Number of springs given.
   const float *stiffnesses;        ///< [N/m] spring_count floats; nullable: stiffness.
   const float *rest_lengths;       ///< [m] spring_count floats; nullable: from the rest positions.
-  /// [N s/m] spring_count floats, along the spring; nullable: spring_damping.
-  const float *spring_dampings;
-  /// [N/m] Stiffness of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
-  float stiffness;
-  /// [N s/m] Damping of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
-  float spring_damping;
-  /// 3 * triangle_count node indices, outward: the render and contact surface; nullable. NULL takes
-  /// the boundary of the tetrahedra or cells.
+  const float *spring_dampings;    ///< [N s/m] spring_count floats; nullable: spring_damping.
+  float stiffness;  ///< [N/m] Stiffness of each spring; 0 for TETRAHEDRA without springs.
+  float spring_damping;  ///< [N s/m] Damping of each spring; 0 for TETRAHEDRA without springs.
+  /// 3 * triangle_count node indices, outward: the render and contact surface. Nullable: the
+  /// boundary of the tetrahedra or cells.
   const uint32_t *triangles;
   size_t triangle_count;           ///< Number of triangles given.
   const uint32_t *tetrahedra;      ///< 4 * tetrahedron_count node indices; nullable: no tetrahedra.
   size_t tetrahedron_count;        ///< Number of tetrahedra given.
   uint32_t storage;                ///< Spring storage, a sinew_storage value.
-  /// Slots per node (FAST_LINK) or per array (DYNAMIC_BULK); 0 (default) derives them from the
-  /// springs. A node with more springs than slots is SINEW_STATUS_CAPACITY with FAST_LINK. Other
-  /// storages ignore it.
+  /// Slots per node (FAST_LINK) or per array (DYNAMIC_BULK); 0 (default): from the springs given.
   uint32_t springs_per_node;
-  uint32_t solver;                 ///< Time integrator, a sinew_solver value.
+  uint32_t solver;                 ///< Time integrator, a sinew_solver value; default AUTO.
   uint32_t reserved;               ///< Reserved; must be 0.
-  /// IMPLICIT, NEWTON: 1 is implicit Euler, 2 is BDF2, which is far more accurate; 0 (default): 2.
-  uint32_t order;
+  uint32_t order;  ///< IMPLICIT, NEWTON: 1 is implicit Euler; 2 or 0 is BDF2, far more accurate.
   /// IMPLICIT, NEWTON: largest number of matrix-vector products per step, at most 1,000,000. 0
-  /// (default) is 1000 for IMPLICIT, where a product costs about one VERLET substep, and 100,000
-  /// for NEWTON. Each part of a subdivided step gets at least 1/32 of it. If less than 256, a step
-  /// beside a tool may take seven times as many, at most 128 more, before it is subdivided.
+  /// (default) is 1000 for IMPLICIT, 100,000 for NEWTON. Each part of a subdivided step gets at
+  /// least 1/32 of it. If less than 256, a step beside a tool may take seven times as many, at most
+  /// 128 more, before it is subdivided.
   uint32_t iterations;
-  /// IMPLICIT, NEWTON: relative tolerance of the linear solve, 1e-6 to 1. It bounds the error
-  /// relative to the displacement that forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for
-  /// NEWTON.
+  /// IMPLICIT, NEWTON: error of the linear solve, 1e-6 to 1, relative to the displacement that
+  /// forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
   float accuracy;
   uint32_t reserved1;              ///< Reserved; must be 0.
-  /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to
-  /// 1; as much as it takes where a step would be refused. Default 0.001; 0 is off. Mass is added
-  /// only if it saves at least 1/4 of the substeps, and never with fixed substeps or a tolerance.
-  /// It adds inertia but no weight. See sinew_solver_report.
+  /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1;
+  /// default 0.001. A step that would be refused may add more. Mass is added only if it saves 1/4
+  /// of the substeps, never with fixed substeps or a tolerance. It adds inertia but no weight. See
+  /// sinew_solver_report.
   float mass_scaling;
   uint32_t reserved2;              ///< Reserved; must be 0.
   /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells. Corner bits: x 1, y 2,
-  /// z 4. Their springs are the edges and the face diagonals.
+  /// z 4. Springs are the edges and face diagonals.
   const uint32_t *cells;
   size_t cell_count;               ///< Number of cells given.
-  /// How elements make forces, a sinew_material value; default NONE. Other values fill the
-  /// tetrahedra or cells, or else the triangles, and need springs NULL and stiffness 0, except for
-  /// TETRAHEDRA with springs of its own. Cells must be cubes of one size within 0.1 %.
+  /// A sinew_material value: how tetrahedra or cells, or else triangles, make forces; default NONE.
+  /// SPRINGS needs springs NULL and stiffness 0. Cells must be cubes of one size within 0.1 %.
   uint32_t material;
   /// [Pa] Young's modulus at small strain, above 0 with a material, else 0. Exact for cells and
-  /// equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, a mesh of one or two
-  /// layers of tetrahedra much softer.
+  /// equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, one or two layers of
+  /// tetrahedra are much softer.
   float young_modulus;
-  /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value +- 0.001.
-  float poisson_ratio;
+  float poisson_ratio;  ///< TETRAHEDRA: 0 to 0.49; SPRINGS: 0 or the implied value +- 0.001.
   /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
-  /// Every node must then belong to an element, masses must be NULL and node_mass 0.
+  /// Every node must then belong to an element, masses be NULL and node_mass 0.
   float density;
-  /// [m] Thickness of a material that fills triangles, above 0; else 0.
-  float thickness;
-  /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0. 0.3
-  /// to 0.6 of Young's modulus lets a body of springs recover from inversion. 0 with TETRAHEDRA.
+  float thickness;  ///< [m] Thickness of a material that fills triangles, above 0; else 0.
+  /// [Pa] Resistance of each tetrahedron to volume change and inversion; 0 with TETRAHEDRA. 0.3 to
+  /// 0.6 of Young's modulus lets a body of springs recover from inversion.
   float volume_stiffness;
-  /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness. An
-  /// anchor spring pulls a node to its rest position in the world.
-  const float *home_stiffnesses;
-  /// [N/m] Stiffness of each anchor spring; default 0: no anchor springs.
-  float home_stiffness;
-  /// [N m] Flexural rigidity of the triangles, at least 0; default 0. A sheet of thickness t has E
-  /// t^3 / (12 (1 - nu^2)). The rest angle of each edge may be any. An edge of more than two
-  /// triangles is refused. Exact for equilateral triangles. sinew_body_remove_spring removes the
-  /// bending of the triangles that have the edge.
+  const float *home_stiffnesses;   ///< [N/m] node_count floats; nullable: home_stiffness.
+  float home_stiffness;  ///< [N/m] Stiffness of anchor springs, which pull nodes to rest positions.
+  /// [N m] Flexural rigidity of triangles: E t^3 / (12 (1 - nu^2)) for a sheet of thickness t.
+  /// Exact for equilateral triangles. An edge of more than two triangles is refused.
   float bending_stiffness;
-  /// Force law of springs, a sinew_spring_law value; default LINEAR. Later springs are linear.
-  uint32_t spring_law;
+  uint32_t spring_law;  ///< Force law, a sinew_spring_law value; later springs are linear.
   float spring_steepness;          ///< EXPONENTIAL: above 0, at most 13.8 / spring_limit; else 0.
   float spring_quadratic;          ///< CUBIC: its square is at most 3 * spring_cubic; else 0.
   float spring_cubic;              ///< CUBIC: cubic coefficient, at least 0; else 0.
   /// EXPONENTIAL, CUBIC: strain beyond which the law is linear, above 0; else 0.
   float spring_limit;
-  /// [Pa] Fiber stiffness of each tetrahedron, at least 0; default 0.
-  float fibre_stiffness;
+  float fibre_stiffness;           ///< [Pa] Fiber stiffness of each tetrahedron.
   /// 3 * tetrahedron_count floats: unit fiber directions at rest, or 0 for no fibers; nullable.
-  /// Fibers pull in proportion to their extension, over the cross section at rest. They never push.
+  /// Fibers pull in proportion to their extension and never push.
   const float *fibre_directions;
-  /// [Pa] tetrahedron_count floats, at least 0; nullable: fibre_stiffness.
-  const float *fibre_stiffnesses;
-  /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6; default 0: none.
-  /// It acts in parallel with the stiffness. Springs added later have none. VERLET needs short
-  /// substeps from about 0.01 s on; use IMPLICIT there.
+  const float *fibre_stiffnesses;  ///< [Pa] tetrahedron_count floats; nullable: fibre_stiffness.
+  /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6. It acts in
+  /// parallel with the stiffness. Later springs have none. From about 0.01 s on use IMPLICIT:
+  /// VERLET needs short substeps.
   float retardation_time;
-  /// [s] Relaxation time of the Maxwell branch (spring in series with the dashpot), 1e-9 to 1e6.
-  /// After a strain step the stress is E (1 + retardation_time / relaxation_time exp(-t /
-  /// relaxation_time)). 0 (default) leaves a Kelvin-Voigt solid. Bodies start relaxed;
-  /// sinew_body_set_positions relaxes them.
+  /// [s] Relaxation time of the Maxwell branch, 1e-9 to 1e6; 0: a Kelvin-Voigt solid. After a
+  /// strain step the stress is E (1 + retardation_time / relaxation_time exp(-t /
+  /// relaxation_time)). Bodies start relaxed; sinew_body_set_positions relaxes them.
   float relaxation_time;
-  /// Strain at which springs and elements yield, in tension and compression; 0 (default): never.
-  /// Strain beyond it is permanent. Requires SINEW_SPRING_LAW_LINEAR; springs added later do not
-  /// yield. Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so long
-  /// steps slow it.
+  /// Strain at which springs and elements yield; 0: never. Strain beyond it is permanent. It needs
+  /// SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow the yielding of
+  /// tetrahedra.
   float yield_strain;
-  /// Maximum plastic strain, above 0 and below 1 with yield_strain; default 0.5. Elastic beyond.
+  /// With yield_strain: maximum plastic strain, above 0 and below 1; default 0.5. Elastic beyond.
   float largest_set;
-  /// Strain above which springs stiffen, at least 0; default 0: none. Springs added later do not.
-  float strain_limit;
+  float strain_limit;  ///< Strain above which springs stiffen; 0: none. Later springs do not.
   /// Added stiffness beyond strain_limit as a multiple, above 0, at most 1e6; default 100.
   float limit_stiffening;
-  /// [Pa] Stiffness of the volume inside closed surfaces, at least 0; default 0. Energy of a
-  /// cavity: enclosed_stiffness / 2 * V0 (V / V0 - 1)^2 - pressure (V - V0). Each connected surface
-  /// component must be closed and is a cavity; if some are inverted, like the inner wall of a
-  /// hollow organ, only those are. Cutting or removing a surface edge opens its cavity permanently.
+  /// [Pa] Stiffness of the volume inside closed surfaces. Energy of a cavity: enclosed_stiffness /
+  /// 2 * V0 (V / V0 - 1)^2 - pressure (V - V0). Each connected surface component must be closed and
+  /// is a cavity; if some are inverted, like the inner wall of a hollow organ, only those are.
+  /// Cutting or removing a surface edge opens its cavity.
   float enclosed_stiffness;
-  /// [Pa] Overpressure in each cavity at rest volume; may be negative; default 0. It is constant
-  /// without an enclosed_stiffness. See sinew_body_set_pressure.
+  /// [Pa] Overpressure in cavities at rest volume, of any sign. It is constant without
+  /// enclosed_stiffness. See sinew_body_set_pressure.
   float pressure;
-  /// [m] Distance that tools and other tissue keep from the surface, 0 to 1e9; default 0.
-  float contact_thickness;
-  /// Coulomb coefficient for tissue contact, at least 0; default 0. The larger of two bodies
-  /// applies. Contact with a tool uses the friction of the tool.
+  float contact_thickness;  ///< [m] Distance that tools and tissue keep from the surface, 0 to 1e9.
+  /// Coulomb coefficient for tissue contact; the larger of two bodies' applies. Contact with a tool
+  /// uses the friction of the tool.
   float contact_friction;
-  /// 1: collides with other bodies that also have 1; 0 (default): does not.
-  uint32_t meets_bodies;
+  uint32_t meets_bodies;  ///< 1: collides with other bodies that have 1; 0 (default): does not.
   /// 1: collides with itself; 0 (default): does not. The two sides of a cut then rest against each
-  /// other with no gap. The cut-boundary edges of a sheet may slide over each other until
-  /// separated.
+  /// other; cut edges of a sheet may slide over each other.
   uint32_t meets_itself;
-  /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE. IMAGE_SPACE applies
-  /// if either of two bodies asks for it. Self-collision is always exact.
-  /// SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
+  /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE, if either asks for
+  /// it. Self-collision is exact. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
   uint32_t contact_detection;
   /// [m] IMAGE_SPACE: pixel size; 0 (default): half of the mean surface edge. At most 2^24 pixels.
   float contact_resolution;
-  /// Bits of the categories that this body belongs to; default 1. Two objects collide if each has a
-  /// category in the mask of the other.
-  uint32_t collision_category;
-  /// Bits of the categories that this body collides with; default 0xffffffff.
-  uint32_t collision_mask;
+  uint32_t collision_category;     ///< Collision categories of this body; default 1. See base.h.
+  uint32_t collision_mask;         ///< Categories that it collides with; default 0xffffffff.
   /// Number of nodes that cuts may add, about 5 per cut element; 0 (default): cannot be cut. Needs
   /// a consistently oriented 2-manifold surface, or tetrahedra connected through faces around each
-  /// node, with triangles that are their boundary, if given. For a body of springs alone 1 is
-  /// enough. See sinew_body_cut.
+  /// node; triangles, if given, are their boundary. 1 is enough for a body of springs alone.
   uint32_t spare_nodes;
-  /// Fracture energy of a blade's cut, at least 0: [J/m] for a surface, [J/m^2] for a solid. For a
-  /// surface it is the toughness times the thickness. Default 0: no resistance. Above 0 it needs
-  /// spare_nodes. SINEW_STATUS_UNSUPPORTED for a body of springs alone.
+  /// Fracture energy of a blade's cut: [J/m^2] for a solid; [J/m] for a surface, with its
+  /// thickness. Above 0 it needs spare_nodes. SINEW_STATUS_UNSUPPORTED for a body of springs alone.
   float toughness;
-  /// Strain above which a spring or an element edge tears, at least 0; 0 (default): never. A
-  /// surface tears at the end node with the larger separating force, across that force, to the next
-  /// triangle. A solid tears along faces of its tetrahedra. A step that tears may allocate. See
-  /// sinew_body_set_tear_limits.
+  /// Strain above which a spring or an element edge tears; 0: never. A surface tears at the node
+  /// with the larger separating force, across it; a solid along faces. A step that tears may
+  /// allocate. See sinew_body_set_tear_limits.
   float tear_strain;
-  /// [N] Force above which a spring tears, at least 0; 0 (default): never. SINEW_STATUS_UNSUPPORTED
-  /// for a body of elements without springs.
+  /// [N] Force above which a spring tears; 0: never. For bodies of elements alone it is
+  /// SINEW_STATUS_UNSUPPORTED.
   float tear_force;
-  /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes.
-  uint32_t most_tears;
-  /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. No tear goes below.
-  float smallest_piece;
-  /// [m/s] Speed below which a node counts as at rest, at least 0; 0 (default): never sleeps. Parts
-  /// that stay slower for sleep_time, and that no force would accelerate to that speed in that
-  /// time, are not stepped until something affects them. Only VERLET bodies without cuts sleep in
-  /// parts. Bodies in contact with or sutured to other tissue stay awake. See
+  uint32_t most_tears;  ///< Maximum number of tears per step; 0: does not tear. Needs spare_nodes.
+  float smallest_piece;            ///< Minimum fragment size at rest: [m^2], or [m^3] for solids.
+  /// [m/s] Speed below which a node counts as at rest; 0 (default): never sleeps. Parts slower for
+  /// sleep_time, which no force would make faster, are not stepped until something affects them.
+  /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake. See
   /// sinew_body_get_awake_share.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
-  /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
+  /// Law of TETRAHEDRA, a sinew_element_law value; not 0: no viscosity or yield.
   uint32_t element_law;
   float mooney_ratio;              ///< MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
-  /// [m] Translation of all positions, after the rotation; default 0 0 0.
-  float position[3];
-  /// Rotation of all positions and fibers about the origin, x y z w, not zero; default 0 0 0 1.
-  float orientation[4];
-  /// Factor of the world's gravity on this body, finite; default 1.
-  float gravity_scale;
+  float position[3];  ///< [m] Translation of all positions, after the rotation; default 0 0 0.
+  float orientation[4];  ///< Rotation of positions and fibers about the origin; default 0 0 0 1.
+  float gravity_scale;  ///< Factor of the world's gravity on this body, finite; default 1.
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
@@ -619,32 +583,30 @@ sinew_status sinew_body_destroy(sinew_world *world, sinew_body_id body);
 
 /// Writes a view of the node positions [m] without copying.
 /// Lifetime: until the next step, sinew_body_set_positions, sinew_body_set_velocities,
-/// sinew_body_rest_state or topology change of the body, or its destruction.
+/// sinew_body_solve_equilibrium or topology change of the body, or its destruction.
 sinew_status sinew_body_get_positions(const sinew_world *world, sinew_body_id body,
-                                      sinew_vec3_view *out);
+    sinew_vec3_view *out);
 
 /// Writes a view of the node velocities [m/s] at the time of the positions.
-/// A pinned node has the velocity of its pin in the last step. The first call after a step computes
-/// the velocities, at the cost of about one substep. Lifetime: as for sinew_body_get_positions.
+/// A pinned node has that of its pin in the last step. The first call after a step costs about one
+/// substep. Lifetime: as for sinew_body_get_positions.
 sinew_status sinew_body_get_velocities(const sinew_world *world, sinew_body_id body,
-                                       sinew_vec3_view *out);
+    sinew_vec3_view *out);
 
-/// Moves all nodes to new positions without a sweep.
-/// `positions` [m] holds 3 * node_count floats. Velocities stay. Pinned nodes move too, and
-/// attached nodes stay attached at their new positions. `node_count` must be the body's.
+/// Moves all nodes to new positions [m], 3 * node_count floats, without a sweep.
+/// Velocities stay. Pinned nodes move too, and attached nodes stay attached.
 sinew_status sinew_body_set_positions(sinew_world *world, sinew_body_id body,
-                                      const float *positions, size_t node_count);
+    const float *positions, size_t node_count);
 
-/// Sets the velocities of all nodes.
-/// `velocities` [m/s] holds 3 * node_count floats. Pinned nodes and pinned axes keep theirs.
-/// `node_count` must be the body's number of nodes.
+/// Sets the velocities [m/s] of all nodes, 3 * node_count floats.
+/// Pinned nodes and pinned axes keep theirs.
 sinew_status sinew_body_set_velocities(sinew_world *world, sinew_body_id body,
-                                       const float *velocities, size_t node_count);
+    const float *velocities, size_t node_count);
 
 /// Writes a view of the render and contact surface: the triangles of a body after all cuts.
 /// Lifetime: until the next topology change of the body, or its destruction.
 sinew_status sinew_body_get_triangles(const sinew_world *world, sinew_body_id body,
-                                      sinew_triangle_view *out);
+    sinew_triangle_view *out);
 
 /// Writes 1 if the surface of a body is closed, else 0.
 /// Only a closed body pushes out what is inside it. Removing a spring on its surface opens it.
@@ -652,21 +614,19 @@ sinew_status sinew_body_is_closed(const sinew_world *world, sinew_body_id body, 
 
 /// Writes the mass of a node [kg]; 0 for a permanent pin or a node bound to others.
 sinew_status sinew_body_get_node_mass(const sinew_world *world, sinew_body_id body, uint32_t node,
-                                      float *out);
+    float *out);
 
 // ---- Forces -------------------------------------------------------------------------------------
 
-/// Adds a force to a node for the whole next step.
-/// `force` [N] points to 3 floats. Forces are constant during the step and cleared when it
-/// succeeds. They have no effect on a pinned or attached node, nor along a pinned axis.
+/// Adds a force [N], 3 floats, to a node for the whole next step; cleared when that succeeds.
+/// It has no effect on a pinned or attached node, nor along a pinned axis.
 sinew_status sinew_body_apply_force(sinew_world *world, sinew_body_id body, uint32_t node,
-                                    const float *force);
+    const float *force);
 
-/// Adds a force to each of many nodes for the whole next step.
-/// `nodes` holds `count` indices, which may repeat; `forces` [N] holds 3 * count floats. See
-/// sinew_body_apply_force. On failure no force is added.
+/// Adds forces [N], 3 * count floats, to nodes for the whole next step; see sinew_body_apply_force.
+/// `nodes` holds `count` indices, which may repeat.
 sinew_status sinew_body_apply_forces(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     const float *forces, size_t count);
+    const float *forces, size_t count);
 
 // ---- Pins ---------------------------------------------------------------------------------------
 
@@ -679,43 +639,43 @@ sinew_status sinew_body_pin(sinew_world *world, sinew_body_id body, uint32_t nod
 #define SINEW_AXIS_Z 4  ///< Bit of the z axis.
 
 /// Pins a node along some axes and frees it along the others.
-/// `axes` is a sum of SINEW_AXIS_X, SINEW_AXIS_Y and SINEW_AXIS_Z; 0 unpins the node. A freed axis
-/// keeps the velocity of its pin. Changing the axes cancels a pending sinew_body_move_pin.
+/// `axes` is a sum of SINEW_AXIS_ values; 0 unpins the node. A freed axis keeps the velocity of its
+/// pin. Changing the axes cancels a pending sinew_body_move_pin.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds it, or a node of mass 0 would be free.
 sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_t node,
-                                 uint32_t axes);
+    uint32_t axes);
 
-/// Unpins a node along all axes; no effect on a free node.
-/// The node keeps the velocity of its pin in the last step.
+/// Unpins a node along all axes; it keeps the velocity of its pin.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or its mass is 0.
 sinew_status sinew_body_unpin(sinew_world *world, sinew_body_id body, uint32_t node);
 
-/// Moves a pinned node to a new position during the next step.
-/// The node moves along a straight line, and only along its pinned axes. `position` [m] is 3
-/// floats.
+/// Moves a pinned node along a line to a position [m], 3 floats, during the next step.
+/// Free axes do not follow.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_move_pin(sinew_world *world, sinew_body_id body, uint32_t node,
-                                 const float *position);
+    const float *position);
 
-/// Writes the reaction force on a pinned node, averaged over the last step.
-/// `force` [N] receives 3 floats, 0 along free axes.
+/// Writes the reaction force [N] on a pinned node, 3 floats, averaged over the last step.
+/// It is 0 along free axes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_get_pin_force(const sinew_world *world, sinew_body_id body, uint32_t node,
-                                      float *force);
+    float *force);
 
 // ---- Collision and sleep ------------------------------------------------------------------------
 
 /// Sets the collision category and mask of a body from the next step on.
-/// See sinew_body_def. Tools and bodies inside it are pushed out once they collide with it.
+/// Tools and bodies inside it are pushed out once they collide with it.
 sinew_status sinew_body_set_collision(sinew_world *world, sinew_body_id body, uint32_t category,
-                                      uint32_t mask);
+    uint32_t mask);
 
-/// Wakes all nodes of a body until they come to rest again.
-/// Forces, contacts, cuts and property changes wake a body automatically.
+/// Writes the collision category and mask of a body.
+sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_category, uint32_t *out_mask);
+
+/// Wakes all nodes of a body until they come to rest again; whatever affects a body does too.
 sinew_status sinew_body_wake(sinew_world *world, sinew_body_id body);
 
-/// Writes the fraction of the nodes that are awake, from 0 to 1.
-/// It is 1 for a body that never sleeps.
+/// Writes the fraction of the nodes that are awake; 1 for a body that never sleeps.
 sinew_status sinew_body_get_awake_share(const sinew_world *world, sinew_body_id body, float *out);
 
 // sinew/tool.h: rigid tools, their poses, contacts and forces.
@@ -738,10 +698,9 @@ typedef enum sinew_shape {
 typedef struct sinew_tool_def {
   size_t struct_size;           ///< Size of this struct; sinew_tool_def_init sets it.
   uint32_t shape;               ///< Shape of the tool, a sinew_shape value.
-  /// [m] Sphere, capsule: above 0, at most 1e9 with half_length added; no default.
-  float radius;
-  /// [m] Capsule: distance from the center to the center of a cap, at least 0. IMAGE_SPACE allows
-  /// at most 10,000 times the radius. Contact points are accurate to 1e-7 of it.
+  float radius;  ///< [m] Sphere, capsule: above 0, at most 1e9 with half_length; no default.
+  /// [m] Capsule: distance from the center to the center of a cap. IMAGE_SPACE allows at most
+  /// 10,000 times the radius. Contact points are accurate to 1e-7 of it.
   float half_length;
   uint32_t reserved0;           ///< Reserved; must be 0.
   const float *positions;       ///< [m] Mesh: 3 * node_count floats; nullable for other shapes.
@@ -749,30 +708,22 @@ typedef struct sinew_tool_def {
   /// 3 * triangle_count node indices of a closed surface, outward; nullable for other shapes.
   const uint32_t *triangles;
   size_t triangle_count;        ///< Number of triangles of the mesh.
-  /// Contact detection, a sinew_detection value; default SINEW_DETECTION_EXACT.
-  uint32_t detection;
+  uint32_t detection;           ///< Contact detection, a sinew_detection value; default EXACT.
   float friction;               ///< Coulomb coefficient, at least 0; default 0.
-  /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
-  float position[3];
-  /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
-  float orientation[4];
+  float position[3];            ///< [m] Initial position; default 0 0 0.
+  float orientation[4];         ///< Initial orientation; default 0 0 0 1.
   uint32_t reserved;            ///< Reserved; must be 0.
-  /// [m] Mesh, box: pixel size of the images or cell size of the distance field; 0 (default):
-  /// automatic. Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the
-  /// shortest if less. Refused above 2^24 pixels or samples, or if no ray or sample would lie
-  /// inside. Memory: about 24 bytes per pixel of 3 images, 4 bytes per sample.
+  /// [m] Mesh, box: pixel size of images or cell size of a distance field; 0 (default): automatic.
+  /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if
+  /// less. Refused above 2^24 pixels or samples, or with no ray or sample inside. Memory: 24 bytes
+  /// per pixel of 3 images, 4 bytes per sample.
   float resolution;
-  /// [N] Largest force that moves the tool, at least 0; infinity (default) or 0: unlimited. Beyond
-  /// it the tool stops short of its pose; see sinew_tool_get_pose.
+  /// [N] Largest force that moves the tool; infinity (default) or 0: unlimited. Beyond it the tool
+  /// stops short of its pose; see sinew_tool_get_pose.
   float force_limit;
-  /// Bits of the categories that this tool belongs to; default 1. Two objects collide if each has a
-  /// category in the mask of the other.
-  uint32_t collision_category;
-  /// Bits of the categories that this tool collides with; default 0xffffffff.
-  uint32_t collision_mask;
-  /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
-  float half_extents[3];
-  uint32_t reserved1;           ///< Reserved; must be 0.
+  uint32_t collision_category;  ///< Collision categories of this tool; default 1. See base.h.
+  uint32_t collision_mask;      ///< Categories that it collides with; default 0xffffffff.
+  float half_extents[3];  ///< [m] Box: distance from the center to each side, above 0, at most 1e9.
 } sinew_tool_def;
 
 /// Fills a tool definition with its defaults; `struct_size` is sizeof(sinew_tool_def).
@@ -787,58 +738,60 @@ sinew_status sinew_tool_destroy(sinew_world *world, sinew_tool_id tool);
 
 // ---- Pose and settings --------------------------------------------------------------------------
 
-/// Moves a tool to a new pose during the next step.
-/// The tool moves along a straight line and rotates through the shorter arc, at constant speed.
-/// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable:
-/// unchanged. If force_limit stops the tool early, the rest is discarded: call again for every
-/// step.
+/// Moves a tool to a new pose during the next step, along a line and the shorter arc.
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged. If force_limit stops the tool
+/// early, the rest is discarded: call again for every step.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const float *position,
-                                 const float *orientation);
+    const float *orientation);
 
-/// Writes the current pose of a tool.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. A tool
-/// with a force_limit can be short of its commanded pose.
-sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *position,
-                                 float *orientation);
+/// Writes the current pose of a tool, which a force_limit can keep short of the commanded one.
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats; both are nullable.
+sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *out_position,
+    float *out_orientation);
 
 /// Sets the friction coefficient of a tool, at least 0, from the next step on.
 sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, float friction);
 
-/// Sets the largest force [N] that moves a tool, from the next step on.
-/// It is at least 0; 0 or infinity: unlimited. See sinew_tool_def.
+/// Writes the friction coefficient of a tool.
+sinew_status sinew_tool_get_friction(const sinew_world *world, sinew_tool_id tool, float *out);
+
+/// Sets the largest force [N] that moves a tool, from the next step on; 0 or infinity: unlimited.
 sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, float force_limit);
 
+/// Writes the largest force [N] that moves a tool; infinity: unlimited.
+sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id tool, float *out);
+
 /// Sets the collision category and mask of a tool from the next step on.
-/// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
+/// With mask 0 it collides with nothing. Tissue inside is pushed out once it collides.
 sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, uint32_t category,
-                                      uint32_t mask);
+    uint32_t mask);
+
+/// Writes the collision category and mask of a tool.
+sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
+    uint32_t *out_category, uint32_t *out_mask);
 
 // ---- Forces and contacts ------------------------------------------------------------------------
 
 /// Writes the force and torque on a tool, averaged over the last step, in world axes.
-/// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each; both are
-/// nullable.
+/// `force` [N] and `torque` [N m], about the position, receive 3 floats each; both are nullable.
 sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool, float *force,
-                                   float *torque);
+    float *torque);
 
 /// Contact between a tool and a body at the end of the last step.
 typedef struct sinew_contact {
   sinew_body_id body;  ///< Body that the tool touches.
-  /// Nodes of the touched node, edge or face; the last is repeated if there are fewer than 3.
-  uint32_t nodes[3];
+  uint32_t nodes[3];   ///< Nodes of the touched node, edge or face; the last is repeated below 3.
   float weights[3];    ///< Weights of the nodes at the contact point; 0 for a repeated node.
   float point[3];      ///< [m] Contact point on the body.
   float normal[3];     ///< Unit normal that points away from the tool.
-  /// [N] Force on the tool with friction, in the last substep; the wrench is the mean of all
-  /// substeps.
-  float force[3];
+  float force[3];      ///< [N] Force on the tool in the last substep; the wrench is a mean.
 } sinew_contact;
 
 /// Writes the contacts of a tool at the end of the last step.
-/// `contacts` receives at most `capacity` entries, `count` the number that exist.
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist.
 sinew_status sinew_tool_get_contacts(const sinew_world *world, sinew_tool_id tool,
-                                     sinew_contact *contacts, size_t capacity, size_t *count);
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
 
 // sinew/material.h: tissue values, springs, pressure and static equilibrium.
 
@@ -853,7 +806,6 @@ typedef struct sinew_material_preset {
   float shear_modulus;  ///< [Pa] Shear modulus as the source gives it.
   float young_modulus;  ///< [Pa] Young's modulus: 3 times the shear modulus (incompressible).
   float density;        ///< [kg/m^3] Mass density.
-  uint32_t reserved;    ///< Reserved; set to 0 by the library.
 } sinew_material_preset;
 
 /// Tissues with values from the literature.
@@ -874,58 +826,57 @@ sinew_status sinew_material_get_preset(uint32_t preset, sinew_material_preset *o
 // ---- Springs ------------------------------------------------------------------------------------
 
 /// Connects two nodes by a spring without damping.
-/// `stiffness` is in [N/m], `rest_length` in [m]; a negative rest length means the current
-/// distance.
+/// `stiffness` is in [N/m], `rest_length` in [m]; negative: the current distance.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the pair has a spring; SINEW_STATUS_CAPACITY if a node
 /// has no free slot (FAST_LINK).
 sinew_status sinew_body_add_spring(sinew_world *world, sinew_body_id body, uint32_t a, uint32_t b,
-                                   float stiffness, float rest_length);
+    float stiffness, float rest_length);
 
-/// Removes the spring between two nodes, with the elements and the bending of that edge.
-/// Elements are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the edge.
+/// Removes the spring between two nodes, and the tetrahedra and the bending that have this edge.
+/// The tetrahedra are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the
+/// edge.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if there is nothing between the nodes.
 sinew_status sinew_body_remove_spring(sinew_world *world, sinew_body_id body, uint32_t a,
-                                      uint32_t b);
+    uint32_t b);
 
 /// Writes the two nodes of each spring, each spring once, the lower node first.
-/// `pairs` receives 2 * count indices; `count` must be spring_count of
+/// `out_pairs` receives 2 * count indices; `count` is spring_count of
 /// sinew_body_get_storage_report. The order stays until springs are added or removed.
 sinew_status sinew_body_get_spring_pairs(const sinew_world *world, sinew_body_id body,
-                                         uint32_t *pairs, size_t count);
+    uint32_t *out_pairs, size_t count);
 
 /// Writes the stiffnesses and rest lengths of the springs between pairs of nodes.
-/// `pairs` holds 2 * count indices. `stiffnesses` [N/m] and `rest_lengths` [m] receive `count`
-/// floats each and are nullable. PACKED merges rest lengths that differ only by rounding.
+/// `pairs` holds 2 * count indices. `out_stiffnesses` [N/m] and `out_rest_lengths` [m] receive
+/// `count` floats each and are nullable.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 sinew_status sinew_body_get_springs(const sinew_world *world, sinew_body_id body,
-                                    const uint32_t *pairs, size_t count, float *stiffnesses,
-                                    float *rest_lengths);
+    const uint32_t *pairs, size_t count, float *out_stiffnesses, float *out_rest_lengths);
 
 /// Sets stiffnesses, rest lengths or both of the springs between pairs of nodes.
-/// `pairs` holds 2 * count indices, the arrays `count` floats each: `stiffnesses` [N/m],
-/// `rest_lengths` [m], both nullable: unchanged. If a pair repeats, its last entry counts. Damping,
-/// force law, positions and velocities stay. On failure no spring changes.
+/// `pairs` holds 2 * count indices, `stiffnesses` [N/m] and `rest_lengths` [m] `count` floats each,
+/// nullable: unchanged. If a pair repeats, its last entry counts. Damping, force law and motion
+/// stay.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 sinew_status sinew_body_set_springs(sinew_world *world, sinew_body_id body, const uint32_t *pairs,
-                                    size_t count, const float *stiffnesses,
-                                    const float *rest_lengths);
+    const float *stiffnesses, const float *rest_lengths, size_t count);
 
 /// Multiplies the stiffness and the rest length of the material between given nodes.
 /// It changes springs, tetrahedra, bending and fibers whose nodes are all among `nodes`, which may
-/// repeat; anchor springs change only their stiffness. `stiffness_factor` is at least 0, where 0 is
-/// permanent; `length_factor` is above 0. Repeated calls multiply. Masses, damping, positions and
-/// velocities stay. On failure nothing changes.
+/// repeat, and the stiffness of anchor springs. `stiffness_factor` is at least 0, where 0 is
+/// permanent; `length_factor` is above 0. Masses, damping and motion stay.
 sinew_status sinew_body_scale_region(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     size_t node_count, float stiffness_factor,
-                                     float length_factor);
+    size_t node_count, float stiffness_factor, float length_factor);
 
 // ---- Cavities -----------------------------------------------------------------------------------
 
-/// Sets the overpressure of the cavities at rest volume from the next step on.
-/// `pressure` is in [Pa]; see sinew_body_def. Open cavities stay without pressure.
+/// Sets the overpressure [Pa] of the cavities at rest volume from the next step on.
+/// Open cavities stay without pressure.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body was created with neither pressure nor
 /// enclosed_stiffness.
 sinew_status sinew_body_set_pressure(sinew_world *world, sinew_body_id body, float pressure);
+
+/// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
+sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
 
 /// Sums over the closed cavities of a body; all 0 without enclosed_stiffness and pressure.
 typedef struct sinew_enclosed_report {
@@ -938,140 +889,237 @@ typedef struct sinew_enclosed_report {
 
 /// Writes the volume and the pressure of the cavities of a body.
 sinew_status sinew_body_get_enclosed_report(const sinew_world *world, sinew_body_id body,
-                                            sinew_enclosed_report *out);
+    sinew_enclosed_report *out);
 
 // ---- Static equilibrium -------------------------------------------------------------------------
 
-/// Settings of the search for static equilibrium, filled by sinew_rest_state_def_init.
-typedef struct sinew_rest_state_def {
-  size_t struct_size;   ///< Size of this struct; sinew_rest_state_def_init sets it.
-  /// [m] Estimated position error allowed; 0 (default): 1e-6 of the body's extent.
-  float tolerance;
+/// Settings of the search for static equilibrium, filled by sinew_equilibrium_def_init.
+typedef struct sinew_equilibrium_def {
+  size_t struct_size;   ///< Size of this struct; sinew_equilibrium_def_init sets it.
+  float tolerance;      ///< [m] Estimated position error allowed; 0: 1e-6 of the body's extent.
   uint32_t iterations;  ///< Largest number of matrix-vector products; 0 (default): 1,000,000.
-} sinew_rest_state_def;
+} sinew_equilibrium_def;
 
-/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_rest_state_def).
-sinew_status sinew_rest_state_def_init(sinew_rest_state_def *def, size_t struct_size);
+/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_equilibrium_def).
+sinew_status sinew_equilibrium_def_init(sinew_equilibrium_def *def, size_t struct_size);
 
 /// Report of the search for static equilibrium.
-typedef struct sinew_rest_state_report {
-  size_t struct_size;    ///< Set to sizeof(sinew_rest_state_report) before the call.
+typedef struct sinew_equilibrium_report {
+  size_t struct_size;    ///< Set to sizeof(sinew_equilibrium_report) before the call.
   uint32_t iterations;   ///< Number of linear systems solved.
   uint32_t products;     ///< Number of matrix-vector products.
-  /// [N] Largest force left on a free node, before positions are rounded to float.
-  double residual;
-  double error;          ///< [m] Estimated position error, before positions are rounded to float.
-  /// [J] Energy of springs, gravity and forces before the search, 0 at the origin.
-  double energy_before;
+  double residual;       ///< [N] Largest force left on a free node, before positions become floats.
+  double error;          ///< [m] Estimated position error, before positions become floats.
+  double energy_before;  ///< [J] Energy of springs, gravity and forces before the search.
   double energy_after;   ///< [J] Energy of springs, gravity and forces after the search.
-} sinew_rest_state_report;
+} sinew_equilibrium_report;
 
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
-/// It is not a step: it allocates and may take seconds. It ignores tools. Velocities become 0,
-/// pending forces stay. The rigid position of unpinned parts is unspecified. `def` (defaults) and
-/// `report` are nullable. It ends the views of the body's positions and velocities. On failure
-/// nothing changes.
+/// It may take seconds, ignores tools and ends views. Velocities become 0, pending forces stay.
+/// `def` (defaults) and `out_report` are nullable. The rigid position of unpinned parts is
+/// unspecified.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part;
 /// SINEW_STATUS_UNSTABLE if not found.
-sinew_status sinew_body_rest_state(sinew_world *world, sinew_body_id body,
-                                   const sinew_rest_state_def *def,
-                                   sinew_rest_state_report *report);
+sinew_status sinew_body_solve_equilibrium(sinew_world *world, sinew_body_id body,
+    const sinew_equilibrium_def *def, sinew_equilibrium_report *out_report);
+
+// sinew/query.h: rays, nearest points and the overlap of two bodies.
+
+// ---- Surface points -----------------------------------------------------------------------------
+
+/// Point on the surface of a body.
+typedef struct sinew_surface_point {
+  size_t struct_size;  ///< Set to sizeof(sinew_surface_point) before the call.
+  sinew_body_id body;  ///< Body of the point; all zero if none was found.
+  uint32_t triangle;   ///< Index of the triangle in the body's surface.
+  float weights[3];    ///< Weights of the triangle's corners, with sum 1.
+  float position[3];   ///< [m] Position of the point.
+  float normal[3];     ///< Outward unit normal of the triangle; 0 if it has no area.
+  float distance;      ///< [m] Distance from the query point.
+} sinew_surface_point;
+
+/// Finds the first body surface point that a ray hits; without one out->body is all zero.
+/// `origin` [m] and `direction`, of any length but 0, are 3 floats each; `max_distance` [m] is at
+/// least 0. A triangle parallel to the ray is not hit. The first query near a body may allocate.
+sinew_status sinew_world_cast_ray(const sinew_world *world, const float *origin,
+    const float *direction, float max_distance, sinew_surface_point *out);
+
+/// Finds the body surface point nearest to a point; without one out->body is all zero.
+/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. The first query may allocate.
+sinew_status sinew_world_find_nearest(const sinew_world *world, const float *point,
+    float max_distance, sinew_surface_point *out);
+
+// ---- Overlap ------------------------------------------------------------------------------------
+
+/// Contents of the images of a detector.
+typedef enum sinew_image_form {
+  /// Intervals of rays inside; finds all edges, points deeper than 0.71 pixels.
+  SINEW_IMAGE_FORM_INTERVALS = 0,
+  /// CInDeR (Halic et al.): edges in a depth buffer, faces in front counted; for comparison. Of
+  /// edges that share a pixel only the nearest is found. No points, no volume.
+  SINEW_IMAGE_FORM_COUNTED = 1
+} sinew_image_form;
+
+/// Bodies and method of a detector.
+/// Filled by sinew_detector_def_init; read only during sinew_detector_create.
+typedef struct sinew_detector_def {
+  size_t struct_size;       ///< Size of this struct; sinew_detector_def_init sets it.
+  sinew_body_id bodies[2];  ///< First and second body with surfaces, one of them at least closed.
+  /// SINEW_DETECTION_EXACT (default), where only `bodies` count, or IMAGE_SPACE. thickness must be
+  /// 0 with EXACT. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
+  uint32_t detection;
+  uint32_t form;            ///< IMAGE_SPACE: a sinew_image_form value; default INTERVALS.
+  float pixel;  ///< [m] IMAGE_SPACE: pixel size, above 0. 1/256 of the body finds 99.9 % of edges.
+  /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes. Depths along the
+  /// view exceed the shortest distance by about 2 % of the size with three axes, by 6 % with one.
+  float direction[3];
+  /// IMAGE_SPACE: capacity of an image in pixels, 1 to 2^24; default 2^18. If it is too small, the
+  /// pixel size doubles until the image fits.
+  uint32_t pixels;
+  /// INTERVALS: capacity of ray-face crossings per body and image, at least 1; default 2^20. If it
+  /// is too small, the pixel size doubles. The default capacities take about 18 MB.
+  uint32_t crossings;
+  /// [m] IMAGE_SPACE: thickness added along the view, so that thin parts are found.
+  float thickness[2];
+} sinew_detector_def;
+
+/// Fills a detector definition with its defaults; `struct_size` is sizeof(sinew_detector_def).
+sinew_status sinew_detector_def_init(sinew_detector_def *def, size_t struct_size);
+
+/// Detector of the overlap of two bodies; it applies no forces and may outlive its world.
+/// Any number of threads may use a `const sinew_detector *` at the same time; a `sinew_detector *`
+/// needs exclusive access.
+typedef struct sinew_detector sinew_detector;
+
+/// Creates a detector for two bodies and allocates its memory, without a first search.
+/// Destroy it with sinew_detector_destroy.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bodies are the same, one has no surface, or both
+/// are open; with EXACT also if a closed surface is inverted, self-intersecting or degenerate.
+sinew_status sinew_detector_create(const sinew_world *world, const sinew_detector_def *def,
+    sinew_detector **out);
+
+/// Destroys a detector and ends its lists and views; NULL has no effect.
+void sinew_detector_destroy(sinew_detector *detector);
+
+/// Overlap that a detector found; index 0 is the first body, 1 the second.
+typedef struct sinew_detector_report {
+  size_t struct_size;        ///< Set to sizeof(sinew_detector_report) before the call.
+  double volume;  ///< [m^3] INTERVALS: overlap volume, mean over the views; 0 with an open body.
+  float normal[3];  ///< Unit direction that moves the first body out fastest; 0 without volume.
+  float depth;               ///< [m] Linear estimate of the distance to move it.
+  float pixel;               ///< [m] Largest pixel size used; 0 with EXACT.
+  uint32_t point_counts[2];  ///< Number of entries of sinew_detector_get_points.
+  uint32_t edge_counts[2];   ///< Number of entries of sinew_detector_get_edges.
+  uint32_t unlisted[2];      ///< Number of edge parts beyond four per edge on average.
+  uint32_t closed[2];  ///< 1: closed; 0: open, and nothing is found inside; not checked again.
+} sinew_detector_report;
+
+/// Finds the overlap of the two bodies at their current positions.
+/// You may pass another world if both ids refer there to bodies with identical surfaces. An open
+/// body reports only edges (EXACT: also points). Image space does not allocate.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface;
+/// SINEW_STATUS_CAPACITY if one ray has more than `crossings`.
+sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,
+    sinew_detector_report *out_report);
+
+#define SINEW_NO_TRIANGLE UINT32_MAX  ///< Value of `triangle` if there is none.
+
+/// Node of a body that lies inside the other body.
+typedef struct sinew_point_inside {
+  uint32_t node;      ///< Index of the node.
+  uint32_t triangle;  ///< IMAGE_SPACE: triangle to leave through; EXACT: SINEW_NO_TRIANGLE.
+  float depth;  ///< [m] IMAGE_SPACE: shortest distance out along the views; EXACT: to the surface.
+  float normal[3];    ///< EXACT: unit direction of the shortest distance out; IMAGE_SPACE: 0.
+} sinew_point_inside;
+
+/// Writes the list of nodes of one body that lie inside the other, in ascending order.
+/// `side` 0 is the first body, 1 the second. It is empty before the first search and with COUNTED.
+/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
+sinew_status sinew_detector_get_points(const sinew_detector *detector, uint32_t side,
+    const sinew_point_inside **out_points, size_t *out_count);
+
+/// Part of an edge of a body that lies inside the other body.
+typedef struct sinew_edge_inside {
+  uint32_t nodes[2];  ///< First and second node of the edge.
+  float entry;        ///< Fraction of the edge where it enters; 0 if it starts inside.
+  float exit;         ///< Fraction of the edge where it leaves; 1 if it ends inside.
+  /// [m] IMAGE_SPACE: largest distance out along the view, the least over the views; EXACT: 0.
+  /// COUNTED: the distance from the edge to the next face.
+  float depth;
+} sinew_edge_inside;
+
+/// Writes the list of surface edge parts of one body that lie inside the other, by edge.
+/// `side` and lifetime are as for sinew_detector_get_points. It is empty before the first search.
+sinew_status sinew_detector_get_edges(const sinew_detector *detector, uint32_t side,
+    const sinew_edge_inside **out_edges, size_t *out_count);
+
+/// Writes a view of the gradient [m^2] of the overlap volume at each node of one body.
+/// Moving the nodes against it separates the bodies. It is empty with COUNTED, EXACT or an open
+/// body. `side` and lifetime are as for sinew_detector_get_points.
+sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_t side,
+    sinew_dvec3_view *out);
 
 // sinew/attachment.h: grasping tissue, joining tissue, sutures.
 //
 // An attachment holds a node or a surface point on a tool or on another point until it is released,
 // breaks, or one of the two is destroyed.
 
-// ---- Tissue to a tool ---------------------------------------------------------------------------
+// ---- Creation -----------------------------------------------------------------------------------
 
-/// Attaches one node of a body to a tool, like sinew_body_attach_nodes.
-sinew_status sinew_body_attach_node(sinew_world *world, sinew_body_id body, uint32_t node,
-                                    sinew_tool_id tool, float force_limit,
-                                    sinew_attachment_id *out);
+/// Nodes or surface points of a body that are attached to a tool or a body.
+/// Filled by sinew_attachment_def_init; read only during sinew_attachment_create.
+typedef struct sinew_attachment_def {
+  size_t struct_size;               ///< Size of this struct; sinew_attachment_def_init sets it.
+  sinew_body_id body;               ///< Body whose nodes or points are attached; no default.
+  sinew_tool_id tool;  ///< Tool that they are attached to; all zero (default): those of `other`.
+  sinew_body_id other;  ///< Body that they are attached to; all zero (default): the tool.
+  size_t count;                     ///< Number of attachments; default 0.
+  const uint32_t *nodes;            ///< `count` node indices; nullable: points.
+  const uint32_t *triangles;  ///< `count` surface triangle indices of points; nullable: nodes.
+  /// 3 * count corner weights of them, at least 0 with sum 1; nullable: nodes.
+  const float *weights;
+  const uint32_t *other_nodes;  ///< `count` node indices of `other`; nullable: points or a tool.
+  /// `count` surface triangle indices of `other`; nullable: nodes or a tool.
+  const uint32_t *other_triangles;
+  /// 3 * count corner weights of these points; nullable: nodes or a tool.
+  const float *other_weights;
+  float force_limit;  ///< [N] Mean force above which it breaks; infinity (default) or 0: unlimited.
+} sinew_attachment_def;
 
-/// Attaches nodes of a body rigidly to a tool, each by its own attachment.
-/// The nodes move with the tool until sinew_attachment_release; the tool does not collide with
-/// them. The holding force is part of the tool's wrench. `out` receives `count` ids. `force_limit`
-/// [N]: the attachment breaks after a step with a larger mean force; 0 or infinity: unlimited.
-/// Attachments end with the body or tool. On failure nothing is attached.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node is pinned, massless or held by another tool.
-sinew_status sinew_body_attach_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                     size_t count, sinew_tool_id tool, float force_limit,
-                                     sinew_attachment_id *out);
+/// Fills an attachment definition with its defaults; `struct_size` is sizeof(sinew_attachment_def).
+sinew_status sinew_attachment_def_init(sinew_attachment_def *def, size_t struct_size);
 
-/// Attaches surface points of a body rigidly to a tool, each by its own attachment.
-/// `triangles` holds `count` indices into the body's surface, `weights` 3 * count corner weights,
-/// at least 0 with sum 1. Every corner with a weight is attached, so that the patch cannot rotate;
-/// its forces add up. Corners shared by points split their force by weight. Otherwise like
-/// sinew_body_attach_nodes.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a corner is pinned, massless or held by another tool.
-sinew_status sinew_body_attach_points(sinew_world *world, sinew_body_id body,
-                                      const uint32_t *triangles, const float *weights, size_t count,
-                                      sinew_tool_id tool, float force_limit,
-                                      sinew_attachment_id *out);
-
-// ---- Tissue to tissue ---------------------------------------------------------------------------
-
-/// Attaches nodes of a body to nodes of another or the same body, pair by pair.
-/// Each pair becomes one point, about which both may rotate; a gap closes at no more than 0.25 m/s.
-/// Momentum is conserved. Paired nodes and their features do not collide. `out` receives `count`
-/// ids. `force_limit` [N]: breaks after a step with a larger mean force; 0 or infinity: unlimited.
-/// Attachments end with either body. On failure nothing is attached.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if both nodes of a pair are the same.
-sinew_status sinew_body_attach_nodes_to_nodes(sinew_world *world, sinew_body_id body,
-                                              const uint32_t *nodes, size_t count,
-                                              sinew_body_id other, const uint32_t *other_nodes,
-                                              float force_limit, sinew_attachment_id *out);
-
-/// Attaches nodes of a body to surface points of another or the same body, pair by pair.
-/// `other_triangles` and `other_weights` are as in sinew_body_attach_points, but the surface may
-/// rotate about each point. Otherwise like sinew_body_attach_nodes_to_nodes.
-sinew_status sinew_body_attach_nodes_to_points(sinew_world *world, sinew_body_id body,
-                                               const uint32_t *nodes, size_t count,
-                                               sinew_body_id other, const uint32_t *other_triangles,
-                                               const float *other_weights, float force_limit,
-                                               sinew_attachment_id *out);
-
-/// Attaches surface points of a body to surface points of another or the same body, pair by pair.
-/// Points are as in sinew_body_attach_nodes_to_points, the rest as in
-/// sinew_body_attach_nodes_to_nodes.
-sinew_status sinew_body_attach_points_to_points(sinew_world *world, sinew_body_id body,
-                                                const uint32_t *triangles, const float *weights,
-                                                size_t count, sinew_body_id other,
-                                                const uint32_t *other_triangles,
-                                                const float *other_weights, float force_limit,
-                                                sinew_attachment_id *out);
+/// Attaches nodes or surface points of a body to a tool or to a body, each by its own attachment.
+/// A tool holds them rigidly and does not collide with them. Two bodies join at one point that both
+/// rotate about; a gap closes at no more than 0.25 m/s. `out_attachments` receives `count` ids.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node for a tool is pinned, massless or held, or both
+/// ends are the same.
+sinew_status sinew_attachment_create(sinew_world *world, const sinew_attachment_def *def,
+    sinew_attachment_id *out_attachments);
 
 // ---- Sutures ------------------------------------------------------------------------------------
 
 /// Settings of a suture, filled by sinew_suture_def_init.
 typedef struct sinew_suture_def {
   size_t struct_size;  ///< Size of this struct; sinew_suture_def_init sets it.
-  /// [m] Unloaded length of the thread, at least 0; -1 (default): the current distance.
-  float length;
-  /// [N/m] Stiffness of the thread, above 0; infinity (default): inextensible.
-  float stiffness;
-  /// [N] Mean force above which it tears out, at least 0; 0 (default) or infinity: unlimited.
-  float force_limit;
-  uint32_t reserved0;  ///< Reserved; must be 0.
+  float length;        ///< [m] Unloaded length of the thread; -1 (default): the current distance.
+  float stiffness;  ///< [N/m] Stiffness of the thread, above 0; infinity (default): inextensible.
+  float force_limit;   ///< [N] Mean force where it tears out; infinity (default) or 0: unlimited.
 } sinew_suture_def;
 
 /// Fills a suture definition with its defaults; `struct_size` is sizeof(sinew_suture_def).
 sinew_status sinew_suture_def_init(sinew_suture_def *def, size_t struct_size);
 
 /// Joins two surface points of bodies by a thread, which pulls and never pushes.
-/// A point is a surface triangle with 3 corner weights, at least 0 with sum 1. The bodies may be
-/// the same and still collide. `def` is nullable: the defaults. A thread shorter than the distance
-/// is drawn in at no more than 0.25 m/s. Release and force are those of an attachment; a torn
-/// suture is in sinew_world_get_slipped.
+/// Body, triangle and weights of the points count. The bodies may be the same and still collide.
+/// `def` is nullable: the defaults. The thread is drawn in at no more than 0.25 m/s. It is an
+/// attachment.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if both points are the same.
-sinew_status sinew_body_suture_points(sinew_world *world, sinew_body_id body, uint32_t triangle,
-                                      const float *weights, sinew_body_id other,
-                                      uint32_t other_triangle, const float *other_weights,
-                                      const sinew_suture_def *def, sinew_attachment_id *out);
+sinew_status sinew_suture_create(sinew_world *world, const sinew_surface_point *point,
+    const sinew_surface_point *other_point, const sinew_suture_def *def, sinew_attachment_id *out);
 
-/// Changes the length [m] of a suture's thread evenly over the next step.
-/// The length is at least 0. It shortens by at most 0.25 m/s, over as many steps as that takes.
+/// Changes the length [m] of a suture's thread over the next step, by at most 0.25 m/s.
+/// A longer change goes on over the following steps.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
 sinew_status sinew_suture_set_length(sinew_world *world, sinew_attachment_id suture, float length);
 
@@ -1080,14 +1128,13 @@ typedef struct sinew_suture_report {
   size_t struct_size;  ///< Set to sizeof(sinew_suture_report) before the call.
   float length;        ///< [m] Unloaded length of the thread.
   float distance;      ///< [m] Distance of its points; larger than the length under load.
-  /// [J] Energy stored in the thread, not part of the bodies' energy; 0 if inextensible.
-  double energy;
+  double energy;       ///< [J] Energy of the thread, not of the bodies; 0 if inextensible.
 } sinew_suture_report;
 
 /// Writes the current state of a suture.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
 sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_id suture,
-                                     sinew_suture_report *report);
+    sinew_suture_report *out_report);
 
 // ---- All attachments ----------------------------------------------------------------------------
 
@@ -1095,17 +1142,16 @@ sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_
 /// Errors: SINEW_STATUS_STALE_ID also if it broke, or if a body or the tool was destroyed.
 sinew_status sinew_attachment_release(sinew_world *world, sinew_attachment_id attachment);
 
-/// Writes the force of an attachment on its body, averaged over the last step.
-/// `force` [N] receives 3 floats in world axes, 0 before the first step. After
-/// sinew_body_rest_state it is the force of the tool in equilibrium.
+/// Writes the force [N] of an attachment on its body, averaged over the last step.
+/// `out_force` receives 3 floats in world axes. After sinew_body_solve_equilibrium it is the force
+/// of the tool in equilibrium.
 sinew_status sinew_attachment_get_force(const sinew_world *world, sinew_attachment_id attachment,
-                                        float *force);
+    float *out_force);
 
 /// Writes the attachments that broke in the last step because of their force_limit.
-/// `out` receives at most `capacity` ids, `count` the number that broke. The ids are stale: compare
-/// them with those you stored.
-sinew_status sinew_world_get_slipped(const sinew_world *world, sinew_attachment_id *out,
-                                     size_t capacity, size_t *count);
+/// `out_attachments` receives at most `capacity` ids, which are stale, `out_count` their number.
+sinew_status sinew_world_get_broken_attachments(const sinew_world *world,
+    sinew_attachment_id *out_attachments, size_t capacity, size_t *out_count);
 
 // sinew/cutting.h: cuts, blades, tears and the changes they make.
 //
@@ -1118,32 +1164,27 @@ typedef struct sinew_cut_report {
   size_t struct_size;        ///< Set to sizeof(sinew_cut_report) before the call.
   uint32_t new_nodes;        ///< Number of new nodes: copies, and surface points bound to nodes.
   uint32_t new_triangles;    ///< Number of new surface triangles.
-  /// Number of springs removed by the blade or replaced by springs of copies.
-  uint32_t springs_removed;
+  uint32_t springs_removed;  ///< Number of springs removed, or replaced by springs of copies.
   uint32_t pieces_parted;    ///< Increase of the number of connected surface components.
-  /// [m] Length of the cut in the rest shape; for a solid on its surface.
-  double length;
-  /// [m^2] Area of the opened faces of a solid in the rest shape, counted on one side. A cell in
-  /// which the cut ends stays whole, so the area can be less than the blade swept.
+  double length;  ///< [m] Length of the cut in the rest shape; for a solid on its surface.
+  /// [m^2] Area of one side of the opened faces of a solid at rest; a cell where the cut ends stays
+  /// whole.
   double area;
 } sinew_cut_report;
 
 /// Cuts a body along the surface that a blade's edge swept, at the current positions.
-/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `report` is nullable. A
-/// sweep that starts where the body's last one ended continues it. New nodes are appended; mass,
-/// momentum and energy are conserved. The call ends views of positions and triangles; see
-/// sinew_body_get_topology_changes. On failure nothing changes.
+/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `out_report` is
+/// nullable. A sweep that starts where the last one ended continues it. New nodes are appended, and
+/// views end; see sinew_body_get_topology_changes.
 /// Errors: SINEW_STATUS_UNSUPPORTED without spare_nodes; SINEW_STATUS_CAPACITY if too few are left.
 sinew_status sinew_body_cut(sinew_world *world, sinew_body_id body, const float *start,
-                            const float *end, sinew_cut_report *report);
+    const float *end, sinew_cut_report *out_report);
 
 /// Origin of a node that a cut added; vertex attributes interpolate by its weights.
 typedef struct sinew_new_node {
   uint32_t node;        ///< Index of the new node; indices increase by 1 per entry.
-  /// Source nodes, each with a lower index than the new node; an unused entry has weight 0.
-  uint32_t sources[3];
-  /// Weights of the sources, at least 0, with sum 1; a copy has a single source.
-  float weights[3];
+  uint32_t sources[3];  ///< Source nodes, lower than the new node; an unused entry has weight 0.
+  float weights[3];     ///< Weights of the sources, with sum 1; a copy has a single source.
 } sinew_new_node;
 
 /// Cut-boundary edge; each cut edge has one on either side.
@@ -1159,29 +1200,26 @@ typedef struct sinew_topology_changes {
   uint64_t version;                 ///< Current topology version; pass it to the next call.
   const sinew_new_node *nodes;      ///< New nodes in ascending order of index.
   size_t node_count;                ///< Number of new nodes.
-  /// Indices of changed and new triangles in sinew_body_get_triangles; may repeat.
-  const uint32_t *triangles;
+  const uint32_t *triangles;        ///< Changed and new triangles of the surface; may repeat.
   size_t triangle_count;            ///< Number of triangle indices.
   const uint32_t *removed_springs;  ///< 2 * removed_spring_count nodes of removed springs.
   size_t removed_spring_count;      ///< Number of removed springs.
-  /// New cut-boundary edges as they were when they were made; later cuts may change them.
-  const sinew_rim_edge *rim;
+  const sinew_rim_edge *rim;  ///< New cut-boundary edges as they were made; later cuts change them.
   size_t rim_count;                 ///< Number of cut-boundary edges.
 } sinew_topology_changes;
 
 /// Writes the topology changes of a body since a version.
-/// Pass 0 for all changes since creation, then the `version` of the previous call. A renderer
-/// interpolates the attributes of new nodes from their sources and reads the listed triangles
-/// again.
+/// Pass 0 for all changes, then the `version` of the previous call. Interpolate the attributes of
+/// new nodes from their sources and read the listed triangles again.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the version is in the future.
 sinew_status sinew_body_get_topology_changes(const sinew_world *world, sinew_body_id body,
-                                             uint64_t since_version, sinew_topology_changes *out);
+    uint64_t since_version, sinew_topology_changes *out);
 
-/// Writes the connected component of each node, and the number of components.
-/// Nodes are connected by springs, elements and the surface. `pieces` receives `count` numbers from
-/// 0, where `count` is the number of nodes. `pieces` and `piece_count` are nullable.
-sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body, uint32_t *pieces,
-                                   size_t count, uint32_t *piece_count);
+/// Writes the connected component of each node, from 0, and the number of components.
+/// Nodes are connected by springs, elements and the surface. `out_pieces` receives `node_count`
+/// numbers; both outputs are nullable.
+sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_pieces, size_t node_count, uint32_t *out_piece_count);
 
 // ---- Blades -------------------------------------------------------------------------------------
 
@@ -1189,41 +1227,45 @@ sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body,
 /// Filled by sinew_blade_def_init; read only during sinew_blade_create.
 typedef struct sinew_blade_def {
   size_t struct_size;           ///< Size of this struct; sinew_blade_def_init sets it.
-  /// [m] Two different end points of the edge about the blade's origin, within 1e9; no default.
-  float edge[6];
-  /// [N/m] Coupling stiffness between the blade and its proxy in each body, above 0; default 1000.
-  /// Before cutting, tissue of toughness T deforms by about T / stiffness.
+  float edge[6];  ///< [m] Two different end points of the edge about the origin, within 1e9.
+  /// [N/m] Coupling stiffness between blade and proxy, above 0; default 1000. Before cutting,
+  /// tissue of toughness T deforms by about T / stiffness.
   float stiffness;
-  /// Bits of the categories that this blade belongs to; default 1. It cuts a body if each has a
-  /// category in the mask of the other.
-  uint32_t collision_category;
-  /// Bits of the categories that this blade cuts; default 0xffffffff.
-  uint32_t collision_mask;
-  /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
-  float position[3];
-  /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
-  float orientation[4];
+  uint32_t collision_category;  ///< Collision categories of this blade; default 1. See base.h.
+  uint32_t collision_mask;      ///< Categories that it cuts; default 0xffffffff.
+  float position[3];            ///< [m] Initial position; default 0 0 0.
+  float orientation[4];         ///< Initial orientation; default 0 0 0 1.
 } sinew_blade_def;
 
 /// Fills a blade definition with its defaults; `struct_size` is sizeof(sinew_blade_def).
 sinew_status sinew_blade_def_init(sinew_blade_def *def, size_t struct_size);
 
 /// Creates a blade: an edge that cuts bodies with spare_nodes as its pose moves.
-/// It has no volume; add a tool for the flat of a scalpel. Tissue resists with its toughness; a
-/// failed cut is reported in sinew_blade_report and leaves the step successful. Tissue that moves
-/// onto the edge is cut too. Moving along the edge or back through the cut meets no resistance. A
-/// triangle needs about 10 spare_nodes. A step that cuts may allocate.
+/// It has no volume. Tissue resists with its toughness; tissue that moves onto the edge is cut too.
+/// Moving along the edge or back meets no resistance. A triangle needs about 10 spare_nodes. A step
+/// that cuts may allocate; sinew_blade_report tells of a failed cut.
 sinew_status sinew_blade_create(sinew_world *world, const sinew_blade_def *def,
-                                sinew_blade_id *out);
+    sinew_blade_id *out);
 
 /// Destroys a blade; its cuts remain.
 sinew_status sinew_blade_destroy(sinew_world *world, sinew_blade_id blade);
 
-/// Moves a blade to a new pose during the next step.
-/// The blade moves along a straight line at constant speed. `position` [m] is 3 floats, each within
-/// 1e9; `orientation` is x y z w, not zero, nullable: unchanged.
+/// Moves a blade to a new pose during the next step, along a line at constant speed.
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged.
 sinew_status sinew_blade_set_pose(sinew_world *world, sinew_blade_id blade, const float *position,
-                                  const float *orientation);
+    const float *orientation);
+
+/// Writes the current pose of a blade; see sinew_tool_get_pose.
+sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade,
+    float *out_position, float *out_orientation);
+
+/// Sets the collision category and mask of a blade; bodies outside of them let go of it.
+sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
+    uint32_t mask);
+
+/// Writes the collision category and mask of a blade.
+sinew_status sinew_blade_get_collision(const sinew_world *world, sinew_blade_id blade,
+    uint32_t *out_category, uint32_t *out_mask);
 
 /// Report of the cuts of a blade and the load on it in the last step.
 typedef struct sinew_blade_report {
@@ -1232,52 +1274,45 @@ typedef struct sinew_blade_report {
   float torque[3];      ///< [N m] Mean torque on the blade about its position, in world axes.
   double work;          ///< [J] Work that moving the blade did on tissue in the step.
   double length;        ///< [m] Length of the cuts in the rest shape; for solids on their surface.
-  /// [m] Distance of the blade ahead of its cut; 0 without tissue in its path.
-  double lag;
-  /// SINEW_STATUS_OK, or CAPACITY or OUT_OF_MEMORY if a cut failed; the next step retries.
-  sinew_status status;
-  uint32_t reserved0;   ///< Reserved; set to 0 by the library.
-  /// [m^2] Area of the opened faces of solids in the rest shape. A cell in which the cut ends stays
-  /// whole, so the area can be less than the blade swept.
-  double area;
+  double lag;  ///< [m] Distance of the blade ahead of its cut; 0 without tissue in its path.
+  sinew_status status;  ///< SINEW_STATUS_OK, or CAPACITY or OUT_OF_MEMORY if a cut is retried.
+  double area;          ///< [m^2] Area of one side of the opened faces of solids at rest.
 } sinew_blade_report;
 
 /// Writes the cuts of a blade and the load on it in the last step.
 sinew_status sinew_blade_get_report(const sinew_world *world, sinew_blade_id blade,
-                                    sinew_blade_report *out);
+    sinew_blade_report *out);
 
 // ---- Tears --------------------------------------------------------------------------------------
 
 /// Sets tear limits of single springs or element edges, in place of the body's.
-/// `pairs` holds 2 * count indices; `strains` and `forces` [N] hold `count` floats each, at least
-/// 0, where 0 means no limit; both are nullable: unchanged. If a pair repeats, its last entry
-/// counts. On failure no limit changes. Springs added later have no limits.
+/// `pairs` holds 2 * count indices; `strains` and `forces` [N] `count` floats each, 0: no limit;
+/// both are nullable: unchanged. If a pair repeats, its last entry counts. Later springs have none.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a pair without spring and edge;
 /// SINEW_STATUS_UNSUPPORTED if most_tears is 0.
 sinew_status sinew_body_set_tear_limits(sinew_world *world, sinew_body_id body,
-                                        const uint32_t *pairs, size_t count, const float *strains,
-                                        const float *forces);
+    const uint32_t *pairs, const float *strains, const float *forces, size_t count);
+
+/// Writes the tear limits of springs or element edges between pairs of nodes.
+/// `pairs` holds 2 * count indices. `out_strains` and `out_forces` [N] receive `count` floats each,
+/// 0: no limit, and are nullable. Errors are those of sinew_body_set_tear_limits.
+sinew_status sinew_body_get_tear_limits(const sinew_world *world, sinew_body_id body,
+    const uint32_t *pairs, size_t count, float *out_strains, float *out_forces);
 
 /// Report of the tears in the last step; all 0 for a body that does not tear.
+/// Springs of small_pieces and no_room are retried after a topology change.
 typedef struct sinew_tear_report {
   size_t struct_size;      ///< Set to sizeof(sinew_tear_report) before the call.
   uint32_t tears;          ///< Number of tears made.
   uint32_t pieces_parted;  ///< Increase of the number of connected surface components.
-  /// Overloaded springs that wait: most_tears was reached, a neighbor tore, or no force separates
-  /// their nodes.
-  uint32_t waiting;
-  /// Overloaded springs that would make a fragment below smallest_piece; retried after a topology
-  /// change.
-  uint32_t small_pieces;
-  /// Overloaded springs without spare nodes, FAST_LINK slots or memory; retried after a topology
-  /// change.
-  uint32_t no_room;
-  uint32_t reserved;       ///< Reserved; set to 0 by the library.
+  uint32_t waiting;  ///< Overloaded springs that wait: beyond most_tears, or not pulled apart.
+  uint32_t small_pieces;   ///< Overloaded springs whose fragment would be below smallest_piece.
+  uint32_t no_room;        ///< Overloaded springs without spare nodes, FAST_LINK slots or memory.
 } sinew_tear_report;
 
 /// Writes which tears the last step of a body made or refused.
 sinew_status sinew_body_get_tear_report(const sinew_world *world, sinew_body_id body,
-                                        sinew_tear_report *out);
+    sinew_tear_report *out);
 
 // sinew/haptics.h: force feedback at 1 kHz on the device's own thread.
 
@@ -1286,27 +1321,22 @@ sinew_status sinew_body_get_tear_report(const sinew_world *world, sinew_body_id 
 typedef struct sinew_haptic_def {
   size_t struct_size;       ///< Size of this struct; sinew_haptic_def_init sets it.
   sinew_tool_id tool;       ///< Tool that the device drives; no default.
-  /// [N/m] Coupling stiffness between device and tool, above 0; default 1000. A device is stable up
-  /// to about half of its damping [N s/m] divided by the tick time.
+  /// [N/m] Coupling stiffness between device and tool, above 0; default 1000. Stable up to about
+  /// half of the device's damping [N s/m] divided by the tick time.
   float stiffness;
   /// [N m/rad] Angular coupling stiffness; 0 (default): stiffness at half of the tool's length. It
   /// is at least 1e-6 of that value.
   float angular_stiffness;
-  /// Damping of the coupling while tissue resists, at least 0; 1 (default) is critical for
-  /// device_mass.
-  float damping_ratio;
+  float damping_ratio;  ///< Damping while tissue resists; 1 (default): critical for device_mass.
   float device_mass;        ///< [kg] Effective mass of the device, above 0; default 0.05.
-  /// [N] Largest force on the device, at least 0; infinity (default) or 0: unlimited.
-  float force_limit;
-  /// [N m] Largest torque on the device, at least 0; infinity (default) or 0: unlimited.
-  float torque_limit;
-  /// [N/s] Largest rate of change of the force, at least 0; infinity (default) or 0: unlimited. The
-  /// coupling is passive only while this limit is not reached.
+  float force_limit;  ///< [N] Largest force on the device; infinity (default) or 0: unlimited.
+  float torque_limit;  ///< [N m] Largest torque on the device; infinity (default) or 0: unlimited.
+  /// [N/s] Largest rate of change of the force; infinity (default) or 0: unlimited. The coupling is
+  /// passive only while this limit is not reached.
   float force_rate_limit;
-  /// [N m/s] Largest rate of change of the torque, at least 0; infinity (default) or 0: unlimited.
+  /// [N m/s] Largest rate of change of the torque; infinity (default) or 0: unlimited.
   float torque_rate_limit;
-  /// [s] Age at which the model is stale and the force fades to 0, above 0; default 0.1.
-  float stale_after;
+  float stale_after;  ///< [s] Age at which the model's force fades to 0, above 0; default 0.1.
   float ramp;               ///< [s] Duration of that fade, and of the return, above 0; default 0.1.
 } sinew_haptic_def;
 
@@ -1317,43 +1347,39 @@ sinew_status sinew_haptic_def_init(sinew_haptic_def *def, size_t struct_size);
 /// One thread at a time may use it, while other threads step or use the world.
 typedef struct sinew_haptic sinew_haptic;
 
-/// Creates a haptic handle that drives a tool.
-/// Destroy it with sinew_haptic_destroy. Until then sinew_tool_set_pose refuses the tool, and each
-/// step moves it to the latest proxy pose. The tool should start at the device's pose.
+/// Creates a haptic handle that drives a tool; destroy it with sinew_haptic_destroy.
+/// Until then sinew_tool_set_pose refuses the tool, and each step moves it to the latest proxy
+/// pose. The tool should start at the device's pose.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if another handle drives the tool.
 sinew_status sinew_haptic_create(sinew_world *world, const sinew_haptic_def *def,
-                                 sinew_haptic **out);
+    sinew_haptic **out);
 
 /// Destroys a haptic handle, before or after its world; NULL has no effect.
 /// The tool is then moved by sinew_tool_set_pose again.
 void sinew_haptic_destroy(sinew_haptic *haptic);
 
 /// Result of a haptic tick.
-typedef struct sinew_haptic_result {
-  size_t struct_size;          ///< Set to sizeof(sinew_haptic_result) before the call.
+typedef struct sinew_haptic_report {
+  size_t struct_size;          ///< Set to sizeof(sinew_haptic_report) before the call.
   float force[3];              ///< [N] Force on the device until the next tick, in world axes.
   float torque[3];             ///< [N m] Torque on the device about its position, in world axes.
-  /// [m] Position that the tool is driven to: the device minus the coupling extension.
-  float proxy_position[3];
+  float proxy_position[3];     ///< [m] Position that the tool is driven to, behind the device.
   float proxy_orientation[4];  ///< Orientation that the tool is driven to, x y z w.
   uint32_t contact_count;      ///< Number of contacts of the model; see sinew_haptic_get_contacts.
-  /// [s] Age of the model by tick time; infinity before the first model.
-  float age;
+  float age;  ///< [s] Age of the model by tick time; infinity before the first model.
   uint64_t version;            ///< Number of world steps published to this handle.
-  /// Fraction of the model's force that is applied; below 1 if the model is stale.
-  float gain;
+  float gain;                  ///< Fraction of the model's force that is applied; below 1 if stale.
   uint32_t is_over;            ///< 1: the tool or its world was destroyed.
-  /// [J] Energy that the coupling dissipated; kept at least 0 as far as damping can.
-  double lost;
-} sinew_haptic_result;
+  double lost;  ///< [J] Energy that the coupling dissipated, at least 0 as far as damping can.
+} sinew_haptic_report;
 
 /// Computes the force on the device from its current pose, without waiting, locking or allocating.
-/// `position` [m] is 3 floats; `orientation` is x y z w, nullable: unchanged. `velocity` [m/s] and
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged. `velocity` [m/s] and
 /// `angular_velocity` [rad/s] are 3 floats each in world axes, nullable: estimated. `dt` [s] is the
-/// time since the last tick, above 0, at most 1. After an error apply no force to the device.
+/// time since the last tick, above 0, at most 1. After an error apply no force.
 sinew_status sinew_haptic_tick(sinew_haptic *haptic, const float *position,
-                               const float *orientation, const float *velocity,
-                               const float *angular_velocity, float dt, sinew_haptic_result *out);
+    const float *orientation, const float *velocity, const float *angular_velocity, float dt,
+    sinew_haptic_report *out);
 
 /// Contact of the tool in the model of a haptic handle.
 typedef struct sinew_haptic_contact {
@@ -1365,10 +1391,10 @@ typedef struct sinew_haptic_contact {
 } sinew_haptic_contact;
 
 /// Writes the contacts of the model that the last tick used, without waiting.
-/// `contacts` receives at most `capacity` entries, `count` the number that exist, at most 32; with
-/// more, those with the largest force.
-sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic, sinew_haptic_contact *contacts,
-                                       size_t capacity, size_t *count);
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist, at most
+/// 32; with more, those with the largest force.
+sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic,
+    sinew_haptic_contact *out_contacts, size_t capacity, size_t *out_count);
 
 // sinew/dynamics.h: tools that are rigid bodies.
 
@@ -1376,59 +1402,52 @@ sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic, sinew_haptic_
 typedef struct sinew_mass_properties {
   size_t struct_size;       ///< Set to sizeof(sinew_mass_properties) before the call.
   float mass;               ///< [kg] Mass, 1e-12 to 1e12.
-  /// [m] Center of mass, from the tool's position; each coordinate is within 1e9.
-  float center_of_mass[3];
-  /// [kg m^2] Inertia tensor xx yy zz xy xz yz about the center of mass. It is positive definite,
-  /// and no principal moment exceeds the sum of the other two.
+  float center_of_mass[3];  ///< [m] Center of mass, from the tool's position; within 1e9.
+  /// [kg m^2] Inertia tensor xx yy zz xy xz yz about the center of mass. It is positive definite;
+  /// no principal moment exceeds the sum of the others.
   float inertia[6];
 } sinew_mass_properties;
 
-/// Writes the mass properties of a tool that is filled evenly with material.
-/// `density` [kg/m^3] is above 0. `out` sets struct_size.
+/// Writes the mass properties of a tool of a density [kg/m^3], above 0; `out` sets struct_size.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane.
 sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool_id tool,
-                                            float density, sinew_mass_properties *out);
+    float density, sinew_mass_properties *out);
 
 /// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
-/// `mass` is nullable: the tool becomes kinematic again, as it is created. A dynamic tool starts at
-/// rest; a new mass leaves its velocity. Contact keeps momentum and, with VERLET, is stable for any
-/// mass. Pinned nodes are obstacles; other tools are not. Bodies near a dynamic tool do not sleep.
+/// `mass` is nullable: kinematic again, as it is created. It starts at rest; a new mass leaves its
+/// velocity. Pinned nodes are obstacles; other tools are not. Bodies near it do not sleep.
 /// force_limit has no effect.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if attachments or a haptic handle use the
-/// tool.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if an attachment or haptic handle uses it.
 sinew_status sinew_tool_set_mass(sinew_world *world, sinew_tool_id tool,
-                                 const sinew_mass_properties *mass);
+    const sinew_mass_properties *mass);
 
 /// Writes the mass properties of a dynamic tool; all zero if the tool is kinematic.
 sinew_status sinew_tool_get_mass(const sinew_world *world, sinew_tool_id tool,
-                                 sinew_mass_properties *out);
+    sinew_mass_properties *out);
 
 /// Sets the velocity of a dynamic tool, in world axes.
 /// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] are 3 floats each.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
 sinew_status sinew_tool_set_velocity(sinew_world *world, sinew_tool_id tool, const float *velocity,
-                                     const float *angular_velocity);
+    const float *angular_velocity);
 
-/// Writes the velocity of a dynamic tool, in world axes.
-/// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] receive 3 floats each;
-/// both are nullable.
+/// Writes the velocity of a dynamic tool, as sinew_tool_set_velocity takes it; both are nullable.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
-sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool, float *velocity,
-                                     float *angular_velocity);
+sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool,
+    float *out_velocity, float *out_angular_velocity);
 
 /// Adds a force and a torque on a dynamic tool throughout the next step, in world axes.
 /// `force` [N] acts at the center of mass, `torque` [N m] about it; they are 3 floats each.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
 sinew_status sinew_tool_apply_wrench(sinew_world *world, sinew_tool_id tool, const float *force,
-                                     const float *torque);
+    const float *torque);
 
-/// Moves a tool to a new pose at once, without a sweep.
-/// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable:
-/// unchanged. Tissue inside is pushed out over the next steps. A dynamic tool keeps its velocity; a
-/// pending sinew_tool_set_pose is dropped.
+/// Moves a tool to a new pose at once, without a sweep; a dynamic tool keeps its velocity.
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged. Tissue inside is pushed out
+/// over the next steps. A pending sinew_tool_set_pose is dropped.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if attachments or a haptic handle use the tool.
 sinew_status sinew_tool_teleport(sinew_world *world, sinew_tool_id tool, const float *position,
-                                 const float *orientation);
+    const float *orientation);
 
 // sinew/render.h: render surfaces, and positions for a render thread.
 
@@ -1438,15 +1457,13 @@ sinew_status sinew_tool_teleport(sinew_world *world, sinew_tool_id tool, const f
 /// Filled by sinew_embedding_def_init; read only during sinew_embedding_create.
 typedef struct sinew_embedding_def {
   size_t struct_size;          ///< Size of this struct; sinew_embedding_def_init sets it.
-  /// [m] 3 * vertex_count floats for the body's current positions, within 1e9; no default.
-  const float *vertices;
+  const float *vertices;       ///< [m] 3 * vertex_count floats for the body's current positions.
   size_t vertex_count;         ///< Number of vertices, at least 1.
-  /// 3 * triangle_count vertex indices, outward, for the normals; nullable: no normals.
-  const uint32_t *triangles;
+  const uint32_t *triangles;  ///< 3 * triangle_count vertex indices, outward; nullable: no normals.
   size_t triangle_count;       ///< Number of triangles.
   /// 4 * tetrahedron_count nodes: the body's tetrahedra at its creation; nullable. Each vertex
-  /// keeps its barycentric weights in the nearest one; a cut body uses its current tetrahedra. NULL
-  /// binds each vertex to the nearest surface triangle, at a constant distance.
+  /// keeps its weights in the nearest one, or, with NULL, its distance to the nearest surface
+  /// triangle. A cut body uses its current tetrahedra.
   const uint32_t *tetrahedra;
   size_t tetrahedron_count;    ///< Number of tetrahedra.
 } sinew_embedding_def;
@@ -1459,57 +1476,50 @@ sinew_status sinew_embedding_def_init(sinew_embedding_def *def, size_t struct_si
 typedef struct sinew_embedding sinew_embedding;
 
 /// Creates an embedding: binds a render surface to a body at its current positions.
-/// It copies everything that `def` points to, and costs about as much as 100 updates. Destroy it
-/// with sinew_embedding_destroy, before or after the body and its world.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if no tetrahedron has a volume, or the body has no
-/// surface.
+/// It copies what `def` points to, and costs about 100 updates. Destroy it with
+/// sinew_embedding_destroy, before or after the body and its world.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if no tetrahedron has a volume, or without a surface.
 sinew_status sinew_embedding_create(const sinew_world *world, sinew_body_id body,
-                                    const sinew_embedding_def *def, sinew_embedding **out);
+    const sinew_embedding_def *def, sinew_embedding **out);
 
 /// Destroys an embedding and ends its views; NULL has no effect.
 void sinew_embedding_destroy(sinew_embedding *embedding);
 
 /// Moves the vertices of an embedding to the body's current positions.
-/// It allocates only after a cut or tear; then vertices follow their side, and triangles across the
-/// cut are dropped from sinew_embedding_get_triangles. On failure the vertices stay.
+/// After a cut or tear it allocates; vertices then follow their side, and triangles across the cut
+/// are dropped.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the nodes are not those it is bound to;
-/// SINEW_STATUS_UNSUPPORTED if the body was cut, and it is bound to triangles or to part of the
-/// tetrahedra.
+/// SINEW_STATUS_UNSUPPORTED for a cut body, if it is bound to triangles or some of the tetrahedra.
 sinew_status sinew_embedding_update(sinew_embedding *embedding, const sinew_world *world);
 
-/// Moves the vertices of an embedding to given node positions, such as those of a reader's frame.
-/// `positions` [m] holds 3 * node_count packed floats. It does not use the world, so it may run
-/// beside a step.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body had another number of nodes at the last
-/// sinew_embedding_update.
+/// Moves the vertices of an embedding to node positions [m], 3 * node_count packed floats.
+/// They are, for example, those of a reader's frame. It may run beside a step.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT for another number of nodes than at the last update.
 sinew_status sinew_embedding_update_from(sinew_embedding *embedding, const float *positions,
-                                         size_t node_count);
+    size_t node_count);
 
-/// Writes a view of the vertex positions [m], in the given order.
-/// Lifetime: until the embedding is destroyed; updates change its contents.
+/// Writes a view of the vertex positions [m], which updates change.
+/// Lifetime: until the embedding is destroyed.
 sinew_status sinew_embedding_get_positions(const sinew_embedding *embedding, sinew_vec3_view *out);
 
 /// Writes a view of the triangles, in the given order, without those across a cut.
 /// Lifetime: until the first update after the next cut, or the embedding's destruction.
 sinew_status sinew_embedding_get_triangles(const sinew_embedding *embedding,
-                                           sinew_triangle_view *out);
+    sinew_triangle_view *out);
 
 /// Computes the unit vertex normals if needed, and writes a view of them.
 /// They are area-weighted and point outward; 0 without area. The view is empty without triangles.
-/// It needs exclusive access. Lifetime: until the embedding is destroyed; the next call after an
-/// update changes them.
+/// Lifetime: until the embedding is destroyed; the next call after an update changes them.
 sinew_status sinew_embedding_get_normals(sinew_embedding *embedding, sinew_vec3_view *out);
 
 /// Creates a body of tetrahedra that fills a closed surface, and binds the surface to it.
 /// positions and triangles of `def` are the surface, outward; vertices may repeat. `spacing` [m] is
-/// the mean edge length. Features thinner than about half of it are lost. The rest of `def` is as
-/// for sinew_body_create, with one value for all nodes. `out_embedding` is nullable; the caller
-/// destroys it.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` is too fine
-/// or too coarse, or elements, springs, rest positions or lists of values are given.
+/// the mean edge length; features thinner than half of it are lost. `out_embedding` is nullable;
+/// the caller destroys it.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` too fine or
+/// too coarse, or `def` lists elements, springs or values.
 sinew_status sinew_body_create_from_surface(sinew_world *world, const sinew_body_def *def,
-                                            float spacing, sinew_body_id *out_body,
-                                            sinew_embedding **out_embedding);
+    float spacing, sinew_body_id *out_body, sinew_embedding **out_embedding);
 
 // ---- Readers ------------------------------------------------------------------------------------
 
@@ -1518,10 +1528,9 @@ sinew_status sinew_body_create_from_surface(sinew_world *world, const sinew_body
 /// body and the world. Create one reader per reading thread.
 typedef struct sinew_reader sinew_reader;
 
-/// Creates a reader of a body.
-/// Destroy it with sinew_reader_destroy. Each successful step and each change between steps is
-/// published to it; an incomplete step never is. A body with readers keeps two copies of its
-/// positions more than it has readers.
+/// Creates a reader of a body; destroy it with sinew_reader_destroy.
+/// Each successful step and each change between steps is published to it. A body with readers keeps
+/// two copies of its positions more than it has readers.
 /// Errors: SINEW_STATUS_CAPACITY if the body has 126 readers.
 sinew_status sinew_reader_create(sinew_world *world, sinew_body_id body, sinew_reader **out);
 
@@ -1533,245 +1542,54 @@ void sinew_reader_destroy(sinew_reader *reader);
 typedef struct sinew_frame {
   size_t struct_size;             ///< Set to sizeof(sinew_frame) before the call.
   sinew_vec3_view positions;      ///< [m] Node positions, with the nodes added by cuts.
-  /// Triangles of sinew_body_get_triangles; they change only with topology_version.
-  sinew_triangle_view triangles;
-  /// Number of the frame; larger than before if the body was moved.
-  uint64_t version;
+  sinew_triangle_view triangles;  ///< Triangles of the body, which change with topology_version.
+  uint64_t version;  ///< Number of the frame; larger than before if the body was moved.
   uint64_t topology_version;      ///< Version of sinew_body_get_topology_changes at that moment.
   uint64_t step;                  ///< Number of steps that the world had taken.
   double time;                    ///< [s] Sum of the lengths of these steps.
   uint32_t is_new;                ///< 1: this reader did not read this frame before.
-  /// 1: the body or its world was destroyed, and this is its last frame.
-  uint32_t is_over;
+  uint32_t is_over;  ///< 1: the body or its world was destroyed; this is its last frame.
 } sinew_frame;
 
 /// Writes the latest frame of the body without copying, allocating, locking or waiting.
-/// It returns the same frame again if there is no newer one. It ends the views of the previous
-/// frame.
+/// Without a newer one it is the same again. It ends the views of the previous frame.
 sinew_status sinew_reader_read(sinew_reader *reader, sinew_frame *out);
 
-// sinew/query.h: rays, nearest points and the overlap of two bodies.
-
-// ---- Surface points -----------------------------------------------------------------------------
-
-/// Point on the surface of a body.
-typedef struct sinew_surface_point {
-  size_t struct_size;  ///< Set to sizeof(sinew_surface_point) before the call.
-  sinew_body_id body;  ///< Body of the point; all zero if nothing was found, and the rest is 0.
-  uint32_t triangle;   ///< Index of the triangle in the body's surface.
-  float weights[3];    ///< Weights of the triangle's corners, with sum 1.
-  float position[3];   ///< [m] Position of the point.
-  float normal[3];     ///< Outward unit normal of the triangle; 0 if it has no area.
-  float distance;      ///< [m] Distance from the query point.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
-} sinew_surface_point;
-
-/// Finds the first body surface point that a ray hits.
-/// `origin` [m] and `direction` are 3 floats each; the direction may have any length but 0.
-/// `max_distance` [m] is at least 0. Without a hit out->body is all zero. A triangle parallel to
-/// the ray is not hit. The first query near a body builds a tree, which may allocate; nodes that
-/// moved refit it.
-sinew_status sinew_world_cast_ray(const sinew_world *world, const float *origin,
-                                  const float *direction, float max_distance,
-                                  sinew_surface_point *out);
-
-/// Finds the body surface point that is nearest to a point.
-/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. If no surface is within it out->body
-/// is all zero. It uses the trees of sinew_world_cast_ray.
-sinew_status sinew_world_find_nearest(const sinew_world *world, const float *point,
-                                      float max_distance, sinew_surface_point *out);
-
-// ---- Overlap ------------------------------------------------------------------------------------
-
-/// Contents of the images of a detector.
-typedef enum sinew_image_form {
-  /// Intervals of each pixel's ray inside a body; finds every edge, and points deeper than 0.71
-  /// pixels.
-  SINEW_IMAGE_FORM_INTERVALS = 0,
-  /// CInDeR (Halic et al., section 2.1): edges in a depth buffer, faces in front counted; for
-  /// comparison. Of edges that share a pixel only the nearest is found. No points and no volume.
-  SINEW_IMAGE_FORM_COUNTED = 1
-} sinew_image_form;
-
-/// Bodies and method of a detector.
-/// Filled by sinew_detector_def_init; read only during sinew_detector_create.
-typedef struct sinew_detector_def {
-  size_t struct_size;       ///< Size of this struct; sinew_detector_def_init sets it.
-  /// First and second body with surfaces, at least one of them closed; no default.
-  sinew_body_id bodies[2];
-  /// SINEW_DETECTION_EXACT (default) or IMAGE_SPACE. EXACT ignores the other settings, but
-  /// thickness must be 0. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
-  uint32_t detection;
-  /// IMAGE_SPACE: a sinew_image_form value; default SINEW_IMAGE_FORM_INTERVALS.
-  uint32_t form;
-  /// [m] IMAGE_SPACE: pixel size, above 0; no default. 1/256 of the body finds 99.9 % of edges.
-  float pixel;
-  /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes in turn. Depths are
-  /// measured along the view. They exceed the shortest distance by about 2 % of the size with three
-  /// axes and by about 6 % with one.
-  float direction[3];
-  /// IMAGE_SPACE: capacity of an image in pixels, 1 to 2^24; default 2^18. If it is too small, the
-  /// pixel size doubles until the image fits.
-  uint32_t pixels;
-  /// INTERVALS: capacity of ray-face crossings per body and image, at least 1; default 2^20. If it
-  /// is too small, the pixel size doubles. The default capacities take about 18 MB.
-  uint32_t crossings;
-  /// [m] IMAGE_SPACE: added thickness of each body along the view, at least 0; default 0 0. It
-  /// keeps thin parts from being missed, and adds to depths and volume.
-  float thickness[2];
-} sinew_detector_def;
-
-/// Fills a detector definition with its defaults; `struct_size` is sizeof(sinew_detector_def).
-sinew_status sinew_detector_def_init(sinew_detector_def *def, size_t struct_size);
-
-/// Detector of the overlap of two bodies; it applies no forces.
-/// The caller owns it; it may outlive its world. Any number of threads may use a `const
-/// sinew_detector *` at the same time; a `sinew_detector *` needs exclusive access.
-typedef struct sinew_detector sinew_detector;
-
-/// Creates a detector for two bodies and allocates its memory, without a first search.
-/// Destroy it with sinew_detector_destroy.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bodies are the same, one has no surface, or both
-/// are open; with EXACT also if a closed surface is inverted, self-intersecting or degenerate.
-/// SINEW_STATUS_UNSUPPORTED for SINEW_DETECTION_DISTANCE_FIELD.
-sinew_status sinew_detector_create(const sinew_world *world, const sinew_detector_def *def,
-                                   sinew_detector **out);
-
-/// Destroys a detector and ends its lists and views; NULL has no effect.
-void sinew_detector_destroy(sinew_detector *detector);
-
-/// Overlap that a detector found; index 0 is the first body, 1 the second.
-typedef struct sinew_detector_report {
-  size_t struct_size;        ///< Set to sizeof(sinew_detector_report) before the call.
-  /// [m^3] INTERVALS: overlap volume, mean over the views; 0 with an open body, COUNTED or EXACT.
-  double volume;
-  /// Unit direction that moves the first body out of the second fastest; 0 without volume.
-  float normal[3];
-  float depth;               ///< [m] Linear estimate of the distance to move it.
-  float pixel;               ///< [m] Largest pixel size used; 0 with EXACT.
-  uint32_t point_counts[2];  ///< Number of entries of sinew_detector_get_points.
-  uint32_t edge_counts[2];   ///< Number of entries of sinew_detector_get_edges.
-  /// Number of edge parts beyond the capacity of four per edge on average.
-  uint32_t unlisted[2];
-  /// 1: the body is closed; 0: it is open, and nothing is found inside it. A detector made for an
-  /// open body does not check again.
-  uint32_t closed[2];
-  uint32_t reserved;         ///< Reserved; set to 0 by the library.
-} sinew_detector_report;
-
-/// Finds the overlap of the two bodies at their current positions.
-/// You may pass another world, such as a loaded snapshot, if both ids refer there to bodies with
-/// identical surfaces. An open body reports only edges (EXACT: also points). Image space does not
-/// allocate. On failure the previous result stays.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface;
-/// SINEW_STATUS_CAPACITY if one ray has more than `crossings`.
-sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,
-                                 sinew_detector_report *report);
-
-#define SINEW_NO_TRIANGLE UINT32_MAX  ///< Value of `triangle` if there is none.
-
-/// Node of a body that lies inside the other body.
-typedef struct sinew_point_inside {
-  uint32_t node;      ///< Index of the node.
-  /// IMAGE_SPACE: triangle of the other surface where the node would leave; EXACT:
-  /// SINEW_NO_TRIANGLE.
-  uint32_t triangle;
-  /// [m] IMAGE_SPACE: shortest distance out along the views; EXACT: distance to the surface.
-  float depth;
-  float normal[3];    ///< EXACT: unit direction of the shortest distance out; IMAGE_SPACE: 0.
-} sinew_point_inside;
-
-/// Writes the list of nodes of one body that lie inside the other, in ascending order.
-/// `side` 0 is the first body, 1 the second. The list is empty before the first search and with
-/// COUNTED.
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-sinew_status sinew_detector_get_points(const sinew_detector *detector, uint32_t side,
-                                       const sinew_point_inside **points, size_t *count);
-
-/// Part of an edge of a body that lies inside the other body.
-typedef struct sinew_edge_inside {
-  uint32_t nodes[2];  ///< First and second node of the edge.
-  float entry;        ///< Fraction of the edge where it enters; 0 if it starts inside.
-  float exit;         ///< Fraction of the edge where it leaves; 1 if it ends inside.
-  /// [m] IMAGE_SPACE: largest distance out along the view, the least over the views; EXACT: 0.
-  /// COUNTED: the distance from the edge to the next face.
-  float depth;
-} sinew_edge_inside;
-
-/// Writes the list of surface edge parts of one body that lie inside the other.
-/// `side` 0 is the first body, 1 the second. The list is ordered by edge and along it, and empty
-/// before the first search.
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-sinew_status sinew_detector_get_edges(const sinew_detector *detector, uint32_t side,
-                                      const sinew_edge_inside **edges, size_t *count);
-
-/// Writes a view of the gradient [m^2] of the overlap volume at each node of one body.
-/// `side` 0 is the first body, 1 the second. Moving the nodes against it separates the bodies. It
-/// is empty before the first search, with COUNTED or EXACT, and if a body is open.
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_t side,
-                                         sinew_dvec3_view *out);
-
-// sinew/more.h: whole bodies, several nodes, filtered rays, settings and user data.
-
-// ---- Meshes -------------------------------------------------------------------------------------
-
-/// Creates a mesh from arrays and cleans it like sinew_mesh_load.
-/// `positions` [m] holds 3 * node_count floats, `triangles` 3 * triangle_count and `tetrahedra` 4 *
-/// tetrahedron_count node indices. node_of_vertex of sinew_mesh_view maps the given nodes to those
-/// of the mesh.
-sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
-                               size_t triangle_count, const uint32_t *tetrahedra,
-                               size_t tetrahedron_count, sinew_mesh **out);
-
-/// Creates a mesh of tetrahedra that fills the closed surface of a mesh.
-/// `spacing` [m] is the mean edge length. Nodes and tetrahedra are those of the body that
-/// sinew_body_create_from_surface makes of the same surface, with the rest positions.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` too fine
-/// or too coarse.
-sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, sinew_mesh **out);
-
-/// Sets the nodes and elements of a body definition to those of a mesh.
-/// It sets positions with tetrahedra, cells or triangles, and leaves the rest. The mesh must exist
-/// until the body is created.
-/// Errors: SINEW_STATUS_UNSUPPORTED for a mesh of cells if `def` is of an older header without
-/// them.
-sinew_status sinew_body_def_set_mesh(sinew_body_def *def, const sinew_mesh *mesh);
+// sinew/more.h: whole bodies, several nodes, filtered rays, settings, bounded steps and user data.
 
 // ---- Whole bodies -------------------------------------------------------------------------------
 
+/// Sets the nodes and elements of a body definition to those of a mesh.
+/// The mesh must exist until the body is created.
+/// Errors: SINEW_STATUS_UNSUPPORTED for a mesh of cells if `def` is of an older header.
+sinew_status sinew_body_def_set_mesh(sinew_body_def *def, const sinew_mesh *mesh);
+
 /// Rotates a body about a pivot and then translates it, with its pins and velocities.
-/// `translation` [m] is 3 floats, `rotation` x y z w, not zero, and `pivot` [m] 3 floats; all are
-/// nullable: none, none, and the center of the bounding box. Nothing is swept; otherwise like
-/// sinew_body_set_positions.
+/// `translation` [m], `rotation` and `pivot` [m] are nullable: none, none, and the center of the
+/// bounding box. Nothing is swept; otherwise like sinew_body_set_positions.
 sinew_status sinew_body_transform(sinew_world *world, sinew_body_id body, const float *translation,
-                                  const float *rotation, const float *pivot);
+    const float *rotation, const float *pivot);
 
-/// Writes the bounding box of the nodes of a body.
-/// `out_min` [m] and `out_max` [m] receive 3 floats each.
+/// Writes the bounding box [m] of the nodes of a body, as two corners of 3 floats.
 sinew_status sinew_body_get_bounds(const sinew_world *world, sinew_body_id body, float *out_min,
-                                   float *out_max);
+    float *out_max);
 
-/// Writes the unit normals of the surface of a body at its nodes.
-/// They are area-weighted and point outward; 0 for a node without a triangle. `normals` receives 3
-/// * node_count floats; `node_count` must be the body's number of nodes.
-sinew_status sinew_body_get_normals(const sinew_world *world, sinew_body_id body, float *normals,
-                                    size_t node_count);
+/// Writes the unit normals of the surface of a body at its nodes, 3 * node_count floats.
+/// They are area-weighted and point outward; 0 for a node without a triangle.
+sinew_status sinew_body_get_normals(const sinew_world *world, sinew_body_id body,
+    float *out_normals, size_t node_count);
 
 /// Writes the masses [kg] of all nodes of a body; see sinew_body_get_node_mass.
-/// `masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
-sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body, float *masses,
-                                   size_t node_count);
+sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body, float *out_masses,
+    size_t node_count);
 
-/// Changes the velocities of nodes at once by impulses.
-/// `nodes` holds `count` indices, which may repeat; `impulses` [N s] holds 3 * count floats. They
-/// have no effect on a pinned or attached node, nor along a pinned axis. On failure no velocity
-/// changes.
+/// Changes the velocities of nodes at once by impulses [N s], 3 * count floats.
+/// `nodes` holds `count` indices, which may repeat. They have no effect on a pinned or attached
+/// node, nor along a pinned axis.
 sinew_status sinew_body_apply_impulses(sinew_world *world, sinew_body_id body,
-                                       const uint32_t *nodes, const float *impulses, size_t count);
+    const uint32_t *nodes, const float *impulses, size_t count);
 
-/// Sets the factor of the world's gravity on a body, from the next step on.
-/// `scale` is finite: 0 means no gravity.
+/// Sets the factor of the world's gravity on a body, any finite number, from the next step on.
 sinew_status sinew_body_set_gravity_scale(sinew_world *world, sinew_body_id body, float scale);
 
 /// Writes the factor of the world's gravity on a body.
@@ -1779,63 +1597,56 @@ sinew_status sinew_body_get_gravity_scale(const sinew_world *world, sinew_body_i
 
 // ---- Several pins -------------------------------------------------------------------------------
 
-/// Pins nodes at their current positions; see sinew_body_pin.
-/// `nodes` holds `count` indices. On failure no node changes.
+/// Pins `count` nodes at their current positions; see sinew_body_pin.
 sinew_status sinew_body_pin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                  size_t count);
+    size_t count);
 
-/// Unpins nodes along all axes; see sinew_body_unpin.
-/// `nodes` holds `count` indices. On failure no node changes.
+/// Unpins `count` nodes along all axes; see sinew_body_unpin.
 sinew_status sinew_body_unpin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
-                                    size_t count);
+    size_t count);
 
 /// Pins all nodes in a box, and writes how many nodes of the box are pinned.
-/// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
+/// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
 sinew_status sinew_body_pin_box(sinew_world *world, sinew_body_id body, const float *min,
-                                const float *max, size_t *out_count);
+    const float *max, size_t *out_count);
 
 /// Unpins the pinned nodes in a box, except those of mass 0, and writes how many.
-/// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
+/// Arguments and errors are those of sinew_body_pin_box.
 sinew_status sinew_body_unpin_box(sinew_world *world, sinew_body_id body, const float *min,
-                                  const float *max, size_t *out_count);
+    const float *max, size_t *out_count);
 
-/// Writes the reaction forces on all nodes, averaged over the last step.
-/// `forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool
-/// holds. `node_count` must be the body's number of nodes.
-sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body, float *forces,
-                                       size_t node_count);
+/// Writes the reaction forces [N] on all nodes, 3 * node_count floats, averaged over the last step.
+/// It is 0 for a node that is not pinned or that a tool holds.
+sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body,
+    float *out_forces, size_t node_count);
 
 // ---- Tools --------------------------------------------------------------------------------------
 
 /// Writes the pose that the last step moved a tool to, before the force_limit.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
-/// Replaying these poses with sinew_tool_set_pose reproduces the steps, also those that a haptic
-/// handle drove.
-sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool, float *position,
-                                   float *orientation);
+/// Both outputs are nullable. Replaying these poses reproduces the steps, also those of a haptic
+/// handle.
+sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool,
+    float *out_position, float *out_orientation);
 
 /// Writes the total force and torque on several tools, averaged over the last step, in world axes.
-/// `tools` holds `count` different ids. `point` [m] is 3 floats. `force` [N] and `torque` [N m],
-/// about `point`, receive 3 floats each; both are nullable.
-sinew_status sinew_tools_get_wrench(const sinew_world *world, const sinew_tool_id *tools,
-                                    size_t count, const float *point, float *force, float *torque);
+/// `tools` holds `count` different ids. `point` [m] is 3 floats. `out_force` [N] and `out_torque`
+/// [N m], about `point`, receive 3 floats each; both are nullable.
+sinew_status sinew_world_get_total_wrench(const sinew_world *world, const sinew_tool_id *tools,
+    size_t count, const float *point, float *out_force, float *out_torque);
 
 /// Contact between a tool and a body that began or ended in the last step.
 typedef struct sinew_contact_change {
   sinew_tool_id tool;  ///< Tool of the contact.
   sinew_body_id body;  ///< Body of the contact.
   uint32_t begun;      ///< 1: the contact began; 0: it ended.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
 } sinew_contact_change;
 
 /// Writes the contacts that began or ended in the last step.
-/// `changes` receives at most `capacity` entries, `count` the number that exist. Destroying a tool
-/// or body does not report an end.
+/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist. Destroying
+/// a tool or body reports no end.
 sinew_status sinew_world_get_contact_changes(const sinew_world *world,
-                                             sinew_contact_change *changes, size_t capacity,
-                                             size_t *count);
+    sinew_contact_change *out_changes, size_t capacity, size_t *out_count);
 
 /// First body or tool that a ray hits.
 typedef struct sinew_ray_hit {
@@ -1847,59 +1658,15 @@ typedef struct sinew_ray_hit {
   float position[3];   ///< [m] Position of the hit.
   float normal[3];     ///< Outward unit normal at the hit.
   float distance;      ///< [m] Distance from the origin.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
 } sinew_ray_hit;
 
-/// Finds the first body or tool that a ray with a collision filter hits.
-/// The ray meets bodies and tools as if it had this category and mask. Otherwise like
-/// sinew_world_cast_ray; without a hit both ids are all zero.
+/// Finds the first body or tool that a ray hits, as if it had this category and mask.
+/// Otherwise like sinew_world_cast_ray; without a hit both ids are all zero.
 sinew_status sinew_world_cast_ray_filtered(const sinew_world *world, const float *origin,
-                                           const float *direction, float max_distance,
-                                           uint32_t category, uint32_t mask, sinew_ray_hit *out);
+    const float *direction, float max_distance, uint32_t category, uint32_t mask,
+    sinew_ray_hit *out);
 
 // ---- Settings -----------------------------------------------------------------------------------
-
-/// Writes the time [s] that a world has been stepped, and the number of steps.
-/// Both outputs are nullable.
-sinew_status sinew_world_get_time(const sinew_world *world, double *out_time, uint64_t *out_steps);
-
-/// Writes the gravitational acceleration [m/s^2] of a world, 3 floats.
-sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravity);
-
-/// Writes the collision category and mask of a body.
-sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
-                                      uint32_t *out_category, uint32_t *out_mask);
-
-/// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
-sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
-
-/// Writes the friction coefficient of a tool.
-sinew_status sinew_tool_get_friction(const sinew_world *world, sinew_tool_id tool, float *out);
-
-/// Writes the largest force [N] that moves a tool; infinity: unlimited.
-sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id tool, float *out);
-
-/// Writes the collision category and mask of a tool.
-sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
-                                      uint32_t *out_category, uint32_t *out_mask);
-
-/// Writes the current pose of a blade.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
-sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade, float *position,
-                                  float *orientation);
-
-/// Sets the collision category and mask of a blade, from the next step on.
-/// A body that it no longer meets lets go of the blade.
-sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
-                                       uint32_t mask);
-
-/// Sets the number of substeps per step and its limit, from the next step on.
-/// See sinew_world_def.
-sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uint32_t max_substeps);
-
-/// Writes the number of substeps per step and its limit; both outputs are nullable.
-sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
-                                      uint32_t *out_max_substeps);
 
 /// Settings of a body that can change after creation; see sinew_body_def.
 typedef struct sinew_body_settings {
@@ -1914,73 +1681,63 @@ typedef struct sinew_body_settings {
 
 /// Changes the settings of a body from the next step on; start from sinew_body_get_settings.
 /// What is closer than a new contact_thickness is pushed off. A new sleep wakes the body.
-/// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a body that was cut change, other than both
-/// to 0.
+/// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a cut body change, except both to 0.
 sinew_status sinew_body_set_settings(sinew_world *world, sinew_body_id body,
-                                     const sinew_body_settings *settings);
+    const sinew_body_settings *settings);
 
 /// Writes the settings of a body that can change.
 sinew_status sinew_body_get_settings(const sinew_world *world, sinew_body_id body,
-                                     sinew_body_settings *out);
+    sinew_body_settings *out);
 
 /// Sets the drag [N s/m] on each node of a body, at least 0, from the next step on.
 sinew_status sinew_body_set_node_damping(sinew_world *world, sinew_body_id body,
-                                         float node_damping);
+    float node_damping);
 
 /// Writes the drag [N s/m] on a node.
 sinew_status sinew_body_get_node_damping(const sinew_world *world, sinew_body_id body,
-                                         uint32_t node, float *out);
+    uint32_t node, float *out);
 
-/// Advances the world by at most `work` units of work.
+/// Advances the world by at most `work` units of work; `report` is nullable.
 /// A unit is one substep of each VERLET body or one matrix-vector product of each other body. The
-/// step covers `dt` [s] plus the lag, or as much as VERLET reaches in `work` substeps; the rest is
-/// the new lag, which plain steps leave. Other solvers stop after `work` products, or one for each
-/// millisecond near a tool, and continue in the next step. Tools, pins and blades complete their
-/// motion. `report` is nullable.
+/// step covers `dt` [s] plus the lag; what it does not reach is the new lag. Equations stop after
+/// `work` products and continue in the next step. Tools, pins and blades move in full.
 /// Errors: SINEW_STATUS_UNSUPPORTED with fixed substeps or a tolerance.
 sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t work,
-                                          sinew_step_report *report);
+    sinew_step_report *report);
 
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
-/// The first calls do little work and measure. A step can be late if the machine or the scene
-/// became slower. For a bitwise replay record `work` of `report`.
+/// The first calls measure. A step can be late if the scene became slower. For a bitwise replay
+/// record `work` of `report`, which is nullable.
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
-                                     sinew_step_report *report);
+    sinew_step_report *report);
 
 // ---- Ids and user data --------------------------------------------------------------------------
 
-/// Returns 1 if a body with this id exists in the world, else 0.
-/// It returns 0 for a NULL world and a null id.
+/// Returns 1 if a body with this id exists in the world, else 0; also for a NULL world.
 uint32_t sinew_body_is_valid(const sinew_world *world, sinew_body_id body);
 
-/// Returns 1 if a tool with this id exists in the world, else 0.
-/// It returns 0 for a NULL world and a null id.
+/// Returns 1 if a tool with this id exists in the world, else 0; also for a NULL world.
 uint32_t sinew_tool_is_valid(const sinew_world *world, sinew_tool_id tool);
 
-/// Returns 1 if a blade with this id exists in the world, else 0.
-/// It returns 0 for a NULL world and a null id.
+/// Returns 1 if a blade with this id exists in the world, else 0; also for a NULL world.
 uint32_t sinew_blade_is_valid(const sinew_world *world, sinew_blade_id blade);
 
-/// Returns 1 if an attachment with this id exists in the world, else 0.
-/// It returns 0 for a NULL world and a null id.
+/// Returns 1 if an attachment with this id exists in the world, else 0; also for a NULL world.
 uint32_t sinew_attachment_is_valid(const sinew_world *world, sinew_attachment_id attachment);
 
-/// Stores a pointer of the caller with a world; snapshots do not hold it.
-/// `user_data` is nullable.
+/// Stores a pointer of the caller, nullable, with a world; snapshots do not hold it.
 sinew_status sinew_world_set_user_data(sinew_world *world, void *user_data);
 
 /// Writes the pointer that is stored with a world; NULL by default.
 sinew_status sinew_world_get_user_data(const sinew_world *world, void **out);
 
-/// Stores a pointer of the caller with a body; snapshots do not hold it.
-/// `user_data` is nullable.
+/// Stores a pointer of the caller, nullable, with a body; snapshots do not hold it.
 sinew_status sinew_body_set_user_data(sinew_world *world, sinew_body_id body, void *user_data);
 
 /// Writes the pointer that is stored with a body; NULL by default.
 sinew_status sinew_body_get_user_data(const sinew_world *world, sinew_body_id body, void **out);
 
-/// Stores a pointer of the caller with a tool; snapshots do not hold it.
-/// `user_data` is nullable.
+/// Stores a pointer of the caller, nullable, with a tool; snapshots do not hold it.
 sinew_status sinew_tool_set_user_data(sinew_world *world, sinew_tool_id tool, void *user_data);
 
 /// Writes the pointer that is stored with a tool; NULL by default.
@@ -1989,27 +1746,23 @@ sinew_status sinew_tool_get_user_data(const sinew_world *world, sinew_tool_id to
 // sinew/snapshot.h: a world as bytes.
 
 /// Writes the number of bytes that sinew_world_save_snapshot needs now.
-/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or the size exceeds what
-/// memory can address.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or memory cannot address the
+/// size.
 sinew_status sinew_world_get_snapshot_size(const sinew_world *world, size_t *out);
 
 /// Saves a world as bytes, from which sinew_world_load_snapshot continues bitwise identically.
-/// `size` must be that of sinew_world_get_snapshot_size. The snapshot holds bodies with cuts,
-/// contacts, attachments, blades, pending forces and ids. It does not hold threads, readers,
-/// detectors and embeddings. Only this library version can read it. A checksum detects damage, not
-/// tampering.
+/// `size` is that of sinew_world_get_snapshot_size. Threads, readers, detectors and embeddings are
+/// not saved. Only this library version can read it. A checksum detects damage, not tampering.
 /// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool.
-sinew_status sinew_world_save_snapshot(const sinew_world *world, uint8_t *bytes, size_t size);
+sinew_status sinew_world_save_snapshot(const sinew_world *world, uint8_t *out_bytes, size_t size);
 
 /// Creates a world from the bytes of a snapshot.
-/// `thread_count`, `run_tasks` (nullable) and `tasks_context` (nullable) are as in sinew_world_def.
-/// Destroy the world with sinew_world_destroy. Results are bitwise identical only with the kernel
-/// of the saved world.
+/// `def` is nullable: the defaults. Its thread_count, run_tasks and tasks_context apply; the
+/// snapshot holds the rest. Results are bitwise identical only with the kernel of the saved world.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bytes are damaged; SINEW_STATUS_UNSUPPORTED for
-/// another library version or kernel, or if a thread could not be started.
-sinew_status sinew_world_load_snapshot(const uint8_t *bytes, size_t size, uint32_t thread_count,
-                                       sinew_run_tasks run_tasks, void *tasks_context,
-                                       sinew_world **out);
+/// another library version or kernel, or if a thread cannot start.
+sinew_status sinew_world_load_snapshot(const uint8_t *bytes, size_t size,
+    const sinew_world_def *def, sinew_world **out);
 
 // sinew/diagnostics.h: energy, solver and memory reports, strain, images.
 
@@ -2018,11 +1771,8 @@ sinew_status sinew_world_load_snapshot(const uint8_t *bytes, size_t size, uint32
 /// Energy of a body [J] at the time of the positions.
 typedef struct sinew_energy {
   size_t struct_size;    ///< Set to sizeof(sinew_energy) before the call.
-  /// [J] Kinetic energy of the free nodes, without the mass that mass_scaling adds.
-  double kinetic;
-  /// [J] Energy of springs, elements and other internal terms, minus the work of a constant
-  /// pressure.
-  double elastic;
+  double kinetic;  ///< [J] Kinetic energy of the free nodes, without the mass of mass_scaling.
+  double elastic;  ///< [J] Energy of all internal terms, minus the work of a constant pressure.
   double gravitational;  ///< [J] Gravitational energy, 0 at the origin.
 } sinew_energy;
 
@@ -2032,38 +1782,31 @@ sinew_status sinew_body_get_energy(const sinew_world *world, sinew_body_id body,
 /// Report of the solver of a body for its last successful step.
 typedef struct sinew_solver_report {
   size_t struct_size;      ///< Set to sizeof(sinew_solver_report) before the call.
-  uint32_t iterations;     ///< IMPLICIT, NEWTON: matrix-vector products of the step; 0 for VERLET.
-  /// [m] Remaining error of the solved equations; 0 for VERLET. IMPLICIT: mass-weighted root mean
-  /// square. NEWTON: largest displacement of the last correction; about 1/100 of it remains. It
-  /// does not include the time discretization error.
+  uint32_t iterations;     ///< IMPLICIT, NEWTON: matrix-vector products of the step.
+  /// [m] Remaining error of the solved equations, without that of time steps; 0 for VERLET.
+  /// IMPLICIT: mass-weighted root mean square. NEWTON: largest displacement of the last correction;
+  /// about 1/100 of it remains.
   float error;
   double added_mass;       ///< [kg] VERLET: total mass that mass_scaling adds.
-  uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved; 0 for VERLET.
-  /// IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding level; 0 for VERLET.
-  uint32_t converged;
+  uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved.
+  uint32_t converged;  ///< IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding.
   uint32_t solver;         ///< Solver in use, a sinew_solver value; never AUTO.
-  /// AUTO took IMPLICIT if VERLET needs more than 150 substeps; this is their number on creation,
-  /// else 0.
-  uint32_t auto_substeps;
-  /// [s] AUTO: step length of the choice, the mean of the world so far or 1/60 s; else 0.
-  float auto_step;
-  uint32_t reserved;       ///< Reserved; set to 0 by the library.
+  uint32_t auto_substeps;  ///< Substeps of VERLET on creation; above 150 AUTO takes IMPLICIT.
+  float auto_step;  ///< [s] AUTO: step length of the choice, the mean so far or 1/60 s; else 0.
 } sinew_solver_report;
 
 /// Writes how the solver of a body took the last step.
 sinew_status sinew_body_get_solver_report(const sinew_world *world, sinew_body_id body,
-                                          sinew_solver_report *out);
+    sinew_solver_report *out);
 
 /// Limit of the substep of a step that was refused.
 typedef enum sinew_limit {
   SINEW_LIMIT_NONE = 0,      ///< The step was not refused.
   SINEW_LIMIT_SPRING = 1,    ///< Springs of a node; the nodes are the stiffest spring.
   SINEW_LIMIT_ELEMENT = 2,   ///< Elements of a node; the nodes are the stiffest tetrahedron.
-  /// Anchor, bending, fiber, Maxwell or strain-limiting terms of a node.
-  SINEW_LIMIT_TERM = 3,
+  SINEW_LIMIT_TERM = 3,  ///< Anchor, bending, fiber, Maxwell or strain-limiting terms of a node.
   SINEW_LIMIT_CAVITY = 4,    ///< Pressure in a cavity.
-  /// Number of parts of a step of IMPLICIT or NEWTON in contact or attached.
-  SINEW_LIMIT_PARTS = 5,
+  SINEW_LIMIT_PARTS = 5,     ///< Parts of a step of IMPLICIT or NEWTON in contact or attached.
   SINEW_LIMIT_TOLERANCE = 6  ///< Tolerance of the world.
 } sinew_limit;
 
@@ -2078,49 +1821,41 @@ typedef struct sinew_storage_report {
 
 /// Writes the memory use of the springs of a body.
 sinew_status sinew_body_get_storage_report(const sinew_world *world, sinew_body_id body,
-                                           sinew_storage_report *out);
+    sinew_storage_report *out);
 
 // ---- Strain -------------------------------------------------------------------------------------
 
 /// Writes the strain L / L0 - 1 between pairs of nodes; 0 where L0 is 0.
-/// `pairs` holds 2 * count indices. `rest_lengths` [m] holds `count` floats; it is nullable: the
-/// rest lengths of the springs, which takes longer. `strains` receives `count` floats.
+/// `pairs` holds 2 * count indices, `rest_lengths` [m] `count` floats; nullable: those of the
+/// springs, which takes longer. `out_strains` receives `count` floats.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring and `rest_lengths` is NULL.
 sinew_status sinew_body_get_spring_strains(const sinew_world *world, sinew_body_id body,
-                                           const uint32_t *pairs, const float *rest_lengths,
-                                           size_t count, float *strains);
+    const uint32_t *pairs, const float *rest_lengths, size_t count, float *out_strains);
 
 /// Strain of a triangle or tetrahedron; 0 for a rigid motion, or if it has no size at rest.
 typedef struct sinew_strain {
   float largest;   ///< Largest principal stretch minus 1.
   float smallest;  ///< Smallest principal stretch minus 1, at least -1.
-  float growth;    ///< Volumetric (or areal) strain J - 1; below -1 for an inverted tetrahedron.
+  float growth;    ///< Volumetric (or areal) strain J - 1; below -1 if inverted.
 } sinew_strain;
 
-/// Writes the strains of any triangles between nodes of a body.
-/// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `triangles` holds 3 *
-/// triangle_count indices; `strains` receives one entry per triangle. `node_count` must be the
-/// body's.
+/// Writes the strains of any triangles between nodes of a body, one per triangle.
+/// `rest_positions` [m] holds 3 * node_count floats; `triangles` holds 3 * triangle_count indices.
 sinew_status sinew_body_get_triangle_strains(const sinew_world *world, sinew_body_id body,
-                                             const float *rest_positions, size_t node_count,
-                                             const uint32_t *triangles, size_t triangle_count,
-                                             sinew_strain *strains);
+    const float *rest_positions, size_t node_count, const uint32_t *triangles,
+    size_t triangle_count, sinew_strain *out_strains);
 
-/// Writes the strains of any tetrahedra between nodes of a body.
-/// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `tetrahedra` holds 4 *
-/// tetrahedron_count indices; `strains` receives one entry per tetrahedron. `node_count` must be
-/// the body's.
+/// Writes the strains of any tetrahedra between nodes of a body, one per tetrahedron.
+/// `rest_positions` [m] holds 3 * node_count floats; `tetrahedra` 4 * tetrahedron_count indices.
 sinew_status sinew_body_get_tetrahedron_strains(const sinew_world *world, sinew_body_id body,
-                                                const float *rest_positions, size_t node_count,
-                                                const uint32_t *tetrahedra,
-                                                size_t tetrahedron_count, sinew_strain *strains);
+    const float *rest_positions, size_t node_count, const uint32_t *tetrahedra,
+    size_t tetrahedron_count, sinew_strain *out_strains);
 
 /// Averages values of elements at their nodes; 0 at a node without elements.
 /// `elements` holds corners * element_count node indices, `corners` is 2, 3 or 4, `values` holds
-/// element_count finite floats, and `means` receives node_count floats. Use it to color an image by
-/// strain.
-sinew_status sinew_mean_at_nodes(const uint32_t *elements, uint32_t corners, const float *values,
-                                 size_t element_count, float *means, size_t node_count);
+/// element_count finite floats, and `out_means` receives node_count floats.
+sinew_status sinew_util_average_to_nodes(const uint32_t *elements, uint32_t corners,
+    const float *values, size_t element_count, float *out_means, size_t node_count);
 
 // ---- Images -------------------------------------------------------------------------------------
 
@@ -2130,25 +1865,21 @@ typedef struct sinew_picture_def {
   uint32_t width;          ///< [pixels] Width of the image, 1 to 16384; default 1280.
   uint32_t height;         ///< [pixels] Height of the image, 1 to 16384; default 960.
   float eye[3];            ///< [m] Position of the camera.
-  /// [m] Point at the center of the view. eye equal to target (default): the view is fitted to the
-  /// bodies along `direction`.
-  float target[3];
+  float target[3];  ///< [m] Center of the view; equal to eye (default): fitted along `direction`.
   float up[3];             ///< Up direction of the image; default 0 1 0.
-  /// Fitted view: direction from the scene to the camera; default 1 0.6 1.4.
-  float direction[3];
-  float field_of_view;     ///< [rad] Vertical field of view, above 0 and below pi; default 0.6.
-  uint32_t show_contacts;  ///< 1: draws contact points and forces on tools; 0 (default): does not.
+  float direction[3];      ///< Fitted view: direction to the camera; default 1 0.6 1.4.
+  float field_of_view;     ///< [rad] Vertical angle, above 0 and below pi; default 0.6.
+  uint32_t show_contacts;  ///< 1: draws contact points and forces on tools; 0 (default).
 } sinew_picture_def;
 
 /// Fills an image definition with its defaults; `struct_size` is sizeof(sinew_picture_def).
 sinew_status sinew_picture_def_init(sinew_picture_def *def, size_t struct_size);
 
-/// Draws all bodies and tools into a PNG file.
-/// A body without surface shows its springs. `def` is nullable: the defaults. `path` is UTF-8; an
-/// existing file is replaced once the image is complete.
+/// Draws all bodies and tools into a PNG file, which replaces one that exists.
+/// A body without surface shows its springs. `def` is nullable: the defaults. `path` is UTF-8.
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
 sinew_status sinew_world_save_picture(const sinew_world *world, const sinew_picture_def *def,
-                                      const char *path);
+    const char *path);
 
 /// Color map of values.
 typedef enum sinew_colours {
@@ -2157,7 +1888,6 @@ typedef enum sinew_colours {
 } sinew_colours;
 
 /// Values per node that color a body, such as strain or force.
-/// The color maps are perceptually uniform.
 typedef struct sinew_body_values {
   sinew_body_id body;   ///< Body that is colored.
   const float *values;  ///< node_count finite floats in the caller's order.
@@ -2165,17 +1895,13 @@ typedef struct sinew_body_values {
   float low;            ///< Value of the first color; also used below it.
   float high;           ///< Value of the last color, above low; also used above it.
   uint32_t colours;     ///< Color map, a sinew_colours value.
-  uint32_t reserved;    ///< Reserved; must be 0.
 } sinew_body_values;
 
-/// Draws all bodies and tools into a PNG file, with some bodies colored by values.
-/// `coloured` holds `count` entries, each for another body. `def` is nullable: the defaults. `path`
-/// is as in sinew_world_save_picture.
-/// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
+/// Draws like sinew_world_save_picture, with some bodies colored by values.
+/// `coloured` holds `count` entries, each for another body.
 sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
-                                                const sinew_picture_def *def,
-                                                const sinew_body_values *coloured, size_t count,
-                                                const char *path);
+    const sinew_picture_def *def, const sinew_body_values *coloured, size_t count,
+    const char *path);
 
 // sinew/debug.h: profile, debug drawing, recording, log.
 
@@ -2191,10 +1917,8 @@ typedef struct sinew_profile {
   size_t struct_size;        ///< Set to sizeof(sinew_profile) before the call.
   double step;               ///< [s] Whole step.
   double plan;               ///< [s] Targets and paths of tools and blades.
-  /// [s] VERLET: forces and integration, which are one pass over the nodes.
-  double forces;
-  /// [s] IMPLICIT, NEWTON: equations and their solution, with the forces.
-  double solver;
+  double forces;             ///< [s] VERLET: forces and integration.
+  double solver;  ///< [s] IMPLICIT, NEWTON: equations with the forces, and their solution.
   double broad_phase;        ///< [s] Search for what is near a tool or other tissue.
   double narrow_phase;       ///< [s] Search for contacts among what is near.
   double contact_solver;     ///< [s] Impulses of contacts, attachments and sutures.
@@ -2216,8 +1940,7 @@ sinew_status sinew_world_get_profile(const sinew_world *world, sinew_profile *ou
 
 // ---- Debug drawing ------------------------------------------------------------------------------
 
-/// Callback that draws a line, point or triangle: 2, 1 or 3 vectors of 3 floats [m], color
-/// 0xRRGGBBAA.
+/// Callback that draws a line, point or triangle: 2, 1 or 3 vectors [m], color 0xRRGGBBAA.
 typedef void (*sinew_draw)(void *context, const float *points, uint32_t rgba);
 
 /// What sinew_world_debug_draw draws; flags to be added.
@@ -2254,16 +1977,14 @@ sinew_status sinew_world_debug_draw(const sinew_world *world, const sinew_debug_
 // ---- Recording ----------------------------------------------------------------------------------
 
 /// Records all steps from the next one on into a file, for sinew_replay.
-/// The file holds the snapshot at the first step, the changes before each step and a state hash
-/// after each. A file that exists is replaced. `path` is UTF-8. A recorded step writes to the file
-/// and may allocate; a full disk ends the recording, not the step.
+/// It holds the snapshot at the first step, the changes before each step and a state hash after
+/// each. A file that exists is replaced. `path` is UTF-8. A recorded step may allocate; a full disk
+/// ends the recording, not the step.
 /// Errors: SINEW_STATUS_IO.
 sinew_status sinew_world_start_recording(sinew_world *world, const char *path);
 
-/// Stops a recording and writes the number of recorded steps.
-/// `out_steps` is nullable.
-/// Errors: SINEW_STATUS_IO or SINEW_STATUS_OUT_OF_MEMORY if the recording ended earlier; it is
-/// stopped in any case.
+/// Stops a recording and writes the number of recorded steps; `out_steps` is nullable.
+/// Errors: SINEW_STATUS_IO or SINEW_STATUS_OUT_OF_MEMORY if it ended earlier; it stops anyway.
 sinew_status sinew_world_stop_recording(sinew_world *world, uint64_t *out_steps);
 
 /// Report of sinew_replay.
@@ -2274,7 +1995,6 @@ typedef struct sinew_replay_report {
   uint64_t recorded_hash;     ///< State hash after that step in the recording; else 0.
   uint64_t replayed_hash;     ///< State hash after that step in the replay; else 0.
   uint32_t cut_short;         ///< 1 if the file ends within a step, else 0.
-  uint32_t reserved;          ///< Reserved; set to 0 by the library.
 } sinew_replay_report;
 
 /// Replays a recording and compares the state hash after each step, up to the first difference.
@@ -2286,7 +2006,7 @@ sinew_status sinew_replay(const char *path, uint32_t thread_count, sinew_replay_
 
 // ---- Log ----------------------------------------------------------------------------------------
 
-/// Callback that receives a message; `message` is valid during the call only.
+/// Callback that receives a message, which is valid during the call only.
 /// It may run on any thread that calls the library. It must not call the library.
 typedef void (*sinew_log)(void *context, uint32_t level, const char *message);
 
@@ -2299,8 +2019,8 @@ typedef enum sinew_log_level {
 } sinew_log_level;
 
 /// Sets the callback that receives messages up to a level, for the whole process.
-/// `level` is a sinew_log_level value. `callback` and `context` are nullable; without a callback
-/// there are no messages. Other threads may still be in the callback that it replaces.
+/// `level` is a sinew_log_level value. `callback` (none) and `context` are nullable. Other threads
+/// may still be in the callback that it replaces.
 sinew_status sinew_set_log_callback(uint32_t level, sinew_log callback, void *context);
 
 #ifdef __cplusplus

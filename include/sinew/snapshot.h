@@ -7,35 +7,27 @@
 #include "base.h"
 #include "world.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 /// Writes the number of bytes that sinew_world_save_snapshot needs now.
-/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or the size exceeds what
-/// memory can address.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or memory cannot address the
+/// size.
 sinew_status sinew_world_get_snapshot_size(const sinew_world *world, size_t *out);
 
 /// Saves a world as bytes, from which sinew_world_load_snapshot continues bitwise identically.
-/// `size` must be that of sinew_world_get_snapshot_size. The snapshot holds bodies with cuts,
-/// contacts, attachments, blades, pending forces and ids. It does not hold threads, readers,
-/// detectors and embeddings. Only this library version can read it. A checksum detects damage, not
-/// tampering.
+/// `size` is that of sinew_world_get_snapshot_size. Threads, readers, detectors and embeddings are
+/// not saved. Only this library version can read it. A checksum detects damage, not tampering.
 /// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool.
-sinew_status sinew_world_save_snapshot(const sinew_world *world, uint8_t *bytes, size_t size);
+sinew_status sinew_world_save_snapshot(const sinew_world *world, uint8_t *out_bytes, size_t size);
 
 /// Creates a world from the bytes of a snapshot.
-/// `thread_count`, `run_tasks` (nullable) and `tasks_context` (nullable) are as in sinew_world_def.
-/// Destroy the world with sinew_world_destroy. Results are bitwise identical only with the kernel
-/// of the saved world.
+/// `def` is nullable: the defaults. Its thread_count, run_tasks and tasks_context apply; the
+/// snapshot holds the rest. Results are bitwise identical only with the kernel of the saved world.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bytes are damaged; SINEW_STATUS_UNSUPPORTED for
-/// another library version or kernel, or if a thread could not be started.
-sinew_status sinew_world_load_snapshot(const uint8_t *bytes, size_t size, uint32_t thread_count,
-                                       sinew_run_tasks run_tasks, void *tasks_context,
-                                       sinew_world **out);
+/// another library version or kernel, or if a thread cannot start.
+sinew_status sinew_world_load_snapshot(const uint8_t *bytes, size_t size,
+    const sinew_world_def *def, sinew_world **out);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

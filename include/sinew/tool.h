@@ -8,9 +8,7 @@
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 // ---- Creation -----------------------------------------------------------------------------------
 
@@ -28,10 +26,9 @@ typedef enum sinew_shape {
 typedef struct sinew_tool_def {
   size_t struct_size;           ///< Size of this struct; sinew_tool_def_init sets it.
   uint32_t shape;               ///< Shape of the tool, a sinew_shape value.
-  /// [m] Sphere, capsule: above 0, at most 1e9 with half_length added; no default.
-  float radius;
-  /// [m] Capsule: distance from the center to the center of a cap, at least 0. IMAGE_SPACE allows
-  /// at most 10,000 times the radius. Contact points are accurate to 1e-7 of it.
+  float radius;  ///< [m] Sphere, capsule: above 0, at most 1e9 with half_length; no default.
+  /// [m] Capsule: distance from the center to the center of a cap. IMAGE_SPACE allows at most
+  /// 10,000 times the radius. Contact points are accurate to 1e-7 of it.
   float half_length;
   uint32_t reserved0;           ///< Reserved; must be 0.
   const float *positions;       ///< [m] Mesh: 3 * node_count floats; nullable for other shapes.
@@ -39,30 +36,22 @@ typedef struct sinew_tool_def {
   /// 3 * triangle_count node indices of a closed surface, outward; nullable for other shapes.
   const uint32_t *triangles;
   size_t triangle_count;        ///< Number of triangles of the mesh.
-  /// Contact detection, a sinew_detection value; default SINEW_DETECTION_EXACT.
-  uint32_t detection;
+  uint32_t detection;           ///< Contact detection, a sinew_detection value; default EXACT.
   float friction;               ///< Coulomb coefficient, at least 0; default 0.
-  /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
-  float position[3];
-  /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
-  float orientation[4];
+  float position[3];            ///< [m] Initial position; default 0 0 0.
+  float orientation[4];         ///< Initial orientation; default 0 0 0 1.
   uint32_t reserved;            ///< Reserved; must be 0.
-  /// [m] Mesh, box: pixel size of the images or cell size of the distance field; 0 (default):
-  /// automatic. Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the
-  /// shortest if less. Refused above 2^24 pixels or samples, or if no ray or sample would lie
-  /// inside. Memory: about 24 bytes per pixel of 3 images, 4 bytes per sample.
+  /// [m] Mesh, box: pixel size of images or cell size of a distance field; 0 (default): automatic.
+  /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if
+  /// less. Refused above 2^24 pixels or samples, or with no ray or sample inside. Memory: 24 bytes
+  /// per pixel of 3 images, 4 bytes per sample.
   float resolution;
-  /// [N] Largest force that moves the tool, at least 0; infinity (default) or 0: unlimited. Beyond
-  /// it the tool stops short of its pose; see sinew_tool_get_pose.
+  /// [N] Largest force that moves the tool; infinity (default) or 0: unlimited. Beyond it the tool
+  /// stops short of its pose; see sinew_tool_get_pose.
   float force_limit;
-  /// Bits of the categories that this tool belongs to; default 1. Two objects collide if each has a
-  /// category in the mask of the other.
-  uint32_t collision_category;
-  /// Bits of the categories that this tool collides with; default 0xffffffff.
-  uint32_t collision_mask;
-  /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
-  float half_extents[3];
-  uint32_t reserved1;           ///< Reserved; must be 0.
+  uint32_t collision_category;  ///< Collision categories of this tool; default 1. See base.h.
+  uint32_t collision_mask;      ///< Categories that it collides with; default 0xffffffff.
+  float half_extents[3];  ///< [m] Box: distance from the center to each side, above 0, at most 1e9.
 } sinew_tool_def;
 
 /// Fills a tool definition with its defaults; `struct_size` is sizeof(sinew_tool_def).
@@ -77,61 +66,61 @@ sinew_status sinew_tool_destroy(sinew_world *world, sinew_tool_id tool);
 
 // ---- Pose and settings --------------------------------------------------------------------------
 
-/// Moves a tool to a new pose during the next step.
-/// The tool moves along a straight line and rotates through the shorter arc, at constant speed.
-/// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable:
-/// unchanged. If force_limit stops the tool early, the rest is discarded: call again for every
-/// step.
+/// Moves a tool to a new pose during the next step, along a line and the shorter arc.
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged. If force_limit stops the tool
+/// early, the rest is discarded: call again for every step.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const float *position,
-                                 const float *orientation);
+    const float *orientation);
 
-/// Writes the current pose of a tool.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. A tool
-/// with a force_limit can be short of its commanded pose.
-sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *position,
-                                 float *orientation);
+/// Writes the current pose of a tool, which a force_limit can keep short of the commanded one.
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats; both are nullable.
+sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *out_position,
+    float *out_orientation);
 
 /// Sets the friction coefficient of a tool, at least 0, from the next step on.
 sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, float friction);
 
-/// Sets the largest force [N] that moves a tool, from the next step on.
-/// It is at least 0; 0 or infinity: unlimited. See sinew_tool_def.
+/// Writes the friction coefficient of a tool.
+sinew_status sinew_tool_get_friction(const sinew_world *world, sinew_tool_id tool, float *out);
+
+/// Sets the largest force [N] that moves a tool, from the next step on; 0 or infinity: unlimited.
 sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, float force_limit);
 
+/// Writes the largest force [N] that moves a tool; infinity: unlimited.
+sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id tool, float *out);
+
 /// Sets the collision category and mask of a tool from the next step on.
-/// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
+/// With mask 0 it collides with nothing. Tissue inside is pushed out once it collides.
 sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, uint32_t category,
-                                      uint32_t mask);
+    uint32_t mask);
+
+/// Writes the collision category and mask of a tool.
+sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
+    uint32_t *out_category, uint32_t *out_mask);
 
 // ---- Forces and contacts ------------------------------------------------------------------------
 
 /// Writes the force and torque on a tool, averaged over the last step, in world axes.
-/// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each; both are
-/// nullable.
+/// `force` [N] and `torque` [N m], about the position, receive 3 floats each; both are nullable.
 sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool, float *force,
-                                   float *torque);
+    float *torque);
 
 /// Contact between a tool and a body at the end of the last step.
 typedef struct sinew_contact {
   sinew_body_id body;  ///< Body that the tool touches.
-  /// Nodes of the touched node, edge or face; the last is repeated if there are fewer than 3.
-  uint32_t nodes[3];
+  uint32_t nodes[3];   ///< Nodes of the touched node, edge or face; the last is repeated below 3.
   float weights[3];    ///< Weights of the nodes at the contact point; 0 for a repeated node.
   float point[3];      ///< [m] Contact point on the body.
   float normal[3];     ///< Unit normal that points away from the tool.
-  /// [N] Force on the tool with friction, in the last substep; the wrench is the mean of all
-  /// substeps.
-  float force[3];
+  float force[3];      ///< [N] Force on the tool in the last substep; the wrench is a mean.
 } sinew_contact;
 
 /// Writes the contacts of a tool at the end of the last step.
-/// `contacts` receives at most `capacity` entries, `count` the number that exist.
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist.
 sinew_status sinew_tool_get_contacts(const sinew_world *world, sinew_tool_id tool,
-                                     sinew_contact *contacts, size_t capacity, size_t *count);
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

@@ -9,18 +9,15 @@
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+SINEW_BEGIN
 
 /// One task of a step; call it with the task_data and the indices that sinew_run_tasks received.
 typedef void (*sinew_task)(void *task_data, uint32_t index);
 
 /// Callback that runs the tasks of a step on a job system.
-/// Call task(task_data, index) once for every index from 0 to count - 1, on any threads and in any
-/// order. Return when all these calls have returned; returning earlier is not detected. Start no
-/// more tasks at once than there are free cores. The callback runs inside sinew_world_step and must
-/// not use the world.
+/// Call task(task_data, index) once for every index from 0 to count - 1, on any threads, in any
+/// order, and return when all have returned. Start no more tasks at once than there are free cores.
+/// The callback runs inside sinew_world_step and must not use the world.
 typedef void (*sinew_run_tasks)(void *context, sinew_task task, void *task_data, uint32_t count);
 
 /// SIMD level of the kernels that step springs and nodes.
@@ -36,36 +33,32 @@ typedef enum sinew_kernel {
 typedef struct sinew_world_def {
   size_t struct_size;         ///< Size of this struct; sinew_world_def_init sets it.
   float gravity[3];           ///< [m/s^2] Acceleration of all nodes; default 0 -9.81 0.
-  /// Threads of a step, at most 256: 1 (default) uses the calling thread, 0 one thread per core.
-  /// The results do not depend on it. The world owns its threads; they sleep between steps.
+  /// Threads of a step, at most 256: 1 (default) is the caller's, 0 is one per core. Results do not
+  /// depend on it. The world's own threads sleep between steps.
   uint32_t thread_count;
   /// Substeps per step: 0 (default) takes as many as stability needs; n takes exactly n. IMPLICIT
   /// and NEWTON take at most 1 ms near a tool and at most 0.25 ms while attached to another body,
   /// and subdivide a substep that gains energy; at most 4096 substeps in total.
   uint32_t substeps;
-  /// Largest number of substeps per step, at least 1; default 1000. A step that needs more returns
-  /// SINEW_STATUS_UNSTABLE. The subdivisions of IMPLICIT and NEWTON have their own limit of 4096: a
-  /// step beyond it (4 s near a tool, 1 s while attached) is unstable too.
+  /// Largest number of substeps per step, at least 1; default 1000. Beyond it a step is
+  /// SINEW_STATUS_UNSTABLE. The limit of 4096 of IMPLICIT and NEWTON makes a step of 4 s near a
+  /// tool, or of 1 s while attached, unstable too.
   uint32_t max_substeps;
-  /// [m] Bound on the position error of a step; 0 (default) turns it off. It has no effect with
-  /// fixed substeps.
+  /// [m] Bound on the position error of a step; 0: none. No effect with fixed substeps.
   float tolerance;
   uint32_t reserved;          ///< Reserved; must be 0.
   /// Job system that runs thread_count tasks per step; nullable (default): the world's own threads.
-  /// It must stay valid while the world lives. It is not called if thread_count is 1, or in small
-  /// steps.
+  /// It must stay valid while the world lives. A thread_count of 1 and small steps do not call it.
   sinew_run_tasks run_tasks;
   void *tasks_context;        ///< First argument of run_tasks; nullable.
   uint32_t kernel;            ///< SIMD level, a sinew_kernel value; default SINEW_KERNEL_BEST.
-  uint32_t reserved2;         ///< Reserved; must be 0.
 } sinew_world_def;
 
 /// Fills a world definition with its defaults; `struct_size` is sizeof(sinew_world_def).
 sinew_status sinew_world_def_init(sinew_world_def *def, size_t struct_size);
 
 /// Creates an empty world; destroy it with sinew_world_destroy.
-/// Errors: SINEW_STATUS_UNSUPPORTED if a thread could not be started or the processor lacks the
-/// kernel.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a thread cannot start or the processor lacks the kernel.
 sinew_status sinew_world_create(const sinew_world_def *def, sinew_world **out);
 
 /// Destroys a world with all its bodies, tools and blades; NULL has no effect.
@@ -77,17 +70,16 @@ void sinew_world_destroy(sinew_world *world);
 typedef struct sinew_step_report {
   size_t struct_size;        ///< Set to sizeof(sinew_step_report) before the call.
   uint32_t substeps;         ///< Largest number of substeps that a body took.
-  /// [s] Longest stable explicit substep over all bodies; infinity: no limit, as with IMPLICIT and
-  /// NEWTON.
+  /// [s] Longest stable explicit substep over all bodies; infinity with IMPLICIT and NEWTON.
   float stable_substep;
   /// Number of bodies that became non-finite and were rolled back; the others were stepped.
   uint32_t bodies_restored;
   /// [m] Position error of this step; 0 without a tolerance, infinity if the step was refused
   /// before it could be estimated.
   float error_estimate;
-  /// Number of interpenetrating surface edges that contact could not separate. It counts edges
-  /// inside other tissue, and inside their own body where that collides with itself. Contact pushes
-  /// edges of another body out of a closed one in later steps.
+  /// Number of interpenetrating surface edges that contact could not separate. Edges inside their
+  /// own body count if that collides with itself. Later steps push edges of another body out of a
+  /// closed one.
   uint32_t crossings;
   uint32_t limit;            ///< Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
   sinew_body_id limit_body;  ///< UNSTABLE: body with the shortest substep.
@@ -105,16 +97,25 @@ typedef struct sinew_step_report {
 /// number of substeps.
 sinew_status sinew_world_step(sinew_world *world, float dt, sinew_step_report *report);
 
-/// Sets the gravitational acceleration from the next step on.
-/// `gravity` [m/s^2] points to 3 floats.
+/// Sets the gravitational acceleration [m/s^2], 3 floats, from the next step on.
 sinew_status sinew_world_set_gravity(sinew_world *world, const float *gravity);
 
-/// Computes a hash over everything that the next step depends on.
-/// Compare hashes only between worlds of the same library version.
+/// Writes the gravitational acceleration [m/s^2] of a world, 3 floats.
+sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravity);
+
+/// Sets the substeps per step and their limit, from the next step on; see sinew_world_def.
+sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uint32_t max_substeps);
+
+/// Writes the number of substeps per step and its limit; both outputs are nullable.
+sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
+    uint32_t *out_max_substeps);
+
+/// Writes the time [s] that a world has been stepped, and the number of steps; both are nullable.
+sinew_status sinew_world_get_time(const sinew_world *world, double *out_time, uint64_t *out_steps);
+
+/// Computes a hash over all that the next step depends on; compare it within one version.
 sinew_status sinew_world_get_state_hash(const sinew_world *world, uint64_t *out);
 
-#ifdef __cplusplus
-}
-#endif
+SINEW_END
 
 #endif

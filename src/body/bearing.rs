@@ -89,6 +89,12 @@ impl Bearing {
         self.first.resize(node_count, NONE);
     }
 
+    /// The limits of a spring, strain and force; 0: none.
+    pub fn limits(&self, nodes: [u32; 2]) -> [f32; 2] {
+        self.find(nodes)
+            .map_or([0.0; 2], |at| [self.limits[at].strain, self.limits[at].force])
+    }
+
     /// Gives a spring its limits, strain and force, for which there is room if it has none yet.
     pub fn set(&mut self, nodes: [u32; 2], [strain, force]: [Option<f32>; 2], link: &Link) {
         match self.find(nodes) {

@@ -19,6 +19,10 @@ pub(crate) enum Torn {
     Not(Withheld),
 }
 
+fn not_made_to_tear() -> Error {
+    Error::Unsupported("most_tears is 0: the body was not made to tear".into())
+}
+
 impl Body {
     /// Gives the springs of these pairs of nodes, or edges of elements, which bear a strain alone, other limits than [`BodyDefinition::tearing`](crate::BodyDefinition::tearing): a strain, a
     /// force in N, or both; 0: any; `None` leaves them. Springs that are added later have none until they are given some. Of a pair that is
@@ -38,21 +42,34 @@ impl Body {
                 check_values(name, values, pairs.len())?;
             }
         }
-        let mut springs = memory::reserved(pairs.len())?;
-        for index in 0..pairs.len() {
-            springs.push(self.borne_by_pair(pairs, index)?);
-        }
-        let Some(tears) = &mut self.tears else {
-            return Err(Error::Unsupported(
-                "most_tears is 0: the body was not made to tear".into(),
-            ));
-        };
+        let springs = self.borne_by_pairs(pairs)?;
+        let tears = self.tears.as_mut().ok_or_else(not_made_to_tear)?;
         tears.reserve(pairs.len())?;
         for (index, (node, link)) in springs.into_iter().enumerate() {
             let limits = [strains, forces].map(|values| values.map(|values| values.get(index)));
             tears.set([node, link.neighbour], limits, &link);
         }
         Ok(())
+    }
+
+    /// The limits of the springs of these pairs of nodes, or edges of elements, strain and force in N; 0: any.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: the body was made not to tear. [`Error::InvalidArgument`]: a pair has neither. [`Error::OutOfMemory`].
+    pub fn tear_limits(&self, pairs: &[[u32; 2]]) -> Result<Vec<[f32; 2]>> {
+        let springs = self.borne_by_pairs(pairs)?;
+        let tears = self.tears.as_ref().ok_or_else(not_made_to_tear)?;
+        let mut limits = memory::reserved(pairs.len())?;
+        limits.extend(springs.iter().map(|(node, link)| tears.limits([*node, link.neighbour])));
+        Ok(limits)
+    }
+
+    fn borne_by_pairs(&self, pairs: &[[u32; 2]]) -> Result<Vec<(u32, Link)>> {
+        let mut springs = memory::reserved(pairs.len())?;
+        for index in 0..pairs.len() {
+            springs.push(self.borne_by_pair(pairs, index)?);
+        }
+        Ok(springs)
     }
 
     /// What the first of two nodes sees of their spring, or of an edge of elements, which bears a strain alone.

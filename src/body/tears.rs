@@ -96,6 +96,11 @@ impl Tears {
         self.stretch.grow(node_count);
     }
 
+    /// The limits of a spring: see [`Bearing::limits`].
+    pub fn limits(&self, nodes: [u32; 2]) -> [f32; 2] {
+        self.bearing.limits(nodes)
+    }
+
     /// Gives a spring limits: see [`Bearing::set`].
     pub fn set(&mut self, nodes: [u32; 2], limits: [Option<f32>; 2], link: &Link) {
         self.bearing.set(nodes, limits, link);

@@ -1,13 +1,17 @@
 //! Attachments: what tools hold of bodies and bodies of each other, and the force on several tools together.
 
+use std::ptr::null;
+
 use super::body::sinew_body_id;
-use super::guard::{sinew_world, with_world, with_world_mut};
+use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::id::converts;
-use super::memory;
+use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{sinew_tool_id, write_wrench};
-use crate::base::{AttachmentId, Result};
+use crate::base::memory::reserved;
+use crate::base::{AttachmentId, BodyId, Error, Result, ToolId};
 use crate::def::{Anchor, SurfacePoint};
+use crate::world::World;
 
 /// Id of an attachment or a suture; all zero means none.
 #[repr(C)]
@@ -21,229 +25,168 @@ pub struct sinew_attachment_id {
 
 converts!(sinew_attachment_id, AttachmentId);
 
-/// Attaches one node of a body to a tool, like sinew_body_attach_nodes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_body_attach_node(
-    world: *mut sinew_world,
-    body: sinew_body_id,
-    node: u32,
-    tool: sinew_tool_id,
-    force_limit: f32,
-    out: *mut sinew_attachment_id,
-) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let out = memory::output("out", out)?;
-            *out = world.attach_node(body.id(), node, tool.id(), force_limit)?.into();
-            Ok(())
-        })
+/// Nodes or surface points of a body that are attached to a tool or a body.
+///
+/// Filled by sinew_attachment_def_init; read only during sinew_attachment_create.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_attachment_def {
+    /// Size of this struct; sinew_attachment_def_init sets it.
+    pub struct_size: usize,
+    /// Body whose nodes or points are attached; no default.
+    pub body: sinew_body_id,
+    /// Tool that they are attached to; all zero (default): those of `other`.
+    pub tool: sinew_tool_id,
+    /// Body that they are attached to; all zero (default): the tool.
+    pub other: sinew_body_id,
+    /// Number of attachments; default 0.
+    pub count: usize,
+    /// `count` node indices; nullable: points.
+    pub nodes: *const u32,
+    /// `count` surface triangle indices of points; nullable: nodes.
+    pub triangles: *const u32,
+    /// 3 * count corner weights of them, at least 0 with sum 1; nullable: nodes.
+    pub weights: *const f32,
+    /// `count` node indices of `other`; nullable: points or a tool.
+    pub other_nodes: *const u32,
+    /// `count` surface triangle indices of `other`; nullable: nodes or a tool.
+    pub other_triangles: *const u32,
+    /// 3 * count corner weights of these points; nullable: nodes or a tool.
+    pub other_weights: *const f32,
+    /// [N] Mean force above which it breaks; infinity (default) or 0: unlimited.
+    pub force_limit: f32,
+}
+
+// SAFETY: repr(C), begins with struct_size, numbers and pointers alone.
+unsafe impl Versioned for sinew_attachment_def {}
+
+/// Nodes, or points of a surface; of one end of attachments.
+enum AttachedEnds<'a> {
+    Nodes(&'a [u32]),
+    Points(Vec<SurfacePoint>),
+}
+
+impl sinew_attachment_def {
+    fn defaults() -> Self {
+        Self {
+            struct_size: size_of::<Self>(),
+            body: sinew_body_id::default(),
+            tool: sinew_tool_id::default(),
+            other: sinew_body_id::default(),
+            count: 0,
+            nodes: null(),
+            triangles: null(),
+            weights: null(),
+            other_nodes: null(),
+            other_triangles: null(),
+            other_weights: null(),
+            force_limit: f32::INFINITY,
+        }
+    }
+
+    /// # Safety
+    /// The arrays are NULL or as long as stated, and nobody changes them meanwhile.
+    unsafe fn create(&self, world: &mut World) -> Result<Vec<AttachmentId>> {
+        let names = ["nodes", "triangles", "weights"];
+        let other_names = ["other_nodes", "other_triangles", "other_weights"];
+        let arrays = (self.nodes, self.triangles, self.weights);
+        let other_arrays = (self.other_nodes, self.other_triangles, self.other_weights);
+        // SAFETY: the same contract.
+        let ends = unsafe { ends(names, arrays, self.count)? };
+        let (body, limit) = (self.body.id(), self.force_limit);
+        let (nodes, triangles, weights) = other_arrays;
+        let is_given = !(nodes.is_null() && triangles.is_null() && weights.is_null());
+        if self.other.id() == BodyId::default() && !is_given {
+            return match ends {
+                AttachedEnds::Nodes(nodes) => world.attach_nodes(body, nodes, self.tool.id(), limit),
+                AttachedEnds::Points(points) => world.attach_points(body, &points, self.tool.id(), limit),
+            };
+        }
+        if self.tool.id() != ToolId::default() {
+            return Err(Error::invalid(
+                "tool is given beside other or its nodes or points".to_owned(),
+            ));
+        }
+        // SAFETY: the same contract.
+        let others = unsafe { self::ends(other_names, other_arrays, self.count)? }.anchors()?;
+        world.attach_to_body(body, &ends.anchors()?, self.other.id(), &others, limit)
     }
 }
 
-/// Attaches nodes of a body rigidly to a tool, each by its own attachment.
-///
-/// The nodes move with the tool until sinew_attachment_release; the tool does not collide with them. The holding
-/// force is part of the tool's wrench. `out` receives `count` ids. `force_limit` [N]: the attachment breaks after a
-/// step with a larger mean force; 0 or infinity: unlimited. Attachments end with the body or tool. On failure
-/// nothing is attached.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node is pinned, massless or held by another tool.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_body_attach_nodes(
-    world: *mut sinew_world,
-    body: sinew_body_id,
-    nodes: *const u32,
-    count: usize,
-    tool: sinew_tool_id,
-    force_limit: f32,
-    out: *mut sinew_attachment_id,
-) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let nodes = memory::array("nodes", nodes, count)?;
-            let out = memory::output_array("out", out, count)?;
-            write(out, world.attach_nodes(body.id(), nodes, tool.id(), force_limit)?);
-            Ok(())
-        })
+impl AttachedEnds<'_> {
+    fn anchors(&self) -> Result<Vec<Anchor>> {
+        match self {
+            Self::Nodes(nodes) => anchored(nodes, Anchor::Node),
+            Self::Points(points) => anchored(points, Anchor::Point),
+        }
     }
 }
 
-/// Attaches surface points of a body rigidly to a tool, each by its own attachment.
-///
-/// `triangles` holds `count` indices into the body's surface, `weights` 3 * count corner weights, at least 0 with
-/// sum 1. Every corner with a weight is attached, so that the patch cannot rotate; its forces add up. Corners
-/// shared by points split their force by weight. Otherwise like sinew_body_attach_nodes.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a corner is pinned, massless or held by another tool.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_body_attach_points(
-    world: *mut sinew_world,
-    body: sinew_body_id,
-    triangles: *const u32,
-    weights: *const f32,
-    count: usize,
-    tool: sinew_tool_id,
-    force_limit: f32,
-    out: *mut sinew_attachment_id,
-) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let given = surface_points(["triangles", "weights"], triangles, weights, count)?;
-            let mut points = crate::base::memory::reserved(count)?;
-            points.extend(given);
-            let out = memory::output_array("out", out, count)?;
-            write(out, world.attach_points(body.id(), &points, tool.id(), force_limit)?);
-            Ok(())
-        })
-    }
-}
-
-/// Attaches nodes of a body to nodes of another or the same body, pair by pair.
-///
-/// Each pair becomes one point, about which both may rotate; a gap closes at no more than 0.25 m/s. Momentum is
-/// conserved. Paired nodes and their features do not collide. `out` receives `count` ids. `force_limit` [N]: breaks
-/// after a step with a larger mean force; 0 or infinity: unlimited. Attachments end with either body. On failure
-/// nothing is attached.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if both nodes of a pair are the same.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_body_attach_nodes_to_nodes(
-    world: *mut sinew_world,
-    body: sinew_body_id,
-    nodes: *const u32,
-    count: usize,
-    other: sinew_body_id,
-    other_nodes: *const u32,
-    force_limit: f32,
-    out: *mut sinew_attachment_id,
-) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let nodes = anchors_of_nodes("nodes", nodes, count)?;
-            let other_nodes = anchors_of_nodes("other_nodes", other_nodes, count)?;
-            let out = memory::output_array("out", out, count)?;
-            let ids = world.attach_to_body(body.id(), &nodes, other.id(), &other_nodes, force_limit)?;
-            write(out, ids);
-            Ok(())
-        })
-    }
-}
-
-/// Attaches nodes of a body to surface points of another or the same body, pair by pair.
-///
-/// `other_triangles` and `other_weights` are as in sinew_body_attach_points, but the surface may rotate about each
-/// point. Otherwise like sinew_body_attach_nodes_to_nodes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_body_attach_nodes_to_points(
-    world: *mut sinew_world,
-    body: sinew_body_id,
-    nodes: *const u32,
-    count: usize,
-    other: sinew_body_id,
-    other_triangles: *const u32,
-    other_weights: *const f32,
-    force_limit: f32,
-    out: *mut sinew_attachment_id,
-) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let nodes = anchors_of_nodes("nodes", nodes, count)?;
-            let names = ["other_triangles", "other_weights"];
-            let points = anchors_of_points(names, other_triangles, other_weights, count)?;
-            let out = memory::output_array("out", out, count)?;
-            write(
-                out,
-                world.attach_to_body(body.id(), &nodes, other.id(), &points, force_limit)?,
-            );
-            Ok(())
-        })
-    }
-}
-
-/// Attaches surface points of a body to surface points of another or the same body, pair by pair.
-///
-/// Points are as in sinew_body_attach_nodes_to_points, the rest as in sinew_body_attach_nodes_to_nodes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_body_attach_points_to_points(
-    world: *mut sinew_world,
-    body: sinew_body_id,
-    triangles: *const u32,
-    weights: *const f32,
-    count: usize,
-    other: sinew_body_id,
-    other_triangles: *const u32,
-    other_weights: *const f32,
-    force_limit: f32,
-    out: *mut sinew_attachment_id,
-) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let points = anchors_of_points(["triangles", "weights"], triangles, weights, count)?;
-            let names = ["other_triangles", "other_weights"];
-            let others = anchors_of_points(names, other_triangles, other_weights, count)?;
-            let out = memory::output_array("out", out, count)?;
-            write(
-                out,
-                world.attach_to_body(body.id(), &points, other.id(), &others, force_limit)?,
-            );
-            Ok(())
-        })
-    }
-}
-
-/// # Safety
-/// `nodes` is NULL or as long as stated.
-unsafe fn anchors_of_nodes(name: &str, nodes: *const u32, count: usize) -> Result<Vec<Anchor>> {
-    // SAFETY: the same contract.
-    let nodes = unsafe { memory::array(name, nodes, count)? };
-    let mut anchors = crate::base::memory::reserved(count)?;
-    anchors.extend(nodes.iter().map(|&node| Anchor::Node(node)));
+fn anchored<T: Copy>(ends: &[T], anchor: fn(T) -> Anchor) -> Result<Vec<Anchor>> {
+    let mut anchors = reserved(ends.len())?;
+    anchors.extend(ends.iter().map(|&end| anchor(end)));
     Ok(anchors)
 }
 
-/// # Safety
-/// As for [`surface_points`].
-unsafe fn anchors_of_points(
-    names: [&str; 2],
-    triangles: *const u32,
-    weights: *const f32,
-    count: usize,
-) -> Result<Vec<Anchor>> {
-    // SAFETY: the same contract.
-    let points = unsafe { surface_points(names, triangles, weights, count)? };
-    let mut anchors = crate::base::memory::reserved(count)?;
-    anchors.extend(points.map(Anchor::Point));
-    Ok(anchors)
-}
-
-/// Points of a surface by the arrays of these names.
+/// The nodes of an array, or the points of two, by these names.
 ///
 /// # Safety
-/// The arrays are NULL or as long as stated, and nobody changes them while the points are taken.
-unsafe fn surface_points<'a>(
-    [of_triangles, of_weights]: [&str; 2],
-    triangles: *const u32,
-    weights: *const f32,
+/// The arrays are NULL or as long as stated, and nobody changes them while the ends are used.
+unsafe fn ends<'a>(
+    [of_nodes, of_triangles, of_weights]: [&str; 3],
+    (nodes, triangles, weights): (*const u32, *const u32, *const f32),
     count: usize,
-) -> Result<impl Iterator<Item = SurfacePoint> + 'a> {
+) -> Result<AttachedEnds<'a>> {
+    if triangles.is_null() && weights.is_null() {
+        if nodes.is_null() && count > 0 {
+            return Err(Error::invalid(format!("{of_nodes} and {of_triangles} are NULL")));
+        }
+        // SAFETY: the same contract.
+        return unsafe { memory::array(of_nodes, nodes, count) }.map(AttachedEnds::Nodes);
+    }
+    if !nodes.is_null() {
+        return Err(Error::invalid(format!("{of_nodes} is given beside points")));
+    }
     // SAFETY: the same contract.
-    let (triangles, weights): (&'a [u32], &'a [[f32; 3]]) = unsafe {
+    let (triangles, weights): (&[u32], &[[f32; 3]]) = unsafe {
         let triangles = memory::array(of_triangles, triangles, count)?;
         (triangles, memory::array(of_weights, weights.cast(), count)?)
     };
+    let mut points = reserved(count)?;
     let pairs = triangles.iter().zip(weights);
-    Ok(pairs.map(|(&triangle, &weights)| SurfacePoint { triangle, weights }))
+    points.extend(pairs.map(|(&triangle, &weights)| SurfacePoint { triangle, weights }));
+    Ok(AttachedEnds::Points(points))
 }
 
-fn write(out: &mut [sinew_attachment_id], ids: Vec<AttachmentId>) {
-    for (out, id) in out.iter_mut().zip(ids) {
-        *out = id.into();
+/// Fills an attachment definition with its defaults; `struct_size` is sizeof(sinew_attachment_def).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_attachment_def_init(def: *mut sinew_attachment_def, struct_size: usize) -> sinew_status {
+    // SAFETY: the same contract.
+    guard(|| unsafe { memory::initialise(def, struct_size, sinew_attachment_def::defaults()) })
+}
+
+/// Attaches nodes or surface points of a body to a tool or to a body, each by its own attachment.
+///
+/// A tool holds them rigidly and does not collide with them. Two bodies join at one point that both rotate about; a gap
+/// closes at no more than 0.25 m/s. `out_attachments` receives `count` ids.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node for a tool is pinned, massless or held, or both ends are the same.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_attachment_create(
+    world: *mut sinew_world,
+    def: *const sinew_attachment_def,
+    out_attachments: *mut sinew_attachment_id,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            let def = memory::definition("def", def, sinew_attachment_def::defaults())?;
+            let out = memory::output_array("out_attachments", out_attachments, def.count)?;
+            for (out, id) in out.iter_mut().zip(def.create(world)?) {
+                *out = id.into();
+            }
+            Ok(())
+        })
     }
 }
 
@@ -259,46 +202,45 @@ pub unsafe extern "C" fn sinew_attachment_release(
     unsafe { with_world_mut(world, |world| world.release(attachment.id())) }
 }
 
-/// Writes the force of an attachment on its body, averaged over the last step.
+/// Writes the force [N] of an attachment on its body, averaged over the last step.
 ///
-/// `force` [N] receives 3 floats in world axes, 0 before the first step. After sinew_body_rest_state it is the
-/// force of the tool in equilibrium.
+/// `out_force` receives 3 floats in world axes. After sinew_body_solve_equilibrium it is the force of the tool in
+/// equilibrium.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_get_force(
     world: *const sinew_world,
     attachment: sinew_attachment_id,
-    force: *mut f32,
+    out_force: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
             let held = world.attachment_force(attachment.id())?;
-            memory::write("force", force.cast::<[f32; 3]>(), held.to_array())
+            memory::write("out_force", out_force.cast::<[f32; 3]>(), held.to_array())
         })
     }
 }
 
 /// Writes the attachments that broke in the last step because of their force_limit.
 ///
-/// `out` receives at most `capacity` ids, `count` the number that broke. The ids are stale: compare them with those
-/// you stored.
+/// `out_attachments` receives at most `capacity` ids, which are stale, `out_count` their number.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_world_get_slipped(
+pub unsafe extern "C" fn sinew_world_get_broken_attachments(
     world: *const sinew_world,
-    out: *mut sinew_attachment_id,
+    out_attachments: *mut sinew_attachment_id,
     capacity: usize,
-    count: *mut usize,
+    out_count: *mut usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let out = memory::output_array("out", out, capacity)?;
-            let count = memory::output("count", count)?;
+            let out = memory::output_array("out_attachments", out_attachments, capacity)?;
+            let out_count = memory::output("out_count", out_count)?;
             let slipped = world.slipped();
             for (out, &id) in out.iter_mut().zip(slipped) {
                 *out = id.into();
             }
-            *count = slipped.len();
+            *out_count = slipped.len();
             Ok(())
         })
     }
@@ -306,25 +248,25 @@ pub unsafe extern "C" fn sinew_world_get_slipped(
 
 /// Writes the total force and torque on several tools, averaged over the last step, in world axes.
 ///
-/// `tools` holds `count` different ids. `point` [m] is 3 floats. `force` [N] and `torque` [N m], about `point`,
+/// `tools` holds `count` different ids. `point` [m] is 3 floats. `out_force` [N] and `out_torque` [N m], about `point`,
 /// receive 3 floats each; both are nullable.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_tools_get_wrench(
+pub unsafe extern "C" fn sinew_world_get_total_wrench(
     world: *const sinew_world,
     tools: *const sinew_tool_id,
     count: usize,
     point: *const f32,
-    force: *mut f32,
-    torque: *mut f32,
+    out_force: *mut f32,
+    out_torque: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
             let given = memory::array("tools", tools, count)?;
             let point = memory::vector("point", point)?;
-            let mut tools = crate::base::memory::reserved(count)?;
+            let mut tools = reserved(count)?;
             tools.extend(given.iter().map(|tool| tool.id()));
-            write_wrench(world.wrench_about(&tools, point)?, force, torque)
+            write_wrench(world.wrench_about(&tools, point)?, out_force, out_torque)
         })
     }
 }

@@ -31,21 +31,19 @@ converts!(sinew_blade_id, BladeId);
 pub struct sinew_blade_def {
     /// Size of this struct; sinew_blade_def_init sets it.
     pub struct_size: usize,
-    /// [m] Two different end points of the edge about the blade's origin, within 1e9; no default.
+    /// [m] Two different end points of the edge about the origin, within 1e9.
     pub edge: [f32; 6],
-    /// [N/m] Coupling stiffness between the blade and its proxy in each body, above 0; default 1000.
+    /// [N/m] Coupling stiffness between blade and proxy, above 0; default 1000.
     ///
     /// Before cutting, tissue of toughness T deforms by about T / stiffness.
     pub stiffness: f32,
-    /// Bits of the categories that this blade belongs to; default 1.
-    ///
-    /// It cuts a body if each has a category in the mask of the other.
+    /// Collision categories of this blade; default 1. See base.h.
     pub collision_category: u32,
-    /// Bits of the categories that this blade cuts; default 0xffffffff.
+    /// Categories that it cuts; default 0xffffffff.
     pub collision_mask: u32,
-    /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
+    /// [m] Initial position; default 0 0 0.
     pub position: [f32; 3],
-    /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
+    /// Initial orientation; default 0 0 0 1.
     pub orientation: [f32; 4],
 }
 
@@ -65,13 +63,9 @@ pub struct sinew_blade_report {
     pub length: f64,
     /// [m] Distance of the blade ahead of its cut; 0 without tissue in its path.
     pub lag: f64,
-    /// SINEW_STATUS_OK, or CAPACITY or OUT_OF_MEMORY if a cut failed; the next step retries.
+    /// SINEW_STATUS_OK, or CAPACITY or OUT_OF_MEMORY if a cut is retried.
     pub status: sinew_status,
-    /// Reserved; set to 0 by the library.
-    pub reserved0: u32,
-    /// [m^2] Area of the opened faces of solids in the rest shape.
-    ///
-    /// A cell in which the cut ends stays whole, so the area can be less than the blade swept.
+    /// [m^2] Area of one side of the opened faces of solids at rest.
     pub area: f64,
 }
 
@@ -121,10 +115,9 @@ pub unsafe extern "C" fn sinew_blade_def_init(def: *mut sinew_blade_def, struct_
 
 /// Creates a blade: an edge that cuts bodies with spare_nodes as its pose moves.
 ///
-/// It has no volume; add a tool for the flat of a scalpel. Tissue resists with its toughness; a failed cut is
-/// reported in sinew_blade_report and leaves the step successful. Tissue that moves onto the edge is cut too.
-/// Moving along the edge or back through the cut meets no resistance. A triangle needs about 10 spare_nodes. A step
-/// that cuts may allocate.
+/// It has no volume. Tissue resists with its toughness; tissue that moves onto the edge is cut too. Moving along the
+/// edge or back meets no resistance. A triangle needs about 10 spare_nodes. A step that cuts may allocate;
+/// sinew_blade_report tells of a failed cut.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_create(
     world: *mut sinew_world,
@@ -149,10 +142,9 @@ pub unsafe extern "C" fn sinew_blade_destroy(world: *mut sinew_world, blade: sin
     unsafe { with_world_mut(world, |world| world.destroy_blade(blade.id())) }
 }
 
-/// Moves a blade to a new pose during the next step.
+/// Moves a blade to a new pose during the next step, along a line at constant speed.
 ///
-/// The blade moves along a straight line at constant speed. `position` [m] is 3 floats, each within 1e9;
-/// `orientation` is x y z w, not zero, nullable: unchanged.
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_set_pose(
     world: *mut sinew_world,
@@ -170,9 +162,7 @@ pub unsafe extern "C" fn sinew_blade_set_pose(
     }
 }
 
-/// Sets the collision category and mask of a blade, from the next step on.
-///
-/// A body that it no longer meets lets go of the blade.
+/// Sets the collision category and mask of a blade; bodies outside of them let go of it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_set_collision(
     world: *mut sinew_world,
@@ -204,7 +194,6 @@ pub unsafe extern "C" fn sinew_blade_get_report(
                 length: told.length,
                 lag: told.lag,
                 status: told.refused.as_ref().map_or(SINEW_STATUS_OK, status_of),
-                reserved0: 0,
                 area: told.area,
             });
             Ok(())

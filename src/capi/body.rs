@@ -109,10 +109,9 @@ pub unsafe extern "C" fn sinew_body_destroy(world: *mut sinew_world, body: sinew
     unsafe { with_world_mut(world, |world| world.destroy_body(body.id())) }
 }
 
-/// Adds a force to a node for the whole next step.
+/// Adds a force [N], 3 floats, to a node for the whole next step; cleared when that succeeds.
 ///
-/// `force` [N] points to 3 floats. Forces are constant during the step and cleared when it succeeds. They have no
-/// effect on a pinned or attached node, nor along a pinned axis.
+/// It has no effect on a pinned or attached node, nor along a pinned axis.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_apply_force(
     world: *mut sinew_world,
@@ -128,10 +127,9 @@ pub unsafe extern "C" fn sinew_body_apply_force(
     }
 }
 
-/// Adds a force to each of many nodes for the whole next step.
+/// Adds forces [N], 3 * count floats, to nodes for the whole next step; see sinew_body_apply_force.
 ///
-/// `nodes` holds `count` indices, which may repeat; `forces` [N] holds 3 * count floats. See
-/// sinew_body_apply_force. On failure no force is added.
+/// `nodes` holds `count` indices, which may repeat.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_apply_forces(
     world: *mut sinew_world,
@@ -151,7 +149,7 @@ pub unsafe extern "C" fn sinew_body_apply_forces(
 
 /// Writes a view of the node positions [m] without copying.
 ///
-/// Lifetime: until the next step, sinew_body_set_positions, sinew_body_set_velocities, sinew_body_rest_state or
+/// Lifetime: until the next step, sinew_body_set_positions, sinew_body_set_velocities, sinew_body_solve_equilibrium or
 /// topology change of the body, or its destruction.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_positions(
@@ -169,8 +167,8 @@ pub unsafe extern "C" fn sinew_body_get_positions(
 
 /// Writes a view of the node velocities [m/s] at the time of the positions.
 ///
-/// A pinned node has the velocity of its pin in the last step. The first call after a step computes the velocities,
-/// at the cost of about one substep. Lifetime: as for sinew_body_get_positions.
+/// A pinned node has that of its pin in the last step. The first call after a step costs about one substep. Lifetime:
+/// as for sinew_body_get_positions.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_velocities(
     world: *const sinew_world,
@@ -204,7 +202,7 @@ pub unsafe extern "C" fn sinew_body_is_closed(
 
 /// Sets the collision category and mask of a body from the next step on.
 ///
-/// See sinew_body_def. Tools and bodies inside it are pushed out once they collide with it.
+/// Tools and bodies inside it are pushed out once they collide with it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_collision(
     world: *mut sinew_world,
@@ -221,10 +219,9 @@ pub unsafe extern "C" fn sinew_body_set_collision(
     }
 }
 
-/// Moves all nodes to new positions without a sweep.
+/// Moves all nodes to new positions [m], 3 * node_count floats, without a sweep.
 ///
-/// `positions` [m] holds 3 * node_count floats. Velocities stay. Pinned nodes move too, and attached nodes stay
-/// attached at their new positions. `node_count` must be the body's.
+/// Velocities stay. Pinned nodes move too, and attached nodes stay attached.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_positions(
     world: *mut sinew_world,
@@ -242,10 +239,9 @@ pub unsafe extern "C" fn sinew_body_set_positions(
     }
 }
 
-/// Sets the velocities of all nodes.
+/// Sets the velocities [m/s] of all nodes, 3 * node_count floats.
 ///
-/// `velocities` [m/s] holds 3 * node_count floats. Pinned nodes and pinned axes keep theirs. `node_count` must be
-/// the body's number of nodes.
+/// Pinned nodes and pinned axes keep theirs.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_velocities(
     world: *mut sinew_world,
@@ -274,8 +270,8 @@ pub unsafe extern "C" fn sinew_body_pin(world: *mut sinew_world, body: sinew_bod
 
 /// Pins a node along some axes and frees it along the others.
 ///
-/// `axes` is a sum of SINEW_AXIS_X, SINEW_AXIS_Y and SINEW_AXIS_Z; 0 unpins the node. A freed axis keeps the
-/// velocity of its pin. Changing the axes cancels a pending sinew_body_move_pin.
+/// `axes` is a sum of SINEW_AXIS_ values; 0 unpins the node. A freed axis keeps the velocity of its pin. Changing the
+/// axes cancels a pending sinew_body_move_pin.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds it, or a node of mass 0 would be free.
 #[unsafe(no_mangle)]
@@ -299,9 +295,7 @@ pub unsafe extern "C" fn sinew_body_pin_axes(
     }
 }
 
-/// Unpins a node along all axes; no effect on a free node.
-///
-/// The node keeps the velocity of its pin in the last step.
+/// Unpins a node along all axes; it keeps the velocity of its pin.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or its mass is 0.
 #[unsafe(no_mangle)]
@@ -310,9 +304,9 @@ pub unsafe extern "C" fn sinew_body_unpin(world: *mut sinew_world, body: sinew_b
     unsafe { with_body_mut(world, body, |body| body.unpin(node)) }
 }
 
-/// Moves a pinned node to a new position during the next step.
+/// Moves a pinned node along a line to a position [m], 3 floats, during the next step.
 ///
-/// The node moves along a straight line, and only along its pinned axes. `position` [m] is 3 floats.
+/// Free axes do not follow.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 #[unsafe(no_mangle)]
@@ -330,9 +324,9 @@ pub unsafe extern "C" fn sinew_body_move_pin(
     }
 }
 
-/// Writes the reaction force on a pinned node, averaged over the last step.
+/// Writes the reaction force [N] on a pinned node, 3 floats, averaged over the last step.
 ///
-/// `force` [N] receives 3 floats, 0 along free axes.
+/// It is 0 along free axes.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 #[unsafe(no_mangle)]
@@ -352,7 +346,7 @@ pub unsafe extern "C" fn sinew_body_get_pin_force(
 
 /// Connects two nodes by a spring without damping.
 ///
-/// `stiffness` is in [N/m], `rest_length` in [m]; a negative rest length means the current distance.
+/// `stiffness` is in [N/m], `rest_length` in [m]; negative: the current distance.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the pair has a spring; SINEW_STATUS_CAPACITY if a node has no free slot
 /// (FAST_LINK).
@@ -372,9 +366,9 @@ pub unsafe extern "C" fn sinew_body_add_spring(
     unsafe { with_body_mut(world, body, |body| body.add_spring(a, b, stiffness, rest_length)) }
 }
 
-/// Sets the overpressure of the cavities at rest volume from the next step on.
+/// Sets the overpressure [Pa] of the cavities at rest volume from the next step on.
 ///
-/// `pressure` is in [Pa]; see sinew_body_def. Open cavities stay without pressure.
+/// Open cavities stay without pressure.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body was created with neither pressure nor enclosed_stiffness.
 #[unsafe(no_mangle)]
@@ -387,9 +381,9 @@ pub unsafe extern "C" fn sinew_body_set_pressure(
     unsafe { with_body_mut(world, body, |body| body.set_pressure(pressure)) }
 }
 
-/// Removes the spring between two nodes, with the elements and the bending of that edge.
+/// Removes the spring between two nodes, and the tetrahedra and the bending that have this edge.
 ///
-/// Elements are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the edge.
+/// The tetrahedra are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the edge.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if there is nothing between the nodes.
 #[unsafe(no_mangle)]

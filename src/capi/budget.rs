@@ -16,12 +16,11 @@ impl From<BudgetReport> for sinew_step_report {
     }
 }
 
-/// Advances the world by at most `work` units of work.
+/// Advances the world by at most `work` units of work; `report` is nullable.
 ///
 /// A unit is one substep of each VERLET body or one matrix-vector product of each other body. The step covers `dt` [s]
-/// plus the lag, or as much as VERLET reaches in `work` substeps; the rest is the new lag, which plain steps leave.
-/// Other solvers stop after `work` products, or one for each millisecond near a tool, and continue in the next step.
-/// Tools, pins and blades complete their motion. `report` is nullable.
+/// plus the lag; what it does not reach is the new lag. Equations stop after `work` products and continue in the next
+/// step. Tools, pins and blades move in full.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED with fixed substeps or a tolerance.
 #[unsafe(no_mangle)]
@@ -37,8 +36,8 @@ pub unsafe extern "C" fn sinew_world_step_with_budget(
 
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
 ///
-/// The first calls do little work and measure. A step can be late if the machine or the scene became slower. For a
-/// bitwise replay record `work` of `report`.
+/// The first calls measure. A step can be late if the scene became slower. For a bitwise replay record `work` of
+/// `report`, which is nullable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_step_within(
     world: *mut sinew_world,

@@ -13,7 +13,7 @@ use crate::contact::{Contact, ContactChange};
 pub struct sinew_contact {
     /// Body that the tool touches.
     pub body: sinew_body_id,
-    /// Nodes of the touched node, edge or face; the last is repeated if there are fewer than 3.
+    /// Nodes of the touched node, edge or face; the last is repeated below 3.
     pub nodes: [u32; 3],
     /// Weights of the nodes at the contact point; 0 for a repeated node.
     pub weights: [f32; 3],
@@ -21,7 +21,7 @@ pub struct sinew_contact {
     pub point: [f32; 3],
     /// Unit normal that points away from the tool.
     pub normal: [f32; 3],
-    /// [N] Force on the tool with friction, in the last substep; the wrench is the mean of all substeps.
+    /// [N] Force on the tool in the last substep; the wrench is a mean.
     pub force: [f32; 3],
 }
 
@@ -35,8 +35,6 @@ pub struct sinew_contact_change {
     pub body: sinew_body_id,
     /// 1: the contact began; 0: it ended.
     pub begun: u32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 impl From<Contact> for sinew_contact {
@@ -58,29 +56,28 @@ impl From<ContactChange> for sinew_contact_change {
             tool: change.tool.into(),
             body: change.body.into(),
             begun: change.begun.into(),
-            reserved: 0,
         }
     }
 }
 
 /// Writes the contacts of a tool at the end of the last step.
 ///
-/// `contacts` receives at most `capacity` entries, `count` the number that exist.
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_contacts(
     world: *const sinew_world,
     tool: sinew_tool_id,
-    contacts: *mut sinew_contact,
+    out_contacts: *mut sinew_contact,
     capacity: usize,
-    count: *mut usize,
+    out_count: *mut usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
             let found = world.contacts(tool.id())?;
-            let places = memory::output_array("contacts", contacts, capacity)?;
-            let count = memory::output("count", count)?;
-            *count = write(found.map(sinew_contact::from), places);
+            let places = memory::output_array("out_contacts", out_contacts, capacity)?;
+            let out_count = memory::output("out_count", out_count)?;
+            *out_count = write(found.map(sinew_contact::from), places);
             Ok(())
         })
     }
@@ -88,22 +85,22 @@ pub unsafe extern "C" fn sinew_tool_get_contacts(
 
 /// Writes the contacts that began or ended in the last step.
 ///
-/// `changes` receives at most `capacity` entries, `count` the number that exist. Destroying a tool or body does not
-/// report an end.
+/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist. Destroying a tool or body
+/// reports no end.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_contact_changes(
     world: *const sinew_world,
-    changes: *mut sinew_contact_change,
+    out_changes: *mut sinew_contact_change,
     capacity: usize,
-    count: *mut usize,
+    out_count: *mut usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let places = memory::output_array("changes", changes, capacity)?;
+            let places = memory::output_array("out_changes", out_changes, capacity)?;
             let found = world.contact_changes().map(sinew_contact_change::from);
-            let count = memory::output("count", count)?;
-            *count = write(found, places);
+            let out_count = memory::output("out_count", out_count)?;
+            *out_count = write(found, places);
             Ok(())
         })
     }

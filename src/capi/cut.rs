@@ -20,15 +20,13 @@ pub struct sinew_cut_report {
     pub new_nodes: u32,
     /// Number of new surface triangles.
     pub new_triangles: u32,
-    /// Number of springs removed by the blade or replaced by springs of copies.
+    /// Number of springs removed, or replaced by springs of copies.
     pub springs_removed: u32,
     /// Increase of the number of connected surface components.
     pub pieces_parted: u32,
     /// [m] Length of the cut in the rest shape; for a solid on its surface.
     pub length: f64,
-    /// [m^2] Area of the opened faces of a solid in the rest shape, counted on one side.
-    ///
-    /// A cell in which the cut ends stays whole, so the area can be less than the blade swept.
+    /// [m^2] Area of one side of the opened faces of a solid at rest; a cell where the cut ends stays whole.
     pub area: f64,
 }
 
@@ -38,9 +36,9 @@ pub struct sinew_cut_report {
 pub struct sinew_new_node {
     /// Index of the new node; indices increase by 1 per entry.
     pub node: u32,
-    /// Source nodes, each with a lower index than the new node; an unused entry has weight 0.
+    /// Source nodes, lower than the new node; an unused entry has weight 0.
     pub sources: [u32; 3],
-    /// Weights of the sources, at least 0, with sum 1; a copy has a single source.
+    /// Weights of the sources, with sum 1; a copy has a single source.
     pub weights: [f32; 3],
 }
 
@@ -68,7 +66,7 @@ pub struct sinew_topology_changes {
     pub nodes: *const sinew_new_node,
     /// Number of new nodes.
     pub node_count: usize,
-    /// Indices of changed and new triangles in sinew_body_get_triangles; may repeat.
+    /// Changed and new triangles of the surface; may repeat.
     pub triangles: *const u32,
     /// Number of triangle indices.
     pub triangle_count: usize,
@@ -76,7 +74,7 @@ pub struct sinew_topology_changes {
     pub removed_springs: *const u32,
     /// Number of removed springs.
     pub removed_spring_count: usize,
-    /// New cut-boundary edges as they were when they were made; later cuts may change them.
+    /// New cut-boundary edges as they were made; later cuts change them.
     pub rim: *const sinew_rim_edge,
     /// Number of cut-boundary edges.
     pub rim_count: usize,
@@ -113,10 +111,9 @@ const _: () = assert!(size_of::<sinew_rim_edge>() == size_of::<NewRimEdge>());
 
 /// Cuts a body along the surface that a blade's edge swept, at the current positions.
 ///
-/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `report` is nullable. A sweep that
-/// starts where the body's last one ended continues it. New nodes are appended; mass, momentum and energy are
-/// conserved. The call ends views of positions and triangles; see sinew_body_get_topology_changes. On failure
-/// nothing changes.
+/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `out_report` is nullable. A sweep that
+/// starts where the last one ended continues it. New nodes are appended, and views end; see
+/// sinew_body_get_topology_changes.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED without spare_nodes; SINEW_STATUS_CAPACITY if too few are left.
 #[unsafe(no_mangle)]
@@ -125,17 +122,17 @@ pub unsafe extern "C" fn sinew_body_cut(
     body: sinew_body_id,
     start: *const f32,
     end: *const f32,
-    report: *mut sinew_cut_report,
+    out_report: *mut sinew_cut_report,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world_mut(world, |world| {
             let start = edge("start", start)?;
             let end = edge("end", end)?;
-            let out = if report.is_null() {
+            let out = if out_report.is_null() {
                 None
             } else {
-                Some(memory::report("report", report)?)
+                Some(memory::report("out_report", out_report)?)
             };
             let done = world.cut(body.id(), &Sweep { start, end })?;
             if let Some(out) = out {
@@ -156,8 +153,8 @@ pub unsafe extern "C" fn sinew_body_cut(
 
 /// Writes the topology changes of a body since a version.
 ///
-/// Pass 0 for all changes since creation, then the `version` of the previous call. A renderer interpolates the
-/// attributes of new nodes from their sources and reads the listed triangles again.
+/// Pass 0 for all changes, then the `version` of the previous call. Interpolate the attributes of new nodes from their
+/// sources and read the listed triangles again.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the version is in the future.
 #[unsafe(no_mangle)]
@@ -205,32 +202,32 @@ pub unsafe extern "C" fn sinew_body_get_triangles(
     }
 }
 
-/// Writes the connected component of each node, and the number of components.
+/// Writes the connected component of each node, from 0, and the number of components.
 ///
-/// Nodes are connected by springs, elements and the surface. `pieces` receives `count` numbers from 0, where
-/// `count` is the number of nodes. `pieces` and `piece_count` are nullable.
+/// Nodes are connected by springs, elements and the surface. `out_pieces` receives `node_count` numbers; both outputs
+/// are nullable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_pieces(
     world: *const sinew_world,
     body: sinew_body_id,
-    pieces: *mut u32,
-    count: usize,
-    piece_count: *mut u32,
+    out_pieces: *mut u32,
+    node_count: usize,
+    out_piece_count: *mut u32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            let out = memory::optional_output_array("pieces", pieces, count)?;
-            let piece_count = memory::optional_output_array("piece_count", piece_count, 1)?;
+            let out = memory::optional_output_array("out_pieces", out_pieces, node_count)?;
+            let out_piece_count = memory::optional_output_array("out_piece_count", out_piece_count, 1)?;
             if out.is_some() {
-                expect_count("pieces", count, body.node_count())?;
+                expect_count("out_pieces", node_count, body.node_count())?;
             }
             let found = body.pieces()?;
             if let Some(out) = out {
                 out.copy_from_slice(&found.of_nodes);
             }
-            if let Some(piece_count) = piece_count {
-                piece_count[0] = found.count;
+            if let Some(out_piece_count) = out_piece_count {
+                out_piece_count[0] = found.count;
             }
             Ok(())
         })

@@ -26,7 +26,7 @@ pub const SINEW_DRAW_BOUNDS: u32 = 64;
 
 const ALL: u32 = 2 * SINEW_DRAW_BOUNDS - 1;
 
-/// Callback that draws a line, point or triangle: 2, 1 or 3 vectors of 3 floats [m], color 0xRRGGBBAA.
+/// Callback that draws a line, point or triangle: 2, 1 or 3 vectors [m], color 0xRRGGBBAA.
 pub type sinew_draw = Option<unsafe extern "C" fn(context: *mut c_void, points: *const f32, rgba: u32)>;
 
 /// Contents and callbacks of sinew_world_debug_draw, filled by sinew_debug_draw_init.

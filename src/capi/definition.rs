@@ -12,28 +12,27 @@ pub const SINEW_STORAGE_PACKED: u32 = 0;
 pub const SINEW_STORAGE_EFFICIENT: u32 = 1;
 /// One array with springs_per_node slots per node; for comparison.
 pub const SINEW_STORAGE_FAST_LINK: u32 = 2;
-/// Chain of arrays of springs_per_node slots per node; for comparison.
+/// Chain of arrays of springs_per_node slots; for comparison.
 pub const SINEW_STORAGE_DYNAMIC_BULK: u32 = 3;
 
 /// Explicit; takes as many substeps as stability needs.
 pub const SINEW_SOLVER_VERLET: u32 = 0;
 /// Implicit; stable at any step size.
 pub const SINEW_SOLVER_IMPLICIT: u32 = 1;
-/// Reference solver: the equations of IMPLICIT solved to double precision; slow.
+/// Reference: IMPLICIT solved to double precision; slow.
 pub const SINEW_SOLVER_NEWTON: u32 = 2;
-/// VERLET or IMPLICIT, chosen on creation; see sinew_solver_report. Default.
+/// VERLET or IMPLICIT, see sinew_solver_report; default.
 pub const SINEW_SOLVER_AUTO: u32 = 3;
 
 /// Springs as given, or one stiffness for all. Default.
 pub const SINEW_MATERIAL_NONE: u32 = 0;
-/// Springs along the element edges, with stiffnesses computed from young_modulus.
+/// Springs along element edges, of young_modulus.
 ///
-/// They imply a Poisson's ratio of 1/4 for tetrahedra and cells, and of 1/3 in the plane for triangles.
+/// Poisson's ratio is 1/4 for tetrahedra and cells, 1/3 in the plane for triangles.
 pub const SINEW_MATERIAL_SPRINGS: u32 = 1;
-/// Finite elements of element_law.
+/// Finite elements of element_law, with the springs given.
 ///
-/// Accepts a Poisson's ratio from 0 to 0.49. Accurate up to a compression of about 20 %, stable beyond. The body
-/// has no springs but those given. sinew_body_remove_spring removes the tetrahedra that have the edge.
+/// Accurate up to a compression of about 20 %, stable beyond.
 pub const SINEW_MATERIAL_TETRAHEDRA: u32 = 2;
 
 /// Force = stiffness * rest length * strain e. Default.
@@ -68,11 +67,11 @@ pub struct sinew_body_def {
     ///
     /// IMPLICIT rolls a body back if mass / dt^2 is not a finite float.
     pub masses: *const f32,
-    /// [N s/m] node_count floats, the drag per node; nullable: node_damping.
+    /// [N s/m] node_count floats of drag; nullable: node_damping.
     pub node_dampings: *const f32,
-    /// [kg] Mass of each node, at least 1e-37; no default. Must be 0 if density is set.
+    /// [kg] Mass of each node, at least 1e-37; no default. 0 with a density.
     pub node_mass: f32,
-    /// [N s/m] Drag on each node: force = -node_damping * velocity; default 0.
+    /// [N s/m] Drag on each node: force = -node_damping * velocity.
     pub node_damping: f32,
     /// 2 * spring_count node indices, each pair once; nullable: the element edges, each once.
     ///
@@ -84,15 +83,15 @@ pub struct sinew_body_def {
     pub stiffnesses: *const f32,
     /// [m] spring_count floats; nullable: from the rest positions.
     pub rest_lengths: *const f32,
-    /// [N s/m] spring_count floats, along the spring; nullable: spring_damping.
+    /// [N s/m] spring_count floats; nullable: spring_damping.
     pub spring_dampings: *const f32,
-    /// [N/m] Stiffness of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
+    /// [N/m] Stiffness of each spring; 0 for TETRAHEDRA without springs.
     pub stiffness: f32,
-    /// [N s/m] Damping of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
+    /// [N s/m] Damping of each spring; 0 for TETRAHEDRA without springs.
     pub spring_damping: f32,
-    /// 3 * triangle_count node indices, outward: the render and contact surface; nullable.
+    /// 3 * triangle_count node indices, outward: the render and contact surface.
     ///
-    /// NULL takes the boundary of the tetrahedra or cells.
+    /// Nullable: the boundary of the tetrahedra or cells.
     pub triangles: *const u32,
     /// Number of triangles given.
     pub triangle_count: usize,
@@ -102,77 +101,69 @@ pub struct sinew_body_def {
     pub tetrahedron_count: usize,
     /// Spring storage, a sinew_storage value.
     pub storage: u32,
-    /// Slots per node (FAST_LINK) or per array (DYNAMIC_BULK); 0 (default) derives them from the springs.
-    ///
-    /// A node with more springs than slots is SINEW_STATUS_CAPACITY with FAST_LINK. Other storages ignore it.
+    /// Slots per node (FAST_LINK) or per array (DYNAMIC_BULK); 0 (default): from the springs given.
     pub springs_per_node: u32,
-    /// Time integrator, a sinew_solver value.
+    /// Time integrator, a sinew_solver value; default AUTO.
     pub solver: u32,
     /// Reserved; must be 0.
     pub reserved: u32,
-    /// IMPLICIT, NEWTON: 1 is implicit Euler, 2 is BDF2, which is far more accurate; 0 (default): 2.
+    /// IMPLICIT, NEWTON: 1 is implicit Euler; 2 or 0 is BDF2, far more accurate.
     pub order: u32,
     /// IMPLICIT, NEWTON: largest number of matrix-vector products per step, at most 1,000,000.
     ///
-    /// 0 (default) is 1000 for IMPLICIT, where a product costs about one VERLET substep, and 100,000 for NEWTON.
-    /// Each part of a subdivided step gets at least 1/32 of it. If less than 256, a step beside a tool may take seven
-    /// times as many, at most 128 more, before it is subdivided.
+    /// 0 (default) is 1000 for IMPLICIT, 100,000 for NEWTON. Each part of a subdivided step gets at least 1/32 of it.
+    /// If less than 256, a step beside a tool may take seven times as many, at most 128 more, before it is subdivided.
     pub iterations: u32,
-    /// IMPLICIT, NEWTON: relative tolerance of the linear solve, 1e-6 to 1.
+    /// IMPLICIT, NEWTON: error of the linear solve, 1e-6 to 1, relative to the displacement that forces cause in the
+    /// step.
     ///
-    /// It bounds the error relative to the displacement that forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
+    /// 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
     pub accuracy: f32,
     /// Reserved; must be 0.
     pub reserved1: u32,
-    /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to 1; as much
-    /// as it takes where a step would be refused.
+    /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1; default 0.001.
     ///
-    /// Default 0.001; 0 is off. Mass is added only if it saves at least 1/4 of the substeps, and never with fixed
+    /// A step that would be refused may add more. Mass is added only if it saves 1/4 of the substeps, never with fixed
     /// substeps or a tolerance. It adds inertia but no weight. See sinew_solver_report.
     pub mass_scaling: f32,
     /// Reserved; must be 0.
     pub reserved2: u32,
     /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells.
     ///
-    /// Corner bits: x 1, y 2, z 4. Their springs are the edges and the face diagonals.
+    /// Corner bits: x 1, y 2, z 4. Springs are the edges and face diagonals.
     pub cells: *const u32,
     /// Number of cells given.
     pub cell_count: usize,
-    /// How elements make forces, a sinew_material value; default NONE.
+    /// A sinew_material value: how tetrahedra or cells, or else triangles, make forces; default NONE.
     ///
-    /// Other values fill the tetrahedra or cells, or else the triangles, and need springs NULL and stiffness 0,
-    /// except for TETRAHEDRA with springs of its own. Cells must be cubes of one size within 0.1 %.
+    /// SPRINGS needs springs NULL and stiffness 0. Cells must be cubes of one size within 0.1 %.
     pub material: u32,
     /// [Pa] Young's modulus at small strain, above 0 with a material, else 0.
     ///
-    /// Exact for cells and equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, a mesh of one or
-    /// two layers of tetrahedra much softer.
+    /// Exact for cells and equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, one or two layers of
+    /// tetrahedra are much softer.
     pub young_modulus: f32,
-    /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value +- 0.001.
+    /// TETRAHEDRA: 0 to 0.49; SPRINGS: 0 or the implied value +- 0.001.
     pub poisson_ratio: f32,
     /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
     ///
-    /// Every node must then belong to an element, masses must be NULL and node_mass 0.
+    /// Every node must then belong to an element, masses be NULL and node_mass 0.
     pub density: f32,
     /// [m] Thickness of a material that fills triangles, above 0; else 0.
     pub thickness: f32,
-    /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0.
+    /// [Pa] Resistance of each tetrahedron to volume change and inversion; 0 with TETRAHEDRA.
     ///
-    /// 0.3 to 0.6 of Young's modulus lets a body of springs recover from inversion. 0 with TETRAHEDRA.
+    /// 0.3 to 0.6 of Young's modulus lets a body of springs recover from inversion.
     pub volume_stiffness: f32,
-    /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness.
-    ///
-    /// An anchor spring pulls a node to its rest position in the world.
+    /// [N/m] node_count floats; nullable: home_stiffness.
     pub home_stiffnesses: *const f32,
-    /// [N/m] Stiffness of each anchor spring; default 0: no anchor springs.
+    /// [N/m] Stiffness of anchor springs, which pull nodes to rest positions.
     pub home_stiffness: f32,
-    /// [N m] Flexural rigidity of the triangles, at least 0; default 0.
+    /// [N m] Flexural rigidity of triangles: E t^3 / (12 (1 - nu^2)) for a sheet of thickness t.
     ///
-    /// A sheet of thickness t has E t^3 / (12 (1 - nu^2)). The rest angle of each edge may be any. An edge of more
-    /// than two triangles is refused. Exact for equilateral triangles. sinew_body_remove_spring removes the bending
-    /// of the triangles that have the edge.
+    /// Exact for equilateral triangles. An edge of more than two triangles is refused.
     pub bending_stiffness: f32,
-    /// Force law of springs, a sinew_spring_law value; default LINEAR. Later springs are linear.
+    /// Force law, a sinew_spring_law value; later springs are linear.
     pub spring_law: u32,
     /// EXPONENTIAL: above 0, at most 13.8 / spring_limit; else 0.
     pub spring_steepness: f32,
@@ -182,109 +173,101 @@ pub struct sinew_body_def {
     pub spring_cubic: f32,
     /// EXPONENTIAL, CUBIC: strain beyond which the law is linear, above 0; else 0.
     pub spring_limit: f32,
-    /// [Pa] Fiber stiffness of each tetrahedron, at least 0; default 0.
+    /// [Pa] Fiber stiffness of each tetrahedron.
     pub fibre_stiffness: f32,
     /// 3 * tetrahedron_count floats: unit fiber directions at rest, or 0 for no fibers; nullable.
     ///
-    /// Fibers pull in proportion to their extension, over the cross section at rest. They never push.
+    /// Fibers pull in proportion to their extension and never push.
     pub fibre_directions: *const f32,
-    /// [Pa] tetrahedron_count floats, at least 0; nullable: fibre_stiffness.
+    /// [Pa] tetrahedron_count floats; nullable: fibre_stiffness.
     pub fibre_stiffnesses: *const f32,
-    /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6; default 0: none.
+    /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6.
     ///
-    /// It acts in parallel with the stiffness. Springs added later have none. VERLET needs short substeps from
-    /// about 0.01 s on; use IMPLICIT there.
+    /// It acts in parallel with the stiffness. Later springs have none. From about 0.01 s on use IMPLICIT: VERLET needs
+    /// short substeps.
     pub retardation_time: f32,
-    /// [s] Relaxation time of the Maxwell branch (spring in series with the dashpot), 1e-9 to 1e6.
+    /// [s] Relaxation time of the Maxwell branch, 1e-9 to 1e6; 0: a Kelvin-Voigt solid.
     ///
-    /// After a strain step the stress is E (1 + retardation_time / relaxation_time exp(-t / relaxation_time)). 0
-    /// (default) leaves a Kelvin-Voigt solid. Bodies start relaxed; sinew_body_set_positions relaxes them.
+    /// After a strain step the stress is E (1 + retardation_time / relaxation_time exp(-t / relaxation_time)). Bodies
+    /// start relaxed; sinew_body_set_positions relaxes them.
     pub relaxation_time: f32,
-    /// Strain at which springs and elements yield, in tension and compression; 0 (default): never.
+    /// Strain at which springs and elements yield; 0: never. Strain beyond it is permanent.
     ///
-    /// Strain beyond it is permanent. Requires SINEW_SPRING_LAW_LINEAR; springs added later do not yield.
-    /// Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so long steps slow it.
+    /// It needs SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow the yielding of tetrahedra.
     pub yield_strain: f32,
-    /// Maximum plastic strain, above 0 and below 1 with yield_strain; default 0.5. Elastic beyond.
+    /// With yield_strain: maximum plastic strain, above 0 and below 1; default 0.5. Elastic beyond.
     pub largest_set: f32,
-    /// Strain above which springs stiffen, at least 0; default 0: none. Springs added later do not.
+    /// Strain above which springs stiffen; 0: none. Later springs do not.
     pub strain_limit: f32,
     /// Added stiffness beyond strain_limit as a multiple, above 0, at most 1e6; default 100.
     pub limit_stiffening: f32,
-    /// [Pa] Stiffness of the volume inside closed surfaces, at least 0; default 0.
+    /// [Pa] Stiffness of the volume inside closed surfaces.
     ///
     /// Energy of a cavity: enclosed_stiffness / 2 * V0 (V / V0 - 1)^2 - pressure (V - V0). Each connected surface
     /// component must be closed and is a cavity; if some are inverted, like the inner wall of a hollow organ, only
-    /// those are. Cutting or removing a surface edge opens its cavity permanently.
+    /// those are. Cutting or removing a surface edge opens its cavity.
     pub enclosed_stiffness: f32,
-    /// [Pa] Overpressure in each cavity at rest volume; may be negative; default 0.
+    /// [Pa] Overpressure in cavities at rest volume, of any sign.
     ///
-    /// It is constant without an enclosed_stiffness. See sinew_body_set_pressure.
+    /// It is constant without enclosed_stiffness. See sinew_body_set_pressure.
     pub pressure: f32,
-    /// [m] Distance that tools and other tissue keep from the surface, 0 to 1e9; default 0.
+    /// [m] Distance that tools and tissue keep from the surface, 0 to 1e9.
     pub contact_thickness: f32,
-    /// Coulomb coefficient for tissue contact, at least 0; default 0. The larger of two bodies applies.
+    /// Coulomb coefficient for tissue contact; the larger of two bodies' applies.
     ///
     /// Contact with a tool uses the friction of the tool.
     pub contact_friction: f32,
-    /// 1: collides with other bodies that also have 1; 0 (default): does not.
+    /// 1: collides with other bodies that have 1; 0 (default): does not.
     pub meets_bodies: u32,
     /// 1: collides with itself; 0 (default): does not.
     ///
-    /// The two sides of a cut then rest against each other with no gap. The cut-boundary edges of a sheet may slide over each other until separated.
+    /// The two sides of a cut then rest against each other; cut edges of a sheet may slide over each other.
     pub meets_itself: u32,
-    /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE.
+    /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE, if either asks for it.
     ///
-    /// IMAGE_SPACE applies if either of two bodies asks for it. Self-collision is always exact.
-    /// SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
+    /// Self-collision is exact. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
     pub contact_detection: u32,
     /// [m] IMAGE_SPACE: pixel size; 0 (default): half of the mean surface edge. At most 2^24 pixels.
     pub contact_resolution: f32,
-    /// Bits of the categories that this body belongs to; default 1.
-    ///
-    /// Two objects collide if each has a category in the mask of the other.
+    /// Collision categories of this body; default 1. See base.h.
     pub collision_category: u32,
-    /// Bits of the categories that this body collides with; default 0xffffffff.
+    /// Categories that it collides with; default 0xffffffff.
     pub collision_mask: u32,
     /// Number of nodes that cuts may add, about 5 per cut element; 0 (default): cannot be cut.
     ///
-    /// Needs a consistently oriented 2-manifold surface, or tetrahedra connected through faces around each node,
-    /// with triangles that are their boundary, if given. For a body of springs alone 1 is enough. See
-    /// sinew_body_cut.
+    /// Needs a consistently oriented 2-manifold surface, or tetrahedra connected through faces around each node;
+    /// triangles, if given, are their boundary. 1 is enough for a body of springs alone.
     pub spare_nodes: u32,
-    /// Fracture energy of a blade's cut, at least 0: [J/m] for a surface, [J/m^2] for a solid.
+    /// Fracture energy of a blade's cut: [J/m^2] for a solid; [J/m] for a surface, with its thickness.
     ///
-    /// For a surface it is the toughness times the thickness. Default 0: no resistance. Above 0 it needs spare_nodes. SINEW_STATUS_UNSUPPORTED
-    /// for a body of springs alone.
+    /// Above 0 it needs spare_nodes. SINEW_STATUS_UNSUPPORTED for a body of springs alone.
     pub toughness: f32,
-    /// Strain above which a spring or an element edge tears, at least 0; 0 (default): never.
+    /// Strain above which a spring or an element edge tears; 0: never.
     ///
-    /// A surface tears at the end node with the larger separating force, across that force, to the next triangle. A
-    /// solid tears along faces of its tetrahedra. A step that tears may allocate. See sinew_body_set_tear_limits.
+    /// A surface tears at the node with the larger separating force, across it; a solid along faces. A step that tears
+    /// may allocate. See sinew_body_set_tear_limits.
     pub tear_strain: f32,
-    /// [N] Force above which a spring tears, at least 0; 0 (default): never.
-    ///
-    /// SINEW_STATUS_UNSUPPORTED for a body of elements without springs.
+    /// [N] Force above which a spring tears; 0: never. For bodies of elements alone it is SINEW_STATUS_UNSUPPORTED.
     pub tear_force: f32,
-    /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes.
+    /// Maximum number of tears per step; 0: does not tear. Needs spare_nodes.
     pub most_tears: u32,
-    /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. No tear goes below.
+    /// Minimum fragment size at rest: [m^2], or [m^3] for solids.
     pub smallest_piece: f32,
-    /// [m/s] Speed below which a node counts as at rest, at least 0; 0 (default): never sleeps.
+    /// [m/s] Speed below which a node counts as at rest; 0 (default): never sleeps.
     ///
-    /// Parts that stay slower for sleep_time, and that no force would accelerate to that speed in that time, are
-    /// not stepped until something affects them. Only VERLET bodies without cuts sleep in parts. Bodies in contact
-    /// with or sutured to other tissue stay awake. See sinew_body_get_awake_share.
+    /// Parts slower for sleep_time, which no force would make faster, are not stepped until something affects them.
+    /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake. See
+    /// sinew_body_get_awake_share.
     pub sleep_speed: f32,
     /// [s] Time at rest before sleep, above 0; default 0.5.
     pub sleep_time: f32,
-    /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
+    /// Law of TETRAHEDRA, a sinew_element_law value; not 0: no viscosity or yield.
     pub element_law: u32,
     /// MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
     pub mooney_ratio: f32,
     /// [m] Translation of all positions, after the rotation; default 0 0 0.
     pub position: [f32; 3],
-    /// Rotation of all positions and fibers about the origin, x y z w, not zero; default 0 0 0 1.
+    /// Rotation of positions and fibers about the origin; default 0 0 0 1.
     pub orientation: [f32; 4],
     /// Factor of the world's gravity on this body, finite; default 1.
     pub gravity_scale: f32,

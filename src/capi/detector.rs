@@ -17,11 +17,11 @@ use crate::detection::image_space::{Form, ImageSpace, ImageSpaceDefinition, Plac
 use crate::mesh::{self, ClosedSurface};
 use crate::world::World;
 
-/// Intervals of each pixel's ray inside a body; finds every edge, and points deeper than 0.71 pixels.
+/// Intervals of rays inside; finds all edges, points deeper than 0.71 pixels.
 pub const SINEW_IMAGE_FORM_INTERVALS: u32 = 0;
-/// CInDeR (Halic et al., section 2.1): edges in a depth buffer, faces in front counted; for comparison.
+/// CInDeR (Halic et al.): edges in a depth buffer, faces in front counted; for comparison.
 ///
-/// Of edges that share a pixel only the nearest is found. No points and no volume.
+/// Of edges that share a pixel only the nearest is found. No points, no volume.
 pub const SINEW_IMAGE_FORM_COUNTED: u32 = 1;
 
 /// Value of `triangle` if there is none.
@@ -35,21 +35,19 @@ pub const SINEW_NO_TRIANGLE: u32 = u32::MAX;
 pub struct sinew_detector_def {
     /// Size of this struct; sinew_detector_def_init sets it.
     pub struct_size: usize,
-    /// First and second body with surfaces, at least one of them closed; no default.
+    /// First and second body with surfaces, one of them at least closed.
     pub bodies: [sinew_body_id; 2],
-    /// SINEW_DETECTION_EXACT (default) or IMAGE_SPACE.
+    /// SINEW_DETECTION_EXACT (default), where only `bodies` count, or IMAGE_SPACE.
     ///
-    /// EXACT ignores the other settings, but thickness must be 0. SINEW_DETECTION_DISTANCE_FIELD is
-    /// SINEW_STATUS_UNSUPPORTED.
+    /// thickness must be 0 with EXACT. SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
     pub detection: u32,
-    /// IMAGE_SPACE: a sinew_image_form value; default SINEW_IMAGE_FORM_INTERVALS.
+    /// IMAGE_SPACE: a sinew_image_form value; default INTERVALS.
     pub form: u32,
-    /// [m] IMAGE_SPACE: pixel size, above 0; no default. 1/256 of the body finds 99.9 % of edges.
+    /// [m] IMAGE_SPACE: pixel size, above 0. 1/256 of the body finds 99.9 % of edges.
     pub pixel: f32,
-    /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes in turn.
+    /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes.
     ///
-    /// Depths are measured along the view. They exceed the shortest distance by about 2 % of the size with three
-    /// axes and by about 6 % with one.
+    /// Depths along the view exceed the shortest distance by about 2 % of the size with three axes, by 6 % with one.
     pub direction: [f32; 3],
     /// IMAGE_SPACE: capacity of an image in pixels, 1 to 2^24; default 2^18.
     ///
@@ -59,9 +57,7 @@ pub struct sinew_detector_def {
     ///
     /// If it is too small, the pixel size doubles. The default capacities take about 18 MB.
     pub crossings: u32,
-    /// [m] IMAGE_SPACE: added thickness of each body along the view, at least 0; default 0 0.
-    ///
-    /// It keeps thin parts from being missed, and adds to depths and volume.
+    /// [m] IMAGE_SPACE: thickness added along the view, so that thin parts are found.
     pub thickness: [f32; 2],
 }
 
@@ -71,9 +67,9 @@ pub struct sinew_detector_def {
 pub struct sinew_detector_report {
     /// Set to sizeof(sinew_detector_report) before the call.
     pub struct_size: usize,
-    /// [m^3] INTERVALS: overlap volume, mean over the views; 0 with an open body, COUNTED or EXACT.
+    /// [m^3] INTERVALS: overlap volume, mean over the views; 0 with an open body.
     pub volume: f64,
-    /// Unit direction that moves the first body out of the second fastest; 0 without volume.
+    /// Unit direction that moves the first body out fastest; 0 without volume.
     pub normal: [f32; 3],
     /// [m] Linear estimate of the distance to move it.
     pub depth: f32,
@@ -83,14 +79,10 @@ pub struct sinew_detector_report {
     pub point_counts: [u32; 2],
     /// Number of entries of sinew_detector_get_edges.
     pub edge_counts: [u32; 2],
-    /// Number of edge parts beyond the capacity of four per edge on average.
+    /// Number of edge parts beyond four per edge on average.
     pub unlisted: [u32; 2],
-    /// 1: the body is closed; 0: it is open, and nothing is found inside it.
-    ///
-    /// A detector made for an open body does not check again.
+    /// 1: closed; 0: open, and nothing is found inside; not checked again.
     pub closed: [u32; 2],
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 /// Node of a body that lies inside the other body.
@@ -99,9 +91,9 @@ pub struct sinew_detector_report {
 pub struct sinew_point_inside {
     /// Index of the node.
     pub node: u32,
-    /// IMAGE_SPACE: triangle of the other surface where the node would leave; EXACT: SINEW_NO_TRIANGLE.
+    /// IMAGE_SPACE: triangle to leave through; EXACT: SINEW_NO_TRIANGLE.
     pub triangle: u32,
-    /// [m] IMAGE_SPACE: shortest distance out along the views; EXACT: distance to the surface.
+    /// [m] IMAGE_SPACE: shortest distance out along the views; EXACT: to the surface.
     pub depth: f32,
     /// EXACT: unit direction of the shortest distance out; IMAGE_SPACE: 0.
     pub normal: [f32; 3],
@@ -141,10 +133,10 @@ unsafe impl Versioned for sinew_detector_def {}
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_detector_report {}
 
-/// Detector of the overlap of two bodies; it applies no forces.
+/// Detector of the overlap of two bodies; it applies no forces and may outlive its world.
 ///
-/// The caller owns it; it may outlive its world. Any number of threads may use a `const sinew_detector *` at the
-/// same time; a `sinew_detector *` needs exclusive access.
+/// Any number of threads may use a `const sinew_detector *` at the same time; a `sinew_detector *` needs exclusive
+/// access.
 pub struct sinew_detector {
     sides: [DetectorSide; 2],
     method: Method,
@@ -321,9 +313,8 @@ pub unsafe extern "C" fn sinew_detector_def_init(def: *mut sinew_detector_def, s
 ///
 /// Destroy it with sinew_detector_destroy.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bodies are the same, one has no surface, or both are open; with
-/// EXACT also if a closed surface is inverted, self-intersecting or degenerate. SINEW_STATUS_UNSUPPORTED for
-/// SINEW_DETECTION_DISTANCE_FIELD.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bodies are the same, one has no surface, or both are open; with EXACT
+/// also if a closed surface is inverted, self-intersecting or degenerate.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_create(
     world: *const sinew_world,
@@ -343,25 +334,24 @@ pub unsafe extern "C" fn sinew_detector_create(
 
 /// Finds the overlap of the two bodies at their current positions.
 ///
-/// You may pass another world, such as a loaded snapshot, if both ids refer there to bodies with identical
-/// surfaces. An open body reports only edges (EXACT: also points). Image space does not allocate. On failure the
-/// previous result stays.
+/// You may pass another world if both ids refer there to bodies with identical surfaces. An open body reports only
+/// edges (EXACT: also points). Image space does not allocate.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface; SINEW_STATUS_CAPACITY if
-/// one ray has more than `crossings`.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface; SINEW_STATUS_CAPACITY if one
+/// ray has more than `crossings`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_find(
     detector: *mut sinew_detector,
     world: *const sinew_world,
-    report: *mut sinew_detector_report,
+    out_report: *mut sinew_detector_report,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
             let detector = memory::output("detector", detector)?;
-            let report = memory::report("report", report)?;
+            let out_report = memory::report("out_report", out_report)?;
             detector.find(world)?;
-            report.fill(detector.found.report);
+            out_report.fill(detector.found.report);
             Ok(())
         })
     }
@@ -369,51 +359,51 @@ pub unsafe extern "C" fn sinew_detector_find(
 
 /// Writes the list of nodes of one body that lie inside the other, in ascending order.
 ///
-/// `side` 0 is the first body, 1 the second. The list is empty before the first search and with COUNTED.
-///
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
+/// `side` 0 is the first body, 1 the second. It is empty before the first search and with COUNTED. Lifetime: until the
+/// next sinew_detector_find, or the detector's destruction.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_get_points(
     detector: *const sinew_detector,
     side: u32,
-    points: *mut *const sinew_point_inside,
-    count: *mut usize,
+    out_points: *mut *const sinew_point_inside,
+    out_count: *mut usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     guard(|| unsafe {
         let detector = memory::reference("detector", detector)?;
         let found = &detector.found.points[index_of(side)?];
-        memory::write_both(("points", points, found.as_ptr()), ("count", count, found.len()))
+        memory::write_both(
+            ("out_points", out_points, found.as_ptr()),
+            ("out_count", out_count, found.len()),
+        )
     })
 }
 
-/// Writes the list of surface edge parts of one body that lie inside the other.
+/// Writes the list of surface edge parts of one body that lie inside the other, by edge.
 ///
-/// `side` 0 is the first body, 1 the second. The list is ordered by edge and along it, and empty before the first
-/// search.
-///
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
+/// `side` and lifetime are as for sinew_detector_get_points. It is empty before the first search.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_get_edges(
     detector: *const sinew_detector,
     side: u32,
-    edges: *mut *const sinew_edge_inside,
-    count: *mut usize,
+    out_edges: *mut *const sinew_edge_inside,
+    out_count: *mut usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     guard(|| unsafe {
         let detector = memory::reference("detector", detector)?;
         let found = &detector.found.edges[index_of(side)?];
-        memory::write_both(("edges", edges, found.as_ptr()), ("count", count, found.len()))
+        memory::write_both(
+            ("out_edges", out_edges, found.as_ptr()),
+            ("out_count", out_count, found.len()),
+        )
     })
 }
 
 /// Writes a view of the gradient [m^2] of the overlap volume at each node of one body.
 ///
-/// `side` 0 is the first body, 1 the second. Moving the nodes against it separates the bodies. It is empty before
-/// the first search, with COUNTED or EXACT, and if a body is open.
-///
-/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
+/// Moving the nodes against it separates the bodies. It is empty with COUNTED, EXACT or an open body. `side` and
+/// lifetime are as for sinew_detector_get_points.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_get_gradient(
     detector: *const sinew_detector,

@@ -16,11 +16,11 @@ pub struct sinew_mass_properties {
     pub struct_size: usize,
     /// [kg] Mass, 1e-12 to 1e12.
     pub mass: f32,
-    /// [m] Center of mass, from the tool's position; each coordinate is within 1e9.
+    /// [m] Center of mass, from the tool's position; within 1e9.
     pub center_of_mass: [f32; 3],
     /// [kg m^2] Inertia tensor xx yy zz xy xz yz about the center of mass.
     ///
-    /// It is positive definite, and no principal moment exceeds the sum of the other two.
+    /// It is positive definite; no principal moment exceeds the sum of the others.
     pub inertia: [f32; 6],
 }
 
@@ -47,9 +47,7 @@ impl From<MassProperties> for sinew_mass_properties {
     }
 }
 
-/// Writes the mass properties of a tool that is filled evenly with material.
-///
-/// `density` [kg/m^3] is above 0. `out` sets struct_size.
+/// Writes the mass properties of a tool of a density [kg/m^3], above 0; `out` sets struct_size.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane.
 #[unsafe(no_mangle)]
@@ -71,11 +69,10 @@ pub unsafe extern "C" fn sinew_tool_get_mass_of_density(
 
 /// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
 ///
-/// `mass` is nullable: the tool becomes kinematic again, as it is created. A dynamic tool starts at rest; a new mass
-/// leaves its velocity. Contact keeps momentum and, with VERLET, is stable for any mass. Pinned nodes are obstacles;
-/// other tools are not. Bodies near a dynamic tool do not sleep. force_limit has no effect.
+/// `mass` is nullable: kinematic again, as it is created. It starts at rest; a new mass leaves its velocity. Pinned
+/// nodes are obstacles; other tools are not. Bodies near it do not sleep. force_limit has no effect.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if attachments or a haptic handle use the tool.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if an attachment or haptic handle uses it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_mass(
     world: *mut sinew_world,
@@ -139,25 +136,23 @@ pub unsafe extern "C" fn sinew_tool_set_velocity(
     }
 }
 
-/// Writes the velocity of a dynamic tool, in world axes.
-///
-/// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] receive 3 floats each; both are nullable.
+/// Writes the velocity of a dynamic tool, as sinew_tool_set_velocity takes it; both are nullable.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_velocity(
     world: *const sinew_world,
     tool: sinew_tool_id,
-    velocity: *mut f32,
-    angular_velocity: *mut f32,
+    out_velocity: *mut f32,
+    out_angular_velocity: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
             let (linear, angular) = world.tool_velocity(tool.id())?;
             memory::write_wanted(
-                ("velocity", velocity.cast(), linear.to_array()),
-                ("angular_velocity", angular_velocity.cast(), angular.to_array()),
+                ("out_velocity", out_velocity.cast(), linear.to_array()),
+                ("out_angular_velocity", out_angular_velocity.cast(), angular.to_array()),
             )
         })
     }
@@ -185,10 +180,10 @@ pub unsafe extern "C" fn sinew_tool_apply_wrench(
     }
 }
 
-/// Moves a tool to a new pose at once, without a sweep.
+/// Moves a tool to a new pose at once, without a sweep; a dynamic tool keeps its velocity.
 ///
-/// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable: unchanged. Tissue inside
-/// is pushed out over the next steps. A dynamic tool keeps its velocity; a pending sinew_tool_set_pose is dropped.
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged. Tissue inside is pushed out over the next steps. A
+/// pending sinew_tool_set_pose is dropped.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if attachments or a haptic handle use the tool.
 #[unsafe(no_mangle)]

@@ -25,18 +25,18 @@ pub struct sinew_embedding {
 pub struct sinew_embedding_def {
     /// Size of this struct; sinew_embedding_def_init sets it.
     pub struct_size: usize,
-    /// [m] 3 * vertex_count floats for the body's current positions, within 1e9; no default.
+    /// [m] 3 * vertex_count floats for the body's current positions.
     pub vertices: *const f32,
     /// Number of vertices, at least 1.
     pub vertex_count: usize,
-    /// 3 * triangle_count vertex indices, outward, for the normals; nullable: no normals.
+    /// 3 * triangle_count vertex indices, outward; nullable: no normals.
     pub triangles: *const u32,
     /// Number of triangles.
     pub triangle_count: usize,
     /// 4 * tetrahedron_count nodes: the body's tetrahedra at its creation; nullable.
     ///
-    /// Each vertex keeps its barycentric weights in the nearest one; a cut body uses its current tetrahedra. NULL
-    /// binds each vertex to the nearest surface triangle, at a constant distance.
+    /// Each vertex keeps its weights in the nearest one, or, with NULL, its distance to the nearest surface triangle. A
+    /// cut body uses its current tetrahedra.
     pub tetrahedra: *const u32,
     /// Number of tetrahedra.
     pub tetrahedron_count: usize,
@@ -81,10 +81,10 @@ pub unsafe extern "C" fn sinew_embedding_def_init(def: *mut sinew_embedding_def,
 
 /// Creates an embedding: binds a render surface to a body at its current positions.
 ///
-/// It copies everything that `def` points to, and costs about as much as 100 updates. Destroy it with
-/// sinew_embedding_destroy, before or after the body and its world.
+/// It copies what `def` points to, and costs about 100 updates. Destroy it with sinew_embedding_destroy, before or
+/// after the body and its world.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if no tetrahedron has a volume, or the body has no surface.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if no tetrahedron has a volume, or without a surface.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_create(
     world: *const sinew_world,
@@ -118,11 +118,10 @@ pub unsafe extern "C" fn sinew_embedding_destroy(embedding: *mut sinew_embedding
 
 /// Moves the vertices of an embedding to the body's current positions.
 ///
-/// It allocates only after a cut or tear; then vertices follow their side, and triangles across the cut are dropped
-/// from sinew_embedding_get_triangles. On failure the vertices stay.
+/// After a cut or tear it allocates; vertices then follow their side, and triangles across the cut are dropped.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the nodes are not those it is bound to; SINEW_STATUS_UNSUPPORTED if the
-/// body was cut, and it is bound to triangles or to part of the tetrahedra.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the nodes are not those it is bound to; SINEW_STATUS_UNSUPPORTED for a cut
+/// body, if it is bound to triangles or some of the tetrahedra.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_update(
     embedding: *mut sinew_embedding,
@@ -137,12 +136,11 @@ pub unsafe extern "C" fn sinew_embedding_update(
     }
 }
 
-/// Moves the vertices of an embedding to given node positions, such as those of a reader's frame.
+/// Moves the vertices of an embedding to node positions [m], 3 * node_count packed floats.
 ///
-/// `positions` [m] holds 3 * node_count packed floats. It does not use the world, so it may run beside a step.
+/// They are, for example, those of a reader's frame. It may run beside a step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body had another number of nodes at the last
-/// sinew_embedding_update.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT for another number of nodes than at the last update.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_update_from(
     embedding: *mut sinew_embedding,
@@ -159,9 +157,9 @@ pub unsafe extern "C" fn sinew_embedding_update_from(
     })
 }
 
-/// Writes a view of the vertex positions [m], in the given order.
+/// Writes a view of the vertex positions [m], which updates change.
 ///
-/// Lifetime: until the embedding is destroyed; updates change its contents.
+/// Lifetime: until the embedding is destroyed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_get_positions(
     embedding: *const sinew_embedding,
@@ -195,8 +193,8 @@ pub unsafe extern "C" fn sinew_embedding_get_triangles(
 
 /// Computes the unit vertex normals if needed, and writes a view of them.
 ///
-/// They are area-weighted and point outward; 0 without area. The view is empty without triangles. It needs
-/// exclusive access. Lifetime: until the embedding is destroyed; the next call after an update changes them.
+/// They are area-weighted and point outward; 0 without area. The view is empty without triangles. Lifetime: until the
+/// embedding is destroyed; the next call after an update changes them.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_get_normals(
     embedding: *mut sinew_embedding,
@@ -216,11 +214,10 @@ pub unsafe extern "C" fn sinew_embedding_get_normals(
 /// Creates a body of tetrahedra that fills a closed surface, and binds the surface to it.
 ///
 /// positions and triangles of `def` are the surface, outward; vertices may repeat. `spacing` [m] is the mean edge
-/// length. Features thinner than about half of it are lost. The rest of `def` is as for sinew_body_create, with one
-/// value for all nodes. `out_embedding` is nullable; the caller destroys it.
+/// length; features thinner than half of it are lost. `out_embedding` is nullable; the caller destroys it.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` is too fine or too coarse,
-/// or elements, springs, rest positions or lists of values are given.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` too fine or too coarse, or `def`
+/// lists elements, springs or values.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_create_from_surface(
     world: *mut sinew_world,

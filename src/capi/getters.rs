@@ -27,45 +27,35 @@ unsafe fn is_there(world: *const sinew_world, has: impl FnOnce(&World) -> bool) 
     u32::from(is_there)
 }
 
-/// Returns 1 if a body with this id exists in the world, else 0.
-///
-/// It returns 0 for a NULL world and a null id.
+/// Returns 1 if a body with this id exists in the world, else 0; also for a NULL world.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_is_valid(world: *const sinew_world, body: sinew_body_id) -> u32 {
     // SAFETY: the same contract.
     unsafe { is_there(world, |world| world.has_body(body.id())) }
 }
 
-/// Returns 1 if a tool with this id exists in the world, else 0.
-///
-/// It returns 0 for a NULL world and a null id.
+/// Returns 1 if a tool with this id exists in the world, else 0; also for a NULL world.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_is_valid(world: *const sinew_world, tool: sinew_tool_id) -> u32 {
     // SAFETY: the same contract.
     unsafe { is_there(world, |world| world.has_tool(tool.id())) }
 }
 
-/// Returns 1 if a blade with this id exists in the world, else 0.
-///
-/// It returns 0 for a NULL world and a null id.
+/// Returns 1 if a blade with this id exists in the world, else 0; also for a NULL world.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_is_valid(world: *const sinew_world, blade: sinew_blade_id) -> u32 {
     // SAFETY: the same contract.
     unsafe { is_there(world, |world| world.has_blade(blade.id())) }
 }
 
-/// Returns 1 if an attachment with this id exists in the world, else 0.
-///
-/// It returns 0 for a NULL world and a null id.
+/// Returns 1 if an attachment with this id exists in the world, else 0; also for a NULL world.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_is_valid(world: *const sinew_world, attachment: sinew_attachment_id) -> u32 {
     // SAFETY: the same contract.
     unsafe { is_there(world, |world| world.has_attachment(attachment.id())) }
 }
 
-/// Stores a pointer of the caller with a world; snapshots do not hold it.
-///
-/// `user_data` is nullable.
+/// Stores a pointer of the caller, nullable, with a world; snapshots do not hold it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_user_data(world: *mut sinew_world, user_data: *mut c_void) -> sinew_status {
     // SAFETY: the same contract.
@@ -88,9 +78,7 @@ pub unsafe extern "C" fn sinew_world_get_user_data(world: *const sinew_world, ou
     }
 }
 
-/// Stores a pointer of the caller with a tool; snapshots do not hold it.
-///
-/// `user_data` is nullable.
+/// Stores a pointer of the caller, nullable, with a tool; snapshots do not hold it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_user_data(
     world: *mut sinew_world,
@@ -116,9 +104,7 @@ pub unsafe extern "C" fn sinew_tool_get_user_data(
     }
 }
 
-/// Writes the time [s] that a world has been stepped, and the number of steps.
-///
-/// Both outputs are nullable.
+/// Writes the time [s] that a world has been stepped, and the number of steps; both are nullable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_time(
     world: *const sinew_world,
@@ -214,20 +200,36 @@ pub unsafe extern "C" fn sinew_body_get_pressure(
     unsafe { with_body(world, body, |body| memory::write("out", out, body.pressure())) }
 }
 
-/// Writes the current pose of a blade.
-///
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
+/// Writes the current pose of a blade; see sinew_tool_get_pose.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_get_pose(
     world: *const sinew_world,
     blade: sinew_blade_id,
-    position: *mut f32,
-    orientation: *mut f32,
+    out_position: *mut f32,
+    out_orientation: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            write_pose(world.blade_pose(blade.id())?, position, orientation)
+            write_pose(world.blade_pose(blade.id())?, out_position, out_orientation)
+        })
+    }
+}
+
+/// Writes the collision category and mask of a blade.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_blade_get_collision(
+    world: *const sinew_world,
+    blade: sinew_blade_id,
+    out_category: *mut u32,
+    out_mask: *mut u32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let filter = world.blade_collision_filter(blade.id())?;
+            let category = ("out_category", out_category, filter.category);
+            memory::write_both(category, ("out_mask", out_mask, filter.mask))
         })
     }
 }

@@ -32,27 +32,27 @@ pub struct sinew_haptic_def {
     pub tool: sinew_tool_id,
     /// [N/m] Coupling stiffness between device and tool, above 0; default 1000.
     ///
-    /// A device is stable up to about half of its damping [N s/m] divided by the tick time.
+    /// Stable up to about half of the device's damping [N s/m] divided by the tick time.
     pub stiffness: f32,
     /// [N m/rad] Angular coupling stiffness; 0 (default): stiffness at half of the tool's length.
     ///
     /// It is at least 1e-6 of that value.
     pub angular_stiffness: f32,
-    /// Damping of the coupling while tissue resists, at least 0; 1 (default) is critical for device_mass.
+    /// Damping while tissue resists; 1 (default): critical for device_mass.
     pub damping_ratio: f32,
     /// [kg] Effective mass of the device, above 0; default 0.05.
     pub device_mass: f32,
-    /// [N] Largest force on the device, at least 0; infinity (default) or 0: unlimited.
+    /// [N] Largest force on the device; infinity (default) or 0: unlimited.
     pub force_limit: f32,
-    /// [N m] Largest torque on the device, at least 0; infinity (default) or 0: unlimited.
+    /// [N m] Largest torque on the device; infinity (default) or 0: unlimited.
     pub torque_limit: f32,
-    /// [N/s] Largest rate of change of the force, at least 0; infinity (default) or 0: unlimited.
+    /// [N/s] Largest rate of change of the force; infinity (default) or 0: unlimited.
     ///
     /// The coupling is passive only while this limit is not reached.
     pub force_rate_limit: f32,
-    /// [N m/s] Largest rate of change of the torque, at least 0; infinity (default) or 0: unlimited.
+    /// [N m/s] Largest rate of change of the torque; infinity (default) or 0: unlimited.
     pub torque_rate_limit: f32,
-    /// [s] Age at which the model is stale and the force fades to 0, above 0; default 0.1.
+    /// [s] Age at which the model's force fades to 0, above 0; default 0.1.
     pub stale_after: f32,
     /// [s] Duration of that fade, and of the return, above 0; default 0.1.
     pub ramp: f32,
@@ -61,14 +61,14 @@ pub struct sinew_haptic_def {
 /// Result of a haptic tick.
 #[repr(C)]
 #[derive(Clone, Copy)]
-pub struct sinew_haptic_result {
-    /// Set to sizeof(sinew_haptic_result) before the call.
+pub struct sinew_haptic_report {
+    /// Set to sizeof(sinew_haptic_report) before the call.
     pub struct_size: usize,
     /// [N] Force on the device until the next tick, in world axes.
     pub force: [f32; 3],
     /// [N m] Torque on the device about its position, in world axes.
     pub torque: [f32; 3],
-    /// [m] Position that the tool is driven to: the device minus the coupling extension.
+    /// [m] Position that the tool is driven to, behind the device.
     pub proxy_position: [f32; 3],
     /// Orientation that the tool is driven to, x y z w.
     pub proxy_orientation: [f32; 4],
@@ -78,11 +78,11 @@ pub struct sinew_haptic_result {
     pub age: f32,
     /// Number of world steps published to this handle.
     pub version: u64,
-    /// Fraction of the model's force that is applied; below 1 if the model is stale.
+    /// Fraction of the model's force that is applied; below 1 if stale.
     pub gain: f32,
     /// 1: the tool or its world was destroyed.
     pub is_over: u32,
-    /// [J] Energy that the coupling dissipated; kept at least 0 as far as damping can.
+    /// [J] Energy that the coupling dissipated, at least 0 as far as damping can.
     pub lost: f64,
 }
 
@@ -106,7 +106,7 @@ pub struct sinew_haptic_contact {
 unsafe impl Versioned for sinew_haptic_def {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_haptic_result {}
+unsafe impl Versioned for sinew_haptic_report {}
 
 impl sinew_haptic_def {
     fn defaults() -> Self {
@@ -144,7 +144,7 @@ impl sinew_haptic_def {
     }
 }
 
-impl sinew_haptic_result {
+impl sinew_haptic_report {
     fn of(tick: HapticTick, is_over: bool) -> Self {
         Self {
             struct_size: size_of::<Self>(),
@@ -181,10 +181,10 @@ pub unsafe extern "C" fn sinew_haptic_def_init(def: *mut sinew_haptic_def, struc
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_haptic_def::defaults()) })
 }
 
-/// Creates a haptic handle that drives a tool.
+/// Creates a haptic handle that drives a tool; destroy it with sinew_haptic_destroy.
 ///
-/// Destroy it with sinew_haptic_destroy. Until then sinew_tool_set_pose refuses the tool, and each step moves it to
-/// the latest proxy pose. The tool should start at the device's pose.
+/// Until then sinew_tool_set_pose refuses the tool, and each step moves it to the latest proxy pose. The tool should
+/// start at the device's pose.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if another handle drives the tool.
 #[unsafe(no_mangle)]
@@ -222,9 +222,9 @@ pub unsafe extern "C" fn sinew_haptic_destroy(haptic: *mut sinew_haptic) {
 
 /// Computes the force on the device from its current pose, without waiting, locking or allocating.
 ///
-/// `position` [m] is 3 floats; `orientation` is x y z w, nullable: unchanged. `velocity` [m/s] and
-/// `angular_velocity` [rad/s] are 3 floats each in world axes, nullable: estimated. `dt` [s] is the time since the
-/// last tick, above 0, at most 1. After an error apply no force to the device.
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged. `velocity` [m/s] and `angular_velocity` [rad/s]
+/// are 3 floats each in world axes, nullable: estimated. `dt` [s] is the time since the last tick, above 0, at most 1.
+/// After an error apply no force.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_tick(
     haptic: *mut sinew_haptic,
@@ -233,7 +233,7 @@ pub unsafe extern "C" fn sinew_haptic_tick(
     velocity: *const f32,
     angular_velocity: *const f32,
     dt: f32,
-    out: *mut sinew_haptic_result,
+    out: *mut sinew_haptic_report,
 ) -> sinew_status {
     // SAFETY: the caller vouches for the handle where the pointer is not NULL.
     let Some(haptic) = (unsafe { haptic.as_mut() }) else {
@@ -256,21 +256,21 @@ pub unsafe extern "C" fn sinew_haptic_tick(
         let tick = haptic.handle.tick(pose, along, about, dt)?;
         haptic.orientation = orientation;
         // SAFETY: still there.
-        unsafe { out.fill(sinew_haptic_result::of(tick, haptic.handle.is_over())) };
+        unsafe { out.fill(sinew_haptic_report::of(tick, haptic.handle.is_over())) };
         Ok(())
     })
 }
 
 /// Writes the contacts of the model that the last tick used, without waiting.
 ///
-/// `contacts` receives at most `capacity` entries, `count` the number that exist, at most 32; with more, those with
-/// the largest force.
+/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist, at most 32; with more, those
+/// with the largest force.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_get_contacts(
     haptic: *const sinew_haptic,
-    contacts: *mut sinew_haptic_contact,
+    out_contacts: *mut sinew_haptic_contact,
     capacity: usize,
-    count: *mut usize,
+    out_count: *mut usize,
 ) -> sinew_status {
     // SAFETY: the caller vouches for the handle where the pointer is not NULL.
     let Some(haptic) = (unsafe { haptic.as_ref() }) else {
@@ -278,17 +278,17 @@ pub unsafe extern "C" fn sinew_haptic_get_contacts(
     };
     guard(|| {
         // SAFETY: the same contract.
-        let count = unsafe { memory::output("count", count) }?;
+        let out_count = unsafe { memory::output("out_count", out_count) }?;
         // SAFETY: the same contract.
-        let contacts = unsafe { memory::output_array("contacts", contacts, capacity) }?;
+        let out_contacts = unsafe { memory::output_array("out_contacts", out_contacts, capacity) }?;
         let mut found = 0;
         haptic.handle.contacts(|contact| {
-            if let Some(place) = contacts.get_mut(found) {
+            if let Some(place) = out_contacts.get_mut(found) {
                 *place = contact.into();
             }
             found += 1;
         });
-        *count = found;
+        *out_count = found;
         Ok(())
     })
 }

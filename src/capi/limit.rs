@@ -12,7 +12,7 @@ pub const SINEW_LIMIT_ELEMENT: u32 = 2;
 pub const SINEW_LIMIT_TERM: u32 = 3;
 /// Pressure in a cavity.
 pub const SINEW_LIMIT_CAVITY: u32 = 4;
-/// Number of parts of a step of IMPLICIT or NEWTON in contact or attached.
+/// Parts of a step of IMPLICIT or NEWTON in contact or attached.
 pub const SINEW_LIMIT_PARTS: u32 = 5;
 /// Tolerance of the world.
 pub const SINEW_LIMIT_TOLERANCE: u32 = 6;

@@ -19,7 +19,7 @@ pub const SINEW_LOG_ERROR: u32 = 2;
 /// Steps that rolled bodies back.
 pub const SINEW_LOG_WARNING: u32 = 3;
 
-/// Callback that receives a message; `message` is valid during the call only.
+/// Callback that receives a message, which is valid during the call only.
 ///
 /// It may run on any thread that calls the library. It must not call the library.
 pub type sinew_log = Option<unsafe extern "C" fn(context: *mut c_void, level: u32, message: *const c_char)>;
@@ -81,8 +81,8 @@ pub(super) fn failed(error: &Error) {
 
 /// Sets the callback that receives messages up to a level, for the whole process.
 ///
-/// `level` is a sinew_log_level value. `callback` and `context` are nullable; without a callback there are no messages. Other
-/// threads may still be in the callback that it replaces.
+/// `level` is a sinew_log_level value. `callback` (none) and `context` are nullable. Other threads may still be in the
+/// callback that it replaces.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_set_log_callback(level: u32, callback: sinew_log, context: *mut c_void) -> sinew_status {
     guard(|| {

@@ -41,8 +41,6 @@ pub struct sinew_material_preset {
     pub young_modulus: f32,
     /// [kg/m^3] Mass density.
     pub density: f32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -66,7 +64,6 @@ pub unsafe extern "C" fn sinew_material_get_preset(preset: u32, out: *mut sinew_
             shear_modulus: found.shear_modulus,
             young_modulus: found.young_modulus(),
             density: found.density,
-            reserved: 0,
         });
         Ok(())
     })

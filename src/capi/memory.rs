@@ -11,6 +11,9 @@ use crate::base::{Error, Result, memory};
 
 /// A struct that begins with `struct_size`, so that it can grow.
 ///
+/// A new field begins at or after the end of the struct in the last header, never in padding at its end: the size would
+/// not tell whether the caller knows it.
+///
 /// # Safety
 /// The type is `repr(C)`, begins with a `usize` named `struct_size`, has no padding that is read, and every pattern of
 /// bits is a value of it.

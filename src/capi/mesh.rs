@@ -25,7 +25,7 @@ pub const SINEW_MESH_FORMAT_AUTO: u32 = 0;
 pub const SINEW_MESH_FORMAT_OBJ: u32 = 1;
 /// STL, binary or ASCII.
 pub const SINEW_MESH_FORMAT_STL: u32 = 2;
-/// VTK legacy: unstructured grid or polygonal data, ASCII or binary.
+/// VTK legacy, ASCII or binary: unstructured grid or polygonal data.
 pub const SINEW_MESH_FORMAT_VTK: u32 = 3;
 /// Gmsh 1, 2 and 4.1, ASCII.
 pub const SINEW_MESH_FORMAT_GMSH: u32 = 4;
@@ -47,7 +47,7 @@ pub struct sinew_mesh_view {
     pub positions: *const f32,
     /// Number of nodes; every node is used.
     pub node_count: usize,
-    /// 3 * triangle_count node indices: the triangles of the file or shape.
+    /// 3 * triangle_count node indices: triangles of the file or shape.
     pub triangles: *const u32,
     /// Number of triangles.
     pub triangle_count: usize,
@@ -55,13 +55,12 @@ pub struct sinew_mesh_view {
     pub tetrahedra: *const u32,
     /// Number of tetrahedra.
     pub tetrahedron_count: usize,
-    /// 3 * surface_triangle_count node indices, outward.
-    ///
-    /// The boundary of the tetrahedra or cells; without them the triangles.
+    /// 3 * surface_triangle_count node indices, outward: the boundary of the tetrahedra or cells, if any, else the
+    /// triangles.
     pub surface: *const u32,
     /// Number of surface triangles.
     pub surface_triangle_count: usize,
-    /// vertex_count node indices: the node of each vertex of the file, or SINEW_NO_NODE.
+    /// vertex_count nodes, one of each vertex, or SINEW_NO_NODE.
     pub node_of_vertex: *const u32,
     /// Number of vertices in the file; for a shape its nodes.
     pub vertex_count: usize,
@@ -73,13 +72,11 @@ pub struct sinew_mesh_view {
     pub dropped_triangles: usize,
     /// Number of degenerate or duplicate tetrahedra dropped.
     pub dropped_tetrahedra: usize,
-    /// Number of inverted tetrahedra corrected by swapping two nodes.
+    /// Number of inverted tetrahedra corrected.
     pub flipped_tetrahedra: usize,
     /// 1: every surface edge is used equally often in both directions; 0: open.
     pub closed: u32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
-    /// 8 * cell_count node indices of lattice cubes; corner bits: x 1, y 2, z 4.
+    /// 8 * cell_count node indices of cubes; corner bits: x 1, y 2, z 4.
     pub cells: *const u32,
     /// Number of cells.
     pub cell_count: usize,
@@ -127,7 +124,6 @@ impl sinew_mesh_view {
             dropped_tetrahedra: report.dropped_tetrahedra(),
             flipped_tetrahedra: report.flipped_tetrahedra,
             closed: u32::from(*closed),
-            reserved: 0,
             cells: loaded.mesh.cells.as_ptr().cast(),
             cell_count: loaded.mesh.cells.len(),
         }
@@ -157,10 +153,9 @@ pub(super) unsafe fn create(out: *mut *mut sinew_mesh, make: impl FnOnce() -> Re
 /// Loads a mesh from a file and cleans it.
 ///
 /// It welds coincident vertices, drops degenerate and duplicate elements and unused vertices, and corrects inverted
-/// tetrahedra. `path` is UTF-8, `format` a sinew_mesh_format value, `scale` [m] the length of one file unit, above
-/// 0.
+/// tetrahedra. `path` is UTF-8, `format` a sinew_mesh_format value, `scale` [m] the length of one file unit, above 0.
 ///
-/// Errors: SINEW_STATUS_IO if the file is missing or malformed; the message names the line or byte.
+/// Errors: SINEW_STATUS_IO for a missing or malformed file; the message names the line or byte.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_load(
     path: *const c_char,
@@ -187,8 +182,7 @@ pub unsafe extern "C" fn sinew_mesh_load(
 
 /// Creates a cloth of triangles in the plane y = 0, centered at the origin, with normals along +y.
 ///
-/// `size` [m] holds the 2 extents along x and z, above 0; `cells` the 2 cell counts, at least 1, of two triangles
-/// each.
+/// `size` [m] holds the extents along x and z, above 0; `cells` the 2 counts of squares, above 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_create_cloth(
     size: *const f32,
@@ -251,9 +245,7 @@ pub unsafe extern "C" fn sinew_mesh_create_organ(length: f32, spacing: f32, out:
     unsafe { create(out, || LoadedMesh::unchanged(Mesh::organ(length, spacing)?)) }
 }
 
-/// Writes a view of the contents of a mesh without copying.
-///
-/// Lifetime: until the mesh is destroyed.
+/// Writes a view of the contents of a mesh, which ends with the mesh.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_get_view(mesh: *const sinew_mesh, out: *mut sinew_mesh_view) -> sinew_status {
     // SAFETY: the same contract.

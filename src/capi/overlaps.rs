@@ -46,7 +46,6 @@ const NOTHING: sinew_detector_report = sinew_detector_report {
     edge_counts: [0; 2],
     unlisted: [0; 2],
     closed: [0; 2],
-    reserved: 0,
 };
 
 impl DetectorSide {

@@ -23,17 +23,15 @@ pub struct sinew_picture_def {
     pub height: u32,
     /// [m] Position of the camera.
     pub eye: [f32; 3],
-    /// [m] Point at the center of the view.
-    ///
-    /// eye equal to target (default): the view is fitted to the bodies along `direction`.
+    /// [m] Center of the view; equal to eye (default): fitted along `direction`.
     pub target: [f32; 3],
     /// Up direction of the image; default 0 1 0.
     pub up: [f32; 3],
-    /// Fitted view: direction from the scene to the camera; default 1 0.6 1.4.
+    /// Fitted view: direction to the camera; default 1 0.6 1.4.
     pub direction: [f32; 3],
-    /// [rad] Vertical field of view, above 0 and below pi; default 0.6.
+    /// [rad] Vertical angle, above 0 and below pi; default 0.6.
     pub field_of_view: f32,
-    /// 1: draws contact points and forces on tools; 0 (default): does not.
+    /// 1: draws contact points and forces on tools; 0 (default).
     pub show_contacts: u32,
 }
 
@@ -87,8 +85,6 @@ pub const SINEW_COLOURS_DIVERGING: u32 = 0;
 pub const SINEW_COLOURS_SEQUENTIAL: u32 = 1;
 
 /// Values per node that color a body, such as strain or force.
-///
-/// The color maps are perceptually uniform.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_body_values {
@@ -104,15 +100,12 @@ pub struct sinew_body_values {
     pub high: f32,
     /// Color map, a sinew_colours value.
     pub colours: u32,
-    /// Reserved; must be 0.
-    pub reserved: u32,
 }
 
 impl sinew_body_values {
     /// # Safety
     /// `values` is NULL or as long as stated.
     unsafe fn values<'a>(&self) -> Result<BodyValues<'a>> {
-        memory::reserved("reserved", self.reserved)?;
         Ok(BodyValues {
             body: self.body.id(),
             // SAFETY: the same contract.
@@ -130,10 +123,9 @@ impl sinew_body_values {
     }
 }
 
-/// Draws all bodies and tools into a PNG file.
+/// Draws all bodies and tools into a PNG file, which replaces one that exists.
 ///
-/// A body without surface shows its springs. `def` is nullable: the defaults. `path` is UTF-8; an existing file is
-/// replaced once the image is complete.
+/// A body without surface shows its springs. `def` is nullable: the defaults. `path` is UTF-8.
 ///
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
 #[unsafe(no_mangle)]
@@ -151,12 +143,9 @@ pub unsafe extern "C" fn sinew_world_save_picture(
     }
 }
 
-/// Draws all bodies and tools into a PNG file, with some bodies colored by values.
+/// Draws like sinew_world_save_picture, with some bodies colored by values.
 ///
-/// `coloured` holds `count` entries, each for another body. `def` is nullable: the defaults. `path` is as in
-/// sinew_world_save_picture.
-///
-/// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
+/// `coloured` holds `count` entries, each for another body.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_save_picture_of_values(
     world: *const sinew_world,

@@ -18,9 +18,9 @@ pub struct sinew_profile {
     pub step: f64,
     /// [s] Targets and paths of tools and blades.
     pub plan: f64,
-    /// [s] VERLET: forces and integration, which are one pass over the nodes.
+    /// [s] VERLET: forces and integration.
     pub forces: f64,
-    /// [s] IMPLICIT, NEWTON: equations and their solution, with the forces.
+    /// [s] IMPLICIT, NEWTON: equations with the forces, and their solution.
     pub solver: f64,
     /// [s] Search for what is near a tool or other tissue.
     pub broad_phase: f64,

@@ -14,7 +14,7 @@ use crate::query::{RayHit, SurfaceHit};
 pub struct sinew_surface_point {
     /// Set to sizeof(sinew_surface_point) before the call.
     pub struct_size: usize,
-    /// Body of the point; all zero if nothing was found, and the rest is 0.
+    /// Body of the point; all zero if none was found.
     pub body: sinew_body_id,
     /// Index of the triangle in the body's surface.
     pub triangle: u32,
@@ -26,33 +26,44 @@ pub struct sinew_surface_point {
     pub normal: [f32; 3],
     /// [m] Distance from the query point.
     pub distance: f32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_surface_point {}
 
+impl sinew_surface_point {
+    pub(super) const NONE: Self = Self {
+        struct_size: size_of::<Self>(),
+        body: sinew_body_id {
+            index1: 0,
+            generation: 0,
+        },
+        triangle: 0,
+        weights: [0.0; 3],
+        position: [0.0; 3],
+        normal: [0.0; 3],
+        distance: 0.0,
+    };
+}
+
 impl From<Option<SurfaceHit>> for sinew_surface_point {
     fn from(found: Option<SurfaceHit>) -> Self {
-        Self {
+        found.map_or(Self::NONE, |found| Self {
             struct_size: size_of::<Self>(),
-            body: found.map_or(sinew_body_id::default(), |found| found.body.into()),
-            triangle: found.map_or(0, |found| found.triangle),
-            weights: found.map_or([0.0; 3], |found| found.weights),
-            position: found.map_or([0.0; 3], |found| found.position.to_array()),
-            normal: found.map_or([0.0; 3], |found| found.normal.to_array()),
-            distance: found.map_or(0.0, |found| found.distance),
-            reserved: 0,
-        }
+            body: found.body.into(),
+            triangle: found.triangle,
+            weights: found.weights,
+            position: found.position.to_array(),
+            normal: found.normal.to_array(),
+            distance: found.distance,
+        })
     }
 }
 
-/// Finds the first body surface point that a ray hits.
+/// Finds the first body surface point that a ray hits; without one out->body is all zero.
 ///
-/// `origin` [m] and `direction` are 3 floats each; the direction may have any length but 0. `max_distance` [m] is
-/// at least 0. Without a hit out->body is all zero. A triangle parallel to the ray is not hit. The first query near
-/// a body builds a tree, which may allocate; nodes that moved refit it.
+/// `origin` [m] and `direction`, of any length but 0, are 3 floats each; `max_distance` [m] is at least 0. A triangle
+/// parallel to the ray is not hit. The first query near a body may allocate.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_cast_ray(
     world: *const sinew_world,
@@ -73,10 +84,9 @@ pub unsafe extern "C" fn sinew_world_cast_ray(
     }
 }
 
-/// Finds the body surface point that is nearest to a point.
+/// Finds the body surface point nearest to a point; without one out->body is all zero.
 ///
-/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. If no surface is within it out->body is all zero. It
-/// uses the trees of sinew_world_cast_ray.
+/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. The first query may allocate.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_find_nearest(
     world: *const sinew_world,
@@ -115,8 +125,6 @@ pub struct sinew_ray_hit {
     pub normal: [f32; 3],
     /// [m] Distance from the origin.
     pub distance: f32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -133,7 +141,6 @@ impl From<Option<RayHit>> for sinew_ray_hit {
             position: [0.0; 3],
             normal: [0.0; 3],
             distance: 0.0,
-            reserved: 0,
         };
         match hit {
             None => nothing,
@@ -162,10 +169,9 @@ impl From<Option<RayHit>> for sinew_ray_hit {
     }
 }
 
-/// Finds the first body or tool that a ray with a collision filter hits.
+/// Finds the first body or tool that a ray hits, as if it had this category and mask.
 ///
-/// The ray meets bodies and tools as if it had this category and mask. Otherwise like sinew_world_cast_ray; without a hit
-/// both ids are all zero.
+/// Otherwise like sinew_world_cast_ray; without a hit both ids are all zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_cast_ray_filtered(
     world: *const sinew_world,

@@ -25,7 +25,7 @@ pub struct sinew_frame {
     pub struct_size: usize,
     /// [m] Node positions, with the nodes added by cuts.
     pub positions: sinew_vec3_view,
-    /// Triangles of sinew_body_get_triangles; they change only with topology_version.
+    /// Triangles of the body, which change with topology_version.
     pub triangles: sinew_triangle_view,
     /// Number of the frame; larger than before if the body was moved.
     pub version: u64,
@@ -37,17 +37,17 @@ pub struct sinew_frame {
     pub time: f64,
     /// 1: this reader did not read this frame before.
     pub is_new: u32,
-    /// 1: the body or its world was destroyed, and this is its last frame.
+    /// 1: the body or its world was destroyed; this is its last frame.
     pub is_over: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers and pointers alone.
 unsafe impl Versioned for sinew_frame {}
 
-/// Creates a reader of a body.
+/// Creates a reader of a body; destroy it with sinew_reader_destroy.
 ///
-/// Destroy it with sinew_reader_destroy. Each successful step and each change between steps is published to it; an
-/// incomplete step never is. A body with readers keeps two copies of its positions more than it has readers.
+/// Each successful step and each change between steps is published to it. A body with readers keeps two copies of its
+/// positions more than it has readers.
 ///
 /// Errors: SINEW_STATUS_CAPACITY if the body has 126 readers.
 #[unsafe(no_mangle)]
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn sinew_reader_destroy(reader: *mut sinew_reader) {
 
 /// Writes the latest frame of the body without copying, allocating, locking or waiting.
 ///
-/// It returns the same frame again if there is no newer one. It ends the views of the previous frame.
+/// Without a newer one it is the same again. It ends the views of the previous frame.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_reader_read(reader: *mut sinew_reader, out: *mut sinew_frame) -> sinew_status {
     guard(|| {

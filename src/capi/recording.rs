@@ -25,8 +25,6 @@ pub struct sinew_replay_report {
     pub replayed_hash: u64,
     /// 1 if the file ends within a step, else 0.
     pub cut_short: u32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -42,15 +40,14 @@ impl From<ReplayReport> for sinew_replay_report {
             recorded_hash: difference.map_or(0, |difference| difference.recorded),
             replayed_hash: difference.map_or(0, |difference| difference.replayed),
             cut_short: u32::from(report.is_cut_short),
-            reserved: 0,
         }
     }
 }
 
 /// Records all steps from the next one on into a file, for sinew_replay.
 ///
-/// The file holds the snapshot at the first step, the changes before each step and a state hash after each. A file that exists is
-/// replaced. `path` is UTF-8. A recorded step writes to the file and may allocate; a full disk ends the recording, not the step.
+/// It holds the snapshot at the first step, the changes before each step and a state hash after each. A file that
+/// exists is replaced. `path` is UTF-8. A recorded step may allocate; a full disk ends the recording, not the step.
 ///
 /// Errors: SINEW_STATUS_IO.
 #[unsafe(no_mangle)]
@@ -63,11 +60,9 @@ pub unsafe extern "C" fn sinew_world_start_recording(world: *mut sinew_world, pa
     }
 }
 
-/// Stops a recording and writes the number of recorded steps.
+/// Stops a recording and writes the number of recorded steps; `out_steps` is nullable.
 ///
-/// `out_steps` is nullable.
-///
-/// Errors: SINEW_STATUS_IO or SINEW_STATUS_OUT_OF_MEMORY if the recording ended earlier; it is stopped in any case.
+/// Errors: SINEW_STATUS_IO or SINEW_STATUS_OUT_OF_MEMORY if it ended earlier; it stops anyway.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_stop_recording(world: *mut sinew_world, out_steps: *mut u64) -> sinew_status {
     // SAFETY: the same contract.

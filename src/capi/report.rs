@@ -15,9 +15,9 @@ use crate::def::Solver;
 pub struct sinew_energy {
     /// Set to sizeof(sinew_energy) before the call.
     pub struct_size: usize,
-    /// [J] Kinetic energy of the free nodes, without the mass that mass_scaling adds.
+    /// [J] Kinetic energy of the free nodes, without the mass of mass_scaling.
     pub kinetic: f64,
-    /// [J] Energy of springs, elements and other internal terms, minus the work of a constant pressure.
+    /// [J] Energy of all internal terms, minus the work of a constant pressure.
     pub elastic: f64,
     /// [J] Gravitational energy, 0 at the origin.
     pub gravitational: f64,
@@ -45,27 +45,25 @@ pub struct sinew_storage_report {
 pub struct sinew_solver_report {
     /// Set to sizeof(sinew_solver_report) before the call.
     pub struct_size: usize,
-    /// IMPLICIT, NEWTON: matrix-vector products of the step; 0 for VERLET.
+    /// IMPLICIT, NEWTON: matrix-vector products of the step.
     pub iterations: u32,
-    /// [m] Remaining error of the solved equations; 0 for VERLET.
+    /// [m] Remaining error of the solved equations, without that of time steps; 0 for VERLET.
     ///
-    /// IMPLICIT: mass-weighted root mean square. NEWTON: largest displacement of the last correction; about 1/100
-    /// of it remains. It does not include the time discretization error.
+    /// IMPLICIT: mass-weighted root mean square. NEWTON: largest displacement of the last correction; about 1/100 of it
+    /// remains.
     pub error: f32,
     /// [kg] VERLET: total mass that mass_scaling adds.
     pub added_mass: f64,
-    /// IMPLICIT, NEWTON: number of linear systems solved; 0 for VERLET.
+    /// IMPLICIT, NEWTON: number of linear systems solved.
     pub solves: u32,
-    /// IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding level; 0 for VERLET.
+    /// IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding.
     pub converged: u32,
     /// Solver in use, a sinew_solver value; never AUTO.
     pub solver: u32,
-    /// AUTO took IMPLICIT if VERLET needs more than 150 substeps; this is their number on creation, else 0.
+    /// Substeps of VERLET on creation; above 150 AUTO takes IMPLICIT.
     pub auto_substeps: u32,
-    /// [s] AUTO: step length of the choice, the mean of the world so far or 1/60 s; else 0.
+    /// [s] AUTO: step length of the choice, the mean so far or 1/60 s; else 0.
     pub auto_step: f32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 /// Sums over the closed cavities of a body; all 0 without enclosed_stiffness and pressure.
@@ -172,7 +170,6 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
                 },
                 auto_substeps: choice.substeps,
                 auto_step: choice.step,
-                reserved: 0,
             });
             Ok(())
         })

@@ -6,13 +6,13 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::solver::RestStateDefinition;
 
-/// Settings of the search for static equilibrium, filled by sinew_rest_state_def_init.
+/// Settings of the search for static equilibrium, filled by sinew_equilibrium_def_init.
 #[repr(C)]
 #[derive(Clone, Copy)]
-pub struct sinew_rest_state_def {
-    /// Size of this struct; sinew_rest_state_def_init sets it.
+pub struct sinew_equilibrium_def {
+    /// Size of this struct; sinew_equilibrium_def_init sets it.
     pub struct_size: usize,
-    /// [m] Estimated position error allowed; 0 (default): 1e-6 of the body's extent.
+    /// [m] Estimated position error allowed; 0: 1e-6 of the body's extent.
     pub tolerance: f32,
     /// Largest number of matrix-vector products; 0 (default): 1,000,000.
     pub iterations: u32,
@@ -21,30 +21,30 @@ pub struct sinew_rest_state_def {
 /// Report of the search for static equilibrium.
 #[repr(C)]
 #[derive(Clone, Copy)]
-pub struct sinew_rest_state_report {
-    /// Set to sizeof(sinew_rest_state_report) before the call.
+pub struct sinew_equilibrium_report {
+    /// Set to sizeof(sinew_equilibrium_report) before the call.
     pub struct_size: usize,
     /// Number of linear systems solved.
     pub iterations: u32,
     /// Number of matrix-vector products.
     pub products: u32,
-    /// [N] Largest force left on a free node, before positions are rounded to float.
+    /// [N] Largest force left on a free node, before positions become floats.
     pub residual: f64,
-    /// [m] Estimated position error, before positions are rounded to float.
+    /// [m] Estimated position error, before positions become floats.
     pub error: f64,
-    /// [J] Energy of springs, gravity and forces before the search, 0 at the origin.
+    /// [J] Energy of springs, gravity and forces before the search.
     pub energy_before: f64,
     /// [J] Energy of springs, gravity and forces after the search.
     pub energy_after: f64,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_rest_state_def {}
+unsafe impl Versioned for sinew_equilibrium_def {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_rest_state_report {}
+unsafe impl Versioned for sinew_equilibrium_report {}
 
-impl sinew_rest_state_def {
+impl sinew_equilibrium_def {
     fn defaults() -> Self {
         Self {
             struct_size: size_of::<Self>(),
@@ -54,41 +54,42 @@ impl sinew_rest_state_def {
     }
 }
 
-/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_rest_state_def).
+/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_equilibrium_def).
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_rest_state_def_init(def: *mut sinew_rest_state_def, struct_size: usize) -> sinew_status {
+pub unsafe extern "C" fn sinew_equilibrium_def_init(
+    def: *mut sinew_equilibrium_def,
+    struct_size: usize,
+) -> sinew_status {
     // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_rest_state_def::defaults()) })
+    guard(|| unsafe { memory::initialise(def, struct_size, sinew_equilibrium_def::defaults()) })
 }
 
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
 ///
-/// It is not a step: it allocates and may take seconds. It ignores tools. Velocities become 0, pending forces stay.
-/// The rigid position of unpinned parts is unspecified. `def` (defaults) and `report` are nullable. It ends the
-/// views of the body's positions and velocities. On failure nothing changes.
+/// It may take seconds, ignores tools and ends views. Velocities become 0, pending forces stay. `def` (defaults) and
+/// `out_report` are nullable. The rigid position of unpinned parts is unspecified.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part; SINEW_STATUS_UNSTABLE if not
-/// found.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part; SINEW_STATUS_UNSTABLE if not found.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_body_rest_state(
+pub unsafe extern "C" fn sinew_body_solve_equilibrium(
     world: *mut sinew_world,
     body: sinew_body_id,
-    def: *const sinew_rest_state_def,
-    report: *mut sinew_rest_state_report,
+    def: *const sinew_equilibrium_def,
+    out_report: *mut sinew_equilibrium_report,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world_mut(world, |world| {
-            let defaults = sinew_rest_state_def::defaults();
+            let defaults = sinew_equilibrium_def::defaults();
             let def = if def.is_null() {
                 defaults
             } else {
                 memory::definition("def", def, defaults)?
             };
-            let out = if report.is_null() {
+            let out = if out_report.is_null() {
                 None
             } else {
-                Some(memory::report("report", report)?)
+                Some(memory::report("out_report", out_report)?)
             };
             let found = world.rest_state(
                 body.id(),
@@ -98,8 +99,8 @@ pub unsafe extern "C" fn sinew_body_rest_state(
                 },
             )?;
             if let Some(out) = out {
-                out.fill(sinew_rest_state_report {
-                    struct_size: size_of::<sinew_rest_state_report>(),
+                out.fill(sinew_equilibrium_report {
+                    struct_size: size_of::<sinew_equilibrium_report>(),
                     iterations: found.iterations,
                     products: found.products,
                     residual: found.residual,

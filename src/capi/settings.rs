@@ -16,9 +16,7 @@ fn flag(name: &str, value: u32) -> Result<bool> {
     }
 }
 
-/// Sets the number of substeps per step and its limit, from the next step on.
-///
-/// See sinew_world_def.
+/// Sets the substeps per step and their limit, from the next step on; see sinew_world_def.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_substeps(
     world: *mut sinew_world,
@@ -89,7 +87,7 @@ impl From<BodySettings> for sinew_body_settings {
 ///
 /// What is closer than a new contact_thickness is pushed off. A new sleep wakes the body.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a body that was cut change, other than both to 0.
+/// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a cut body change, except both to 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_settings(
     world: *mut sinew_world,

@@ -5,9 +5,7 @@ use super::guard::sinew_world;
 use super::memory;
 use super::status::sinew_status;
 
-/// Pins nodes at their current positions; see sinew_body_pin.
-///
-/// `nodes` holds `count` indices. On failure no node changes.
+/// Pins `count` nodes at their current positions; see sinew_body_pin.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_pin_nodes(
     world: *mut sinew_world,
@@ -23,9 +21,7 @@ pub unsafe extern "C" fn sinew_body_pin_nodes(
     }
 }
 
-/// Unpins nodes along all axes; see sinew_body_unpin.
-///
-/// `nodes` holds `count` indices. On failure no node changes.
+/// Unpins `count` nodes along all axes; see sinew_body_unpin.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_unpin_nodes(
     world: *mut sinew_world,
@@ -43,7 +39,7 @@ pub unsafe extern "C" fn sinew_body_unpin_nodes(
 
 /// Pins all nodes in a box, and writes how many nodes of the box are pinned.
 ///
-/// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
+/// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
 #[unsafe(no_mangle)]
@@ -70,9 +66,7 @@ pub unsafe extern "C" fn sinew_body_pin_box(
 
 /// Unpins the pinned nodes in a box, except those of mass 0, and writes how many.
 ///
-/// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
+/// Arguments and errors are those of sinew_body_pin_box.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_unpin_box(
     world: *mut sinew_world,
@@ -95,21 +89,20 @@ pub unsafe extern "C" fn sinew_body_unpin_box(
     }
 }
 
-/// Writes the reaction forces on all nodes, averaged over the last step.
+/// Writes the reaction forces [N] on all nodes, 3 * node_count floats, averaged over the last step.
 ///
-/// `forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool holds. `node_count` must
-/// be the body's number of nodes.
+/// It is 0 for a node that is not pinned or that a tool holds.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_pin_forces(
     world: *const sinew_world,
     body: sinew_body_id,
-    forces: *mut f32,
+    out_forces: *mut f32,
     node_count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            body.pin_forces(memory::output_array("forces", forces.cast(), node_count)?)
+            body.pin_forces(memory::output_array("out_forces", out_forces.cast(), node_count)?)
         })
     }
 }

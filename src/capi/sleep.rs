@@ -5,9 +5,7 @@ use super::memory;
 use super::status::sinew_status;
 use super::world::sinew_world;
 
-/// Writes the fraction of the nodes that are awake, from 0 to 1.
-///
-/// It is 1 for a body that never sleeps.
+/// Writes the fraction of the nodes that are awake; 1 for a body that never sleeps.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_awake_share(
     world: *const sinew_world,
@@ -18,9 +16,7 @@ pub unsafe extern "C" fn sinew_body_get_awake_share(
     unsafe { with_body(world, body, |body| memory::write("out", out, body.awake_share())) }
 }
 
-/// Wakes all nodes of a body until they come to rest again.
-///
-/// Forces, contacts, cuts and property changes wake a body automatically.
+/// Wakes all nodes of a body until they come to rest again; whatever affects a body does too.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_wake(world: *mut sinew_world, body: sinew_body_id) -> sinew_status {
     // SAFETY: the same contract.

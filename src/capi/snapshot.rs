@@ -1,17 +1,14 @@
 //! Worlds as bytes.
 
-use std::ffi::c_void;
-
 use super::guard::{guard, sinew_world, with_world};
 use super::memory;
 use super::status::sinew_status;
-use super::world::sinew_run_tasks;
-use crate::threads::RunTasks;
+use super::world::sinew_world_def;
 use crate::world::World;
 
 /// Writes the number of bytes that sinew_world_save_snapshot needs now.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or the size exceeds what memory can address.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or memory cannot address the size.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_snapshot_size(world: *const sinew_world, out: *mut usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -26,48 +23,45 @@ pub unsafe extern "C" fn sinew_world_get_snapshot_size(world: *const sinew_world
 
 /// Saves a world as bytes, from which sinew_world_load_snapshot continues bitwise identically.
 ///
-/// `size` must be that of sinew_world_get_snapshot_size. The snapshot holds bodies with cuts, contacts,
-/// attachments, blades, pending forces and ids. It does not hold threads, readers, detectors and embeddings. Only
-/// this library version can read it. A checksum detects damage, not tampering.
+/// `size` is that of sinew_world_get_snapshot_size. Threads, readers, detectors and embeddings are not saved. Only this
+/// library version can read it. A checksum detects damage, not tampering.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_save_snapshot(
     world: *const sinew_world,
-    bytes: *mut u8,
+    out_bytes: *mut u8,
     size: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let bytes = memory::output_array("bytes", bytes, size)?;
-            world.save_into(bytes)
+            let out_bytes = memory::output_array("out_bytes", out_bytes, size)?;
+            world.save_into(out_bytes)
         })
     }
 }
 
 /// Creates a world from the bytes of a snapshot.
 ///
-/// `thread_count`, `run_tasks` (nullable) and `tasks_context` (nullable) are as in sinew_world_def. Destroy the
-/// world with sinew_world_destroy. Results are bitwise identical only with the kernel of the saved world.
+/// `def` is nullable: the defaults. Its thread_count, run_tasks and tasks_context apply; the snapshot holds the rest.
+/// Results are bitwise identical only with the kernel of the saved world.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bytes are damaged; SINEW_STATUS_UNSUPPORTED for another library
-/// version or kernel, or if a thread could not be started.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bytes are damaged; SINEW_STATUS_UNSUPPORTED for another library version
+/// or kernel, or if a thread cannot start.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_load_snapshot(
     bytes: *const u8,
     size: usize,
-    thread_count: u32,
-    run_tasks: sinew_run_tasks,
-    tasks_context: *mut c_void,
+    def: *const sinew_world_def,
     out: *mut *mut sinew_world,
 ) -> sinew_status {
     guard(|| {
         // SAFETY: the same contract.
         let (out, bytes) = unsafe { (memory::output("out", out)?, memory::array("bytes", bytes, size)?) };
         // SAFETY: the same contract.
-        let tasks = run_tasks.map(|run| unsafe { RunTasks::from_c(run, tasks_context) });
-        let world = World::load(bytes, thread_count, tasks)?;
+        let def = unsafe { sinew_world_def::read_or_default(def) }?;
+        let world = World::load(bytes, def.thread_count, def.tasks)?;
         *out = Box::into_raw(crate::base::memory::boxed(sinew_world::new(world))?);
         Ok(())
     })

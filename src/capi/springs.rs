@@ -8,21 +8,21 @@ use crate::def::{Values, expect_count};
 
 /// Writes the two nodes of each spring, each spring once, the lower node first.
 ///
-/// `pairs` receives 2 * count indices; `count` must be spring_count of sinew_body_get_storage_report. The order
-/// stays until springs are added or removed.
+/// `out_pairs` receives 2 * count indices; `count` is spring_count of sinew_body_get_storage_report. The order stays
+/// until springs are added or removed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_spring_pairs(
     world: *const sinew_world,
     body: sinew_body_id,
-    pairs: *mut u32,
+    out_pairs: *mut u32,
     count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            let out = memory::output_array("pairs", pairs.cast::<[u32; 2]>(), count)?;
+            let out = memory::output_array("out_pairs", out_pairs.cast::<[u32; 2]>(), count)?;
             let pairs = body.spring_pairs()?;
-            expect_count("pairs", count, pairs.len())?;
+            expect_count("out_pairs", count, pairs.len())?;
             out.copy_from_slice(&pairs);
             Ok(())
         })
@@ -31,8 +31,8 @@ pub unsafe extern "C" fn sinew_body_get_spring_pairs(
 
 /// Writes the stiffnesses and rest lengths of the springs between pairs of nodes.
 ///
-/// `pairs` holds 2 * count indices. `stiffnesses` [N/m] and `rest_lengths` [m] receive `count` floats each and are
-/// nullable. PACKED merges rest lengths that differ only by rounding.
+/// `pairs` holds 2 * count indices. `out_stiffnesses` [N/m] and `out_rest_lengths` [m] receive `count` floats each and
+/// are nullable.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 #[unsafe(no_mangle)]
@@ -41,22 +41,22 @@ pub unsafe extern "C" fn sinew_body_get_springs(
     body: sinew_body_id,
     pairs: *const u32,
     count: usize,
-    stiffnesses: *mut f32,
-    rest_lengths: *mut f32,
+    out_stiffnesses: *mut f32,
+    out_rest_lengths: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
             let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
-            let mut stiffnesses = memory::optional_output_array("stiffnesses", stiffnesses, count)?;
-            let mut rest_lengths = memory::optional_output_array("rest_lengths", rest_lengths, count)?;
+            let mut out_stiffnesses = memory::optional_output_array("out_stiffnesses", out_stiffnesses, count)?;
+            let mut out_rest_lengths = memory::optional_output_array("out_rest_lengths", out_rest_lengths, count)?;
             let springs = body.springs(pairs)?;
             for (index, spring) in springs.into_iter().enumerate() {
-                if let Some(stiffnesses) = &mut stiffnesses {
-                    stiffnesses[index] = spring.stiffness;
+                if let Some(out_stiffnesses) = &mut out_stiffnesses {
+                    out_stiffnesses[index] = spring.stiffness;
                 }
-                if let Some(rest_lengths) = &mut rest_lengths {
-                    rest_lengths[index] = spring.rest_length;
+                if let Some(out_rest_lengths) = &mut out_rest_lengths {
+                    out_rest_lengths[index] = spring.rest_length;
                 }
             }
             Ok(())
@@ -66,9 +66,8 @@ pub unsafe extern "C" fn sinew_body_get_springs(
 
 /// Sets stiffnesses, rest lengths or both of the springs between pairs of nodes.
 ///
-/// `pairs` holds 2 * count indices, the arrays `count` floats each: `stiffnesses` [N/m], `rest_lengths` [m], both
-/// nullable: unchanged. If a pair repeats, its last entry counts. Damping, force law, positions and velocities
-/// stay. On failure no spring changes.
+/// `pairs` holds 2 * count indices, `stiffnesses` [N/m] and `rest_lengths` [m] `count` floats each, nullable:
+/// unchanged. If a pair repeats, its last entry counts. Damping, force law and motion stay.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 #[unsafe(no_mangle)]
@@ -76,9 +75,9 @@ pub unsafe extern "C" fn sinew_body_set_springs(
     world: *mut sinew_world,
     body: sinew_body_id,
     pairs: *const u32,
-    count: usize,
     stiffnesses: *const f32,
     rest_lengths: *const f32,
+    count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
@@ -93,9 +92,9 @@ pub unsafe extern "C" fn sinew_body_set_springs(
 
 /// Multiplies the stiffness and the rest length of the material between given nodes.
 ///
-/// It changes springs, tetrahedra, bending and fibers whose nodes are all among `nodes`, which may repeat; anchor
-/// springs change only their stiffness. `stiffness_factor` is at least 0, where 0 is permanent; `length_factor` is
-/// above 0. Repeated calls multiply. Masses, damping, positions and velocities stay. On failure nothing changes.
+/// It changes springs, tetrahedra, bending and fibers whose nodes are all among `nodes`, which may repeat, and the
+/// stiffness of anchor springs. `stiffness_factor` is at least 0, where 0 is permanent; `length_factor` is above 0.
+/// Masses, damping and motion stay.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_scale_region(
     world: *mut sinew_world,

@@ -21,13 +21,13 @@ pub const SINEW_STATUS_STALE_ID: sinew_status = 2;
 pub const SINEW_STATUS_CAPACITY: sinew_status = 3;
 /// Memory could not be allocated; nothing changed.
 pub const SINEW_STATUS_OUT_OF_MEMORY: sinew_status = 4;
-/// The step or the equilibrium failed: nothing moved, forces and poses stay pending.
+/// Step or equilibrium failed: nothing moved; forces and poses stay.
 pub const SINEW_STATUS_UNSTABLE: sinew_status = 5;
-/// The request is valid, but this build or combination does not offer it.
+/// Valid, but this build or combination does not offer it.
 pub const SINEW_STATUS_UNSUPPORTED: sinew_status = 6;
 /// A file could not be read or written.
 pub const SINEW_STATUS_IO: sinew_status = 7;
-/// Fault inside the library; the world then accepts only sinew_world_destroy.
+/// Fault in the library; the world accepts only sinew_world_destroy.
 pub const SINEW_STATUS_INTERNAL: sinew_status = 8;
 
 /// Major version of this header.

@@ -17,7 +17,7 @@ pub struct sinew_strain {
     pub largest: f32,
     /// Smallest principal stretch minus 1, at least -1.
     pub smallest: f32,
-    /// Volumetric (or areal) strain J - 1; below -1 for an inverted tetrahedron.
+    /// Volumetric (or areal) strain J - 1; below -1 if inverted.
     pub growth: f32,
 }
 
@@ -28,13 +28,13 @@ pub struct sinew_strain {
 unsafe fn strains_of<'a>(strains: *mut sinew_strain, count: usize) -> Result<&'a mut [Strain]> {
     const { assert!(size_of::<sinew_strain>() == size_of::<Strain>()) };
     // SAFETY: the same contract; both are repr(C) with the same fields.
-    unsafe { memory::output_array("strains", strains.cast::<Strain>(), count) }
+    unsafe { memory::output_array("out_strains", strains.cast::<Strain>(), count) }
 }
 
 /// Writes the strain L / L0 - 1 between pairs of nodes; 0 where L0 is 0.
 ///
-/// `pairs` holds 2 * count indices. `rest_lengths` [m] holds `count` floats; it is nullable: the rest lengths of
-/// the springs, which takes longer. `strains` receives `count` floats.
+/// `pairs` holds 2 * count indices, `rest_lengths` [m] `count` floats; nullable: those of the springs, which takes
+/// longer. `out_strains` receives `count` floats.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring and `rest_lengths` is NULL.
 #[unsafe(no_mangle)]
@@ -44,27 +44,26 @@ pub unsafe extern "C" fn sinew_body_get_spring_strains(
     pairs: *const u32,
     rest_lengths: *const f32,
     count: usize,
-    strains: *mut f32,
+    out_strains: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
             let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
-            let strains = memory::output_array("strains", strains, count)?;
+            let out_strains = memory::output_array("out_strains", out_strains, count)?;
             if let Some(lengths) = memory::optional_array("rest_lengths", rest_lengths, count)? {
-                return strain::of_springs(body.positions(), pairs, lengths, strains);
+                return strain::of_springs(body.positions(), pairs, lengths, out_strains);
             }
             let mut lengths = crate::base::memory::reserved(count)?;
             lengths.extend(body.springs(pairs)?.iter().map(|spring| spring.rest_length));
-            strain::of_springs(body.positions(), pairs, &lengths, strains)
+            strain::of_springs(body.positions(), pairs, &lengths, out_strains)
         })
     }
 }
 
-/// Writes the strains of any triangles between nodes of a body.
+/// Writes the strains of any triangles between nodes of a body, one per triangle.
 ///
-/// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `triangles` holds 3 * triangle_count
-/// indices; `strains` receives one entry per triangle. `node_count` must be the body's.
+/// `rest_positions` [m] holds 3 * node_count floats; `triangles` holds 3 * triangle_count indices.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_triangle_strains(
     world: *const sinew_world,
@@ -73,23 +72,22 @@ pub unsafe extern "C" fn sinew_body_get_triangle_strains(
     node_count: usize,
     triangles: *const u32,
     triangle_count: usize,
-    strains: *mut sinew_strain,
+    out_strains: *mut sinew_strain,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
             let rest = memory::array("rest_positions", rest_positions.cast::<Vec3>(), node_count)?;
             let triangles = memory::array("triangles", triangles.cast::<[u32; 3]>(), triangle_count)?;
-            let strains = strains_of(strains, triangle_count)?;
-            strain::of_triangles(rest, body.positions(), triangles, strains)
+            let out_strains = strains_of(out_strains, triangle_count)?;
+            strain::of_triangles(rest, body.positions(), triangles, out_strains)
         })
     }
 }
 
-/// Writes the strains of any tetrahedra between nodes of a body.
+/// Writes the strains of any tetrahedra between nodes of a body, one per tetrahedron.
 ///
-/// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `tetrahedra` holds 4 * tetrahedron_count
-/// indices; `strains` receives one entry per tetrahedron. `node_count` must be the body's.
+/// `rest_positions` [m] holds 3 * node_count floats; `tetrahedra` 4 * tetrahedron_count indices.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_tetrahedron_strains(
     world: *const sinew_world,
@@ -98,41 +96,41 @@ pub unsafe extern "C" fn sinew_body_get_tetrahedron_strains(
     node_count: usize,
     tetrahedra: *const u32,
     tetrahedron_count: usize,
-    strains: *mut sinew_strain,
+    out_strains: *mut sinew_strain,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
             let rest = memory::array("rest_positions", rest_positions.cast::<Vec3>(), node_count)?;
             let tetrahedra = memory::array("tetrahedra", tetrahedra.cast::<[u32; 4]>(), tetrahedron_count)?;
-            let strains = strains_of(strains, tetrahedron_count)?;
-            strain::of_tetrahedra(rest, body.positions(), tetrahedra, strains)
+            let out_strains = strains_of(out_strains, tetrahedron_count)?;
+            strain::of_tetrahedra(rest, body.positions(), tetrahedra, out_strains)
         })
     }
 }
 
 /// Averages values of elements at their nodes; 0 at a node without elements.
 ///
-/// `elements` holds corners * element_count node indices, `corners` is 2, 3 or 4, `values` holds element_count
-/// finite floats, and `means` receives node_count floats. Use it to color an image by strain.
+/// `elements` holds corners * element_count node indices, `corners` is 2, 3 or 4, `values` holds element_count finite
+/// floats, and `out_means` receives node_count floats.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_mean_at_nodes(
+pub unsafe extern "C" fn sinew_util_average_to_nodes(
     elements: *const u32,
     corners: u32,
     values: *const f32,
     element_count: usize,
-    means: *mut f32,
+    out_means: *mut f32,
     node_count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     guard(|| unsafe {
         let values = memory::array("values", values, element_count)?;
-        let means = memory::output_array("means", means, node_count)?;
+        let out_means = memory::output_array("out_means", out_means, node_count)?;
         let name = "elements";
         match corners {
-            2 => strain::mean_at_nodes::<2>(memory::array(name, elements.cast(), element_count)?, values, means),
-            3 => strain::mean_at_nodes::<3>(memory::array(name, elements.cast(), element_count)?, values, means),
-            4 => strain::mean_at_nodes::<4>(memory::array(name, elements.cast(), element_count)?, values, means),
+            2 => strain::mean_at_nodes::<2>(memory::array(name, elements.cast(), element_count)?, values, out_means),
+            3 => strain::mean_at_nodes::<3>(memory::array(name, elements.cast(), element_count)?, values, out_means),
+            4 => strain::mean_at_nodes::<4>(memory::array(name, elements.cast(), element_count)?, values, out_means),
             _ => Err(Error::invalid(format!("corners is {corners}: must be 2, 3 or 4"))),
         }
     })

@@ -1,11 +1,10 @@
 //! Sutures.
 
 use super::attachment::sinew_attachment_id;
-use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
+use super::query::sinew_surface_point;
 use super::status::sinew_status;
-use crate::base::Result;
 use crate::def::{Anchor, SurfacePoint};
 use crate::world::SutureDefinition;
 
@@ -15,14 +14,12 @@ use crate::world::SutureDefinition;
 pub struct sinew_suture_def {
     /// Size of this struct; sinew_suture_def_init sets it.
     pub struct_size: usize,
-    /// [m] Unloaded length of the thread, at least 0; -1 (default): the current distance.
+    /// [m] Unloaded length of the thread; -1 (default): the current distance.
     pub length: f32,
     /// [N/m] Stiffness of the thread, above 0; infinity (default): inextensible.
     pub stiffness: f32,
-    /// [N] Mean force above which it tears out, at least 0; 0 (default) or infinity: unlimited.
+    /// [N] Mean force where it tears out; infinity (default) or 0: unlimited.
     pub force_limit: f32,
-    /// Reserved; must be 0.
-    pub reserved0: u32,
 }
 
 /// Current state of a suture.
@@ -35,7 +32,7 @@ pub struct sinew_suture_report {
     pub length: f32,
     /// [m] Distance of its points; larger than the length under load.
     pub distance: f32,
-    /// [J] Energy stored in the thread, not part of the bodies' energy; 0 if inextensible.
+    /// [J] Energy of the thread, not of the bodies; 0 if inextensible.
     pub energy: f64,
 }
 
@@ -51,8 +48,7 @@ impl sinew_suture_def {
             struct_size: size_of::<Self>(),
             length: -1.0,
             stiffness: f32::INFINITY,
-            force_limit: 0.0,
-            reserved0: 0,
+            force_limit: f32::INFINITY,
         }
     }
 }
@@ -66,59 +62,56 @@ pub unsafe extern "C" fn sinew_suture_def_init(def: *mut sinew_suture_def, struc
 
 /// Joins two surface points of bodies by a thread, which pulls and never pushes.
 ///
-/// A point is a surface triangle with 3 corner weights, at least 0 with sum 1. The bodies may be the same and still
-/// collide. `def` is nullable: the defaults. A thread shorter than the distance is drawn in at no more than 0.25
-/// m/s. Release and force are those of an attachment; a torn suture is in sinew_world_get_slipped.
+/// Body, triangle and weights of the points count. The bodies may be the same and still collide. `def` is nullable: the
+/// defaults. The thread is drawn in at no more than 0.25 m/s. It is an attachment.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if both points are the same.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_body_suture_points(
+pub unsafe extern "C" fn sinew_suture_create(
     world: *mut sinew_world,
-    body: sinew_body_id,
-    triangle: u32,
-    weights: *const f32,
-    other: sinew_body_id,
-    other_triangle: u32,
-    other_weights: *const f32,
+    point: *const sinew_surface_point,
+    other_point: *const sinew_surface_point,
     def: *const sinew_suture_def,
     out: *mut sinew_attachment_id,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world_mut(world, |world| {
-            let point = anchor("weights", triangle, weights)?;
-            let other_point = anchor("other_weights", other_triangle, other_weights)?;
+            let [point, other] = [("point", point), ("other_point", other_point)]
+                .map(|(name, point)| memory::definition(name, point, sinew_surface_point::NONE));
+            let (point, other) = (point?, other?);
             let defaults = sinew_suture_def::defaults();
             let def = if def.is_null() {
                 defaults
             } else {
                 memory::definition("def", def, defaults)?
             };
-            memory::reserved("reserved0", def.reserved0)?;
             let definition = SutureDefinition {
                 length: (def.length != -1.0).then_some(def.length),
                 stiffness: def.stiffness,
                 force_limit: def.force_limit,
             };
             let out = memory::output("out", out)?;
-            let made = world.suture(body.id(), &point, other.id(), &other_point, &definition)?;
+            let anchor = |of: &sinew_surface_point| {
+                let (triangle, weights) = (of.triangle, of.weights);
+                Anchor::Point(SurfacePoint { triangle, weights })
+            };
+            let made = world.suture(
+                point.body.id(),
+                &anchor(&point),
+                other.body.id(),
+                &anchor(&other),
+                &definition,
+            )?;
             *out = made.into();
             Ok(())
         })
     }
 }
 
-/// # Safety
-/// `weights` is NULL or 3 floats.
-unsafe fn anchor(name: &str, triangle: u32, weights: *const f32) -> Result<Anchor> {
-    // SAFETY: the same contract.
-    let weights = unsafe { memory::vector(name, weights) }?.to_array();
-    Ok(Anchor::Point(SurfacePoint { triangle, weights }))
-}
-
-/// Changes the length [m] of a suture's thread evenly over the next step.
+/// Changes the length [m] of a suture's thread over the next step, by at most 0.25 m/s.
 ///
-/// The length is at least 0. It shortens by at most 0.25 m/s, over as many steps as that takes.
+/// A longer change goes on over the following steps.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
 #[unsafe(no_mangle)]
@@ -138,12 +131,12 @@ pub unsafe extern "C" fn sinew_suture_set_length(
 pub unsafe extern "C" fn sinew_suture_get_report(
     world: *const sinew_world,
     suture: sinew_attachment_id,
-    report: *mut sinew_suture_report,
+    out_report: *mut sinew_suture_report,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let out = memory::report("report", report)?;
+            let out = memory::report("out_report", out_report)?;
             let found = world.suture_report(suture.id())?;
             out.fill(sinew_suture_report {
                 struct_size: size_of::<sinew_suture_report>(),

@@ -7,6 +7,8 @@ use super::status::sinew_status;
 use crate::def::Values;
 
 /// Report of the tears in the last step; all 0 for a body that does not tear.
+///
+/// Springs of small_pieces and no_room are retried after a topology change.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_tear_report {
@@ -16,14 +18,12 @@ pub struct sinew_tear_report {
     pub tears: u32,
     /// Increase of the number of connected surface components.
     pub pieces_parted: u32,
-    /// Overloaded springs that wait: most_tears was reached, a neighbor tore, or no force separates their nodes.
+    /// Overloaded springs that wait: beyond most_tears, or not pulled apart.
     pub waiting: u32,
-    /// Overloaded springs that would make a fragment below smallest_piece; retried after a topology change.
+    /// Overloaded springs whose fragment would be below smallest_piece.
     pub small_pieces: u32,
-    /// Overloaded springs without spare nodes, FAST_LINK slots or memory; retried after a topology change.
+    /// Overloaded springs without spare nodes, FAST_LINK slots or memory.
     pub no_room: u32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -47,8 +47,37 @@ pub unsafe extern "C" fn sinew_body_get_tear_report(
                 waiting: report.waiting,
                 small_pieces: report.small_pieces,
                 no_room: report.no_room,
-                reserved: 0,
             });
+            Ok(())
+        })
+    }
+}
+
+/// Writes the tear limits of springs or element edges between pairs of nodes.
+///
+/// `pairs` holds 2 * count indices. `out_strains` and `out_forces` [N] receive `count` floats each, 0: no limit, and
+/// are nullable. Errors are those of sinew_body_set_tear_limits.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_tear_limits(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    pairs: *const u32,
+    count: usize,
+    out_strains: *mut f32,
+    out_forces: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
+            let strains = memory::optional_output_array("out_strains", out_strains, count)?;
+            let forces = memory::optional_output_array("out_forces", out_forces, count)?;
+            let limits = body.tear_limits(pairs)?;
+            for (out, of) in [(strains, 0), (forces, 1)] {
+                for (out, limits) in out.unwrap_or_default().iter_mut().zip(&limits) {
+                    *out = limits[of];
+                }
+            }
             Ok(())
         })
     }
@@ -56,20 +85,19 @@ pub unsafe extern "C" fn sinew_body_get_tear_report(
 
 /// Sets tear limits of single springs or element edges, in place of the body's.
 ///
-/// `pairs` holds 2 * count indices; `strains` and `forces` [N] hold `count` floats each, at least 0, where 0 means
-/// no limit; both are nullable: unchanged. If a pair repeats, its last entry counts. On failure no limit changes.
-/// Springs added later have no limits.
+/// `pairs` holds 2 * count indices; `strains` and `forces` [N] `count` floats each, 0: no limit; both are nullable:
+/// unchanged. If a pair repeats, its last entry counts. Later springs have none.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a pair without spring and edge; SINEW_STATUS_UNSUPPORTED if most_tears
-/// is 0.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a pair without spring and edge; SINEW_STATUS_UNSUPPORTED if most_tears is
+/// 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_tear_limits(
     world: *mut sinew_world,
     body: sinew_body_id,
     pairs: *const u32,
-    count: usize,
     strains: *const f32,
     forces: *const f32,
+    count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {

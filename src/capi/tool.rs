@@ -53,9 +53,9 @@ pub struct sinew_tool_def {
     pub struct_size: usize,
     /// Shape of the tool, a sinew_shape value.
     pub shape: u32,
-    /// [m] Sphere, capsule: above 0, at most 1e9 with half_length added; no default.
+    /// [m] Sphere, capsule: above 0, at most 1e9 with half_length; no default.
     pub radius: f32,
-    /// [m] Capsule: distance from the center to the center of a cap, at least 0.
+    /// [m] Capsule: distance from the center to the center of a cap.
     ///
     /// IMAGE_SPACE allows at most 10,000 times the radius. Contact points are accurate to 1e-7 of it.
     pub half_length: f32,
@@ -69,36 +69,32 @@ pub struct sinew_tool_def {
     pub triangles: *const u32,
     /// Number of triangles of the mesh.
     pub triangle_count: usize,
-    /// Contact detection, a sinew_detection value; default SINEW_DETECTION_EXACT.
+    /// Contact detection, a sinew_detection value; default EXACT.
     pub detection: u32,
     /// Coulomb coefficient, at least 0; default 0.
     pub friction: f32,
-    /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
+    /// [m] Initial position; default 0 0 0.
     pub position: [f32; 3],
-    /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
+    /// Initial orientation; default 0 0 0 1.
     pub orientation: [f32; 4],
     /// Reserved; must be 0.
     pub reserved: u32,
-    /// [m] Mesh, box: pixel size of the images or cell size of the distance field; 0 (default): automatic.
+    /// [m] Mesh, box: pixel size of images or cell size of a distance field; 0 (default): automatic.
     ///
-    /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if less. Refused
-    /// above 2^24 pixels or samples, or if no ray or sample would lie inside. Memory: about 24 bytes per pixel of 3
-    /// images, 4 bytes per sample.
+    /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if less. Refused above
+    /// 2^24 pixels or samples, or with no ray or sample inside. Memory: 24 bytes per pixel of 3 images, 4 bytes per
+    /// sample.
     pub resolution: f32,
-    /// [N] Largest force that moves the tool, at least 0; infinity (default) or 0: unlimited.
+    /// [N] Largest force that moves the tool; infinity (default) or 0: unlimited.
     ///
     /// Beyond it the tool stops short of its pose; see sinew_tool_get_pose.
     pub force_limit: f32,
-    /// Bits of the categories that this tool belongs to; default 1.
-    ///
-    /// Two objects collide if each has a category in the mask of the other.
+    /// Collision categories of this tool; default 1. See base.h.
     pub collision_category: u32,
-    /// Bits of the categories that this tool collides with; default 0xffffffff.
+    /// Categories that it collides with; default 0xffffffff.
     pub collision_mask: u32,
-    /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
+    /// [m] Box: distance from the center to each side, above 0, at most 1e9.
     pub half_extents: [f32; 3],
-    /// Reserved; must be 0.
-    pub reserved1: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -142,7 +138,6 @@ impl sinew_tool_def {
             collision_category: CollisionFilter::default().category,
             collision_mask: CollisionFilter::default().mask,
             half_extents: [0.0; 3],
-            reserved1: 0,
         }
     }
 
@@ -153,7 +148,6 @@ impl sinew_tool_def {
     unsafe fn definition<'a>(&self) -> Result<ToolDefinition<'a>> {
         memory::reserved("reserved0", self.reserved0)?;
         memory::reserved("reserved", self.reserved)?;
-        memory::reserved("reserved1", self.reserved1)?;
         let detection = detection("detection", self.detection)?;
         let shape = match self.shape {
             SINEW_SHAPE_SPHERE => Shape::Sphere { radius: self.radius },
@@ -225,11 +219,10 @@ pub unsafe extern "C" fn sinew_tool_destroy(world: *mut sinew_world, tool: sinew
     unsafe { with_world_mut(world, |world| world.destroy_tool(tool.id())) }
 }
 
-/// Moves a tool to a new pose during the next step.
+/// Moves a tool to a new pose during the next step, along a line and the shorter arc.
 ///
-/// The tool moves along a straight line and rotates through the shorter arc, at constant speed. `position` [m] is 3
-/// floats, each within 1e9; `orientation` is x y z w, not zero, nullable: unchanged. If force_limit stops the tool
-/// early, the rest is discarded: call again for every step.
+/// `position` [m] is 3 floats; `orientation` is nullable: unchanged. If force_limit stops the tool early, the rest is
+/// discarded: call again for every step.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 #[unsafe(no_mangle)]
@@ -260,9 +253,7 @@ pub unsafe extern "C" fn sinew_tool_set_friction(
     unsafe { with_world_mut(world, |world| world.set_friction(tool.id(), friction)) }
 }
 
-/// Sets the largest force [N] that moves a tool, from the next step on.
-///
-/// It is at least 0; 0 or infinity: unlimited. See sinew_tool_def.
+/// Sets the largest force [N] that moves a tool, from the next step on; 0 or infinity: unlimited.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_force_limit(
     world: *mut sinew_world,
@@ -275,7 +266,7 @@ pub unsafe extern "C" fn sinew_tool_set_force_limit(
 
 /// Sets the collision category and mask of a tool from the next step on.
 ///
-/// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
+/// With mask 0 it collides with nothing. Tissue inside is pushed out once it collides.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_set_collision(
     world: *mut sinew_world,
@@ -291,36 +282,38 @@ pub unsafe extern "C" fn sinew_tool_set_collision(
     }
 }
 
-/// Writes the current pose of a tool.
+/// Writes the current pose of a tool, which a force_limit can keep short of the commanded one.
 ///
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. A tool with a
-/// force_limit can be short of its commanded pose.
+/// `out_position` [m] receives 3 floats and `out_orientation` 4 floats; both are nullable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_pose(
     world: *const sinew_world,
     tool: sinew_tool_id,
-    position: *mut f32,
-    orientation: *mut f32,
-) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world(world, |world| write_pose(world.pose(tool.id())?, position, orientation)) }
-}
-
-/// Writes the pose that the last step moved a tool to, before the force_limit.
-///
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. Replaying these poses
-/// with sinew_tool_set_pose reproduces the steps, also those that a haptic handle drove.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_tool_get_target(
-    world: *const sinew_world,
-    tool: sinew_tool_id,
-    position: *mut f32,
-    orientation: *mut f32,
+    out_position: *mut f32,
+    out_orientation: *mut f32,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            write_pose(world.tool_target(tool.id())?, position, orientation)
+            write_pose(world.pose(tool.id())?, out_position, out_orientation)
+        })
+    }
+}
+
+/// Writes the pose that the last step moved a tool to, before the force_limit.
+///
+/// Both outputs are nullable. Replaying these poses reproduces the steps, also those of a haptic handle.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_target(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    out_position: *mut f32,
+    out_orientation: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            write_pose(world.tool_target(tool.id())?, out_position, out_orientation)
         })
     }
 }
@@ -330,8 +323,8 @@ pub unsafe extern "C" fn sinew_tool_get_target(
 /// # Safety
 /// Each place is NULL or writable: for 3 floats, and for 4.
 pub(super) unsafe fn write_pose(pose: Pose, position: *mut f32, orientation: *mut f32) -> Result<()> {
-    let position = ("position", position.cast(), pose.position.to_array());
-    let orientation = ("orientation", orientation.cast(), pose.orientation.to_array());
+    let position = ("out_position", position.cast(), pose.position.to_array());
+    let orientation = ("out_orientation", orientation.cast(), pose.orientation.to_array());
     // SAFETY: the same contract.
     unsafe { memory::write_wanted(position, orientation) }
 }
@@ -349,7 +342,7 @@ pub(super) unsafe fn write_wrench(wrench: (Vec3, Vec3), force: *mut f32, torque:
 
 /// Writes the force and torque on a tool, averaged over the last step, in world axes.
 ///
-/// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each; both are nullable.
+/// `force` [N] and `torque` [N m], about the position, receive 3 floats each; both are nullable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_wrench(
     world: *const sinew_world,

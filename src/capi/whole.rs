@@ -18,7 +18,7 @@ use crate::mesh::{LoadedMesh, Mesh, tidy};
 /// Creates a mesh from arrays and cleans it like sinew_mesh_load.
 ///
 /// `positions` [m] holds 3 * node_count floats, `triangles` 3 * triangle_count and `tetrahedra` 4 * tetrahedron_count
-/// node indices. node_of_vertex of sinew_mesh_view maps the given nodes to those of the mesh.
+/// node indices. node_of_vertex of sinew_mesh_view maps the given nodes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_create(
     positions: *const f32,
@@ -44,8 +44,7 @@ pub unsafe extern "C" fn sinew_mesh_create(
 
 /// Creates a mesh of tetrahedra that fills the closed surface of a mesh.
 ///
-/// `spacing` [m] is the mean edge length. Nodes and tetrahedra are those of the body that
-/// sinew_body_create_from_surface makes of the same surface, with the rest positions.
+/// `spacing` [m] is the mean edge length. The result is that of sinew_body_create_from_surface.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` too fine or too coarse.
 #[unsafe(no_mangle)]
@@ -65,10 +64,9 @@ pub unsafe extern "C" fn sinew_mesh_create_filled(
 
 /// Sets the nodes and elements of a body definition to those of a mesh.
 ///
-/// It sets positions with tetrahedra, cells or triangles, and leaves the rest. The mesh must exist until the body is
-/// created.
+/// The mesh must exist until the body is created.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED for a mesh of cells if `def` is of an older header without them.
+/// Errors: SINEW_STATUS_UNSUPPORTED for a mesh of cells if `def` is of an older header.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_def_set_mesh(def: *mut sinew_body_def, mesh: *const sinew_mesh) -> sinew_status {
     // SAFETY: the same contract.
@@ -89,8 +87,8 @@ pub unsafe extern "C" fn sinew_body_def_set_mesh(def: *mut sinew_body_def, mesh:
 
 /// Rotates a body about a pivot and then translates it, with its pins and velocities.
 ///
-/// `translation` [m] is 3 floats, `rotation` x y z w, not zero, and `pivot` [m] 3 floats; all are nullable: none, none,
-/// and the center of the bounding box. Nothing is swept; otherwise like sinew_body_set_positions.
+/// `translation` [m], `rotation` and `pivot` [m] are nullable: none, none, and the center of the bounding box. Nothing
+/// is swept; otherwise like sinew_body_set_positions.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_transform(
     world: *mut sinew_world,
@@ -112,9 +110,7 @@ pub unsafe extern "C" fn sinew_body_transform(
     }
 }
 
-/// Writes the bounding box of the nodes of a body.
-///
-/// `out_min` [m] and `out_max` [m] receive 3 floats each.
+/// Writes the bounding box [m] of the nodes of a body, as two corners of 3 floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_bounds(
     world: *const sinew_world,
@@ -131,47 +127,44 @@ pub unsafe extern "C" fn sinew_body_get_bounds(
     }
 }
 
-/// Writes the unit normals of the surface of a body at its nodes.
+/// Writes the unit normals of the surface of a body at its nodes, 3 * node_count floats.
 ///
-/// They are area-weighted and point outward; 0 for a node without a triangle. `normals` receives 3 * node_count floats;
-/// `node_count` must be the body's number of nodes.
+/// They are area-weighted and point outward; 0 for a node without a triangle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_normals(
     world: *const sinew_world,
     body: sinew_body_id,
-    normals: *mut f32,
+    out_normals: *mut f32,
     node_count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            body.normals(memory::output_array("normals", normals.cast(), node_count)?)
+            body.normals(memory::output_array("out_normals", out_normals.cast(), node_count)?)
         })
     }
 }
 
 /// Writes the masses [kg] of all nodes of a body; see sinew_body_get_node_mass.
-///
-/// `masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_get_masses(
     world: *const sinew_world,
     body: sinew_body_id,
-    masses: *mut f32,
+    out_masses: *mut f32,
     node_count: usize,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            body.node_masses(memory::output_array("masses", masses, node_count)?)
+            body.node_masses(memory::output_array("out_masses", out_masses, node_count)?)
         })
     }
 }
 
-/// Changes the velocities of nodes at once by impulses.
+/// Changes the velocities of nodes at once by impulses [N s], 3 * count floats.
 ///
-/// `nodes` holds `count` indices, which may repeat; `impulses` [N s] holds 3 * count floats. They have no effect on a
-/// pinned or attached node, nor along a pinned axis. On failure no velocity changes.
+/// `nodes` holds `count` indices, which may repeat. They have no effect on a pinned or attached node, nor along a
+/// pinned axis.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_apply_impulses(
     world: *mut sinew_world,
@@ -189,9 +182,7 @@ pub unsafe extern "C" fn sinew_body_apply_impulses(
     }
 }
 
-/// Sets the factor of the world's gravity on a body, from the next step on.
-///
-/// `scale` is finite: 0 means no gravity.
+/// Sets the factor of the world's gravity on a body, any finite number, from the next step on.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_gravity_scale(
     world: *mut sinew_world,
@@ -213,9 +204,7 @@ pub unsafe extern "C" fn sinew_body_get_gravity_scale(
     unsafe { with_body(world, body, |body| memory::write("out", out, body.gravity_scale())) }
 }
 
-/// Stores a pointer of the caller with a body; snapshots do not hold it.
-///
-/// `user_data` is nullable.
+/// Stores a pointer of the caller, nullable, with a body; snapshots do not hold it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_user_data(
     world: *mut sinew_world,

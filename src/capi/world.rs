@@ -34,9 +34,9 @@ pub type sinew_task = Option<unsafe extern "C" fn(task_data: *mut c_void, index:
 
 /// Callback that runs the tasks of a step on a job system.
 ///
-/// Call task(task_data, index) once for every index from 0 to count - 1, on any threads and in any order. Return
-/// when all these calls have returned; returning earlier is not detected. Start no more tasks at once than there
-/// are free cores. The callback runs inside sinew_world_step and must not use the world.
+/// Call task(task_data, index) once for every index from 0 to count - 1, on any threads, in any order, and return when
+/// all have returned. Start no more tasks at once than there are free cores. The callback runs inside sinew_world_step
+/// and must not use the world.
 pub type sinew_run_tasks =
     Option<unsafe extern "C" fn(context: *mut c_void, task: sinew_task, task_data: *mut c_void, count: u32)>;
 
@@ -48,36 +48,32 @@ pub struct sinew_world_def {
     pub struct_size: usize,
     /// [m/s^2] Acceleration of all nodes; default 0 -9.81 0.
     pub gravity: [f32; 3],
-    /// Threads of a step, at most 256: 1 (default) uses the calling thread, 0 one thread per core.
+    /// Threads of a step, at most 256: 1 (default) is the caller's, 0 is one per core.
     ///
-    /// The results do not depend on it. The world owns its threads; they sleep between steps.
+    /// Results do not depend on it. The world's own threads sleep between steps.
     pub thread_count: u32,
     /// Substeps per step: 0 (default) takes as many as stability needs; n takes exactly n.
     ///
     /// IMPLICIT and NEWTON take at most 1 ms near a tool and at most 0.25 ms while attached to another body, and
     /// subdivide a substep that gains energy; at most 4096 substeps in total.
     pub substeps: u32,
-    /// Largest number of substeps per step, at least 1; default 1000.
+    /// Largest number of substeps per step, at least 1; default 1000. Beyond it a step is SINEW_STATUS_UNSTABLE.
     ///
-    /// A step that needs more returns SINEW_STATUS_UNSTABLE. The subdivisions of IMPLICIT and NEWTON have their own
-    /// limit of 4096: a step beyond it (4 s near a tool, 1 s while attached) is unstable too.
+    /// The limit of 4096 of IMPLICIT and NEWTON makes a step of 4 s near a tool, or of 1 s while attached, unstable
+    /// too.
     pub max_substeps: u32,
-    /// [m] Bound on the position error of a step; 0 (default) turns it off.
-    ///
-    /// It has no effect with fixed substeps.
+    /// [m] Bound on the position error of a step; 0: none. No effect with fixed substeps.
     pub tolerance: f32,
     /// Reserved; must be 0.
     pub reserved: u32,
     /// Job system that runs thread_count tasks per step; nullable (default): the world's own threads.
     ///
-    /// It must stay valid while the world lives. It is not called if thread_count is 1, or in small steps.
+    /// It must stay valid while the world lives. A thread_count of 1 and small steps do not call it.
     pub run_tasks: sinew_run_tasks,
     /// First argument of run_tasks; nullable.
     pub tasks_context: *mut c_void,
     /// SIMD level, a sinew_kernel value; default SINEW_KERNEL_BEST.
     pub kernel: u32,
-    /// Reserved; must be 0.
-    pub reserved2: u32,
 }
 
 /// Report of a step; written on SINEW_STATUS_OK and on SINEW_STATUS_UNSTABLE.
@@ -88,7 +84,7 @@ pub struct sinew_step_report {
     pub struct_size: usize,
     /// Largest number of substeps that a body took.
     pub substeps: u32,
-    /// [s] Longest stable explicit substep over all bodies; infinity: no limit, as with IMPLICIT and NEWTON.
+    /// [s] Longest stable explicit substep over all bodies; infinity with IMPLICIT and NEWTON.
     pub stable_substep: f32,
     /// Number of bodies that became non-finite and were rolled back; the others were stepped.
     pub bodies_restored: u32,
@@ -97,8 +93,8 @@ pub struct sinew_step_report {
     pub error_estimate: f32,
     /// Number of interpenetrating surface edges that contact could not separate.
     ///
-    /// It counts edges inside other tissue, and inside their own body where that collides with itself. Contact
-    /// pushes edges of another body out of a closed one in later steps.
+    /// Edges inside their own body count if that collides with itself. Later steps push edges of another body out of a
+    /// closed one.
     pub crossings: u32,
     /// Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
     pub limit: u32,
@@ -146,15 +142,25 @@ impl sinew_world_def {
             run_tasks: None,
             tasks_context: std::ptr::null_mut(),
             kernel: SINEW_KERNEL_BEST,
-            reserved2: 0,
         }
+    }
+
+    /// # Safety
+    /// `def` is NULL or points to a definition of the size that it states, whose `run_tasks` is as [`Self::definition`] says.
+    pub(super) unsafe fn read_or_default(def: *const Self) -> Result<WorldDefinition> {
+        let mut read = Self::defaults();
+        if !def.is_null() {
+            // SAFETY: the same contract.
+            read = unsafe { memory::definition("def", def, read) }?;
+        }
+        // SAFETY: the same contract.
+        unsafe { read.definition() }
     }
 
     /// # Safety
     /// `run_tasks` is NULL or what [`sinew_run_tasks`] says, for as long as a world of this definition lives.
     unsafe fn definition(&self) -> Result<WorldDefinition> {
         memory::reserved("reserved", self.reserved)?;
-        memory::reserved("reserved2", self.reserved2)?;
         // SAFETY: the same contract.
         let run_tasks = |run| unsafe { RunTasks::from_c(run, self.tasks_context) };
         Ok(WorldDefinition {
@@ -206,7 +212,7 @@ pub unsafe extern "C" fn sinew_world_def_init(def: *mut sinew_world_def, struct_
 
 /// Creates an empty world; destroy it with sinew_world_destroy.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED if a thread could not be started or the processor lacks the kernel.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a thread cannot start or the processor lacks the kernel.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *mut *mut sinew_world) -> sinew_status {
     guard(|| {
@@ -286,18 +292,14 @@ pub(super) unsafe fn step_and_report<Report: Into<sinew_step_report>>(
     }
 }
 
-/// Sets the gravitational acceleration from the next step on.
-///
-/// `gravity` [m/s^2] points to 3 floats.
+/// Sets the gravitational acceleration [m/s^2], 3 floats, from the next step on.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_gravity(world: *mut sinew_world, gravity: *const f32) -> sinew_status {
     // SAFETY: the same contract.
     unsafe { with_world_mut(world, |world| world.set_gravity(memory::vector("gravity", gravity)?)) }
 }
 
-/// Computes a hash over everything that the next step depends on.
-///
-/// Compare hashes only between worlds of the same library version.
+/// Computes a hash over all that the next step depends on; compare it within one version.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_state_hash(world: *const sinew_world, out: *mut u64) -> sinew_status {
     // SAFETY: the same contract.

@@ -86,6 +86,14 @@ impl World {
         Ok(())
     }
 
+    /// What a blade meets.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`](crate::Error::StaleId).
+    pub fn blade_collision_filter(&self, blade: BladeId) -> Result<CollisionFilter> {
+        Ok(self.blades.get(blade.0)?.filter)
+    }
+
     /// What a blade did and felt in the last step.
     ///
     /// # Errors

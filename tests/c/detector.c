@@ -457,7 +457,7 @@ static void a_search_is_refused_and_what_was_found_stays(void)
     REFUSED(INVALID, "another surface", sinew_detector_find(detector, strange, &report));
     REFUSED(INVALID, "detector", sinew_detector_find(NULL, world, &report));
     REFUSED(INVALID, "world", sinew_detector_find(detector, NULL, &report));
-    REFUSED(INVALID, "report", sinew_detector_find(detector, world, NULL));
+    REFUSED(INVALID, "out_report", sinew_detector_find(detector, world, NULL));
     report.struct_size = 8;
     REFUSED(INVALID, "struct_size is 8", sinew_detector_find(detector, world, &report));
     report.struct_size = sizeof report;
@@ -480,10 +480,10 @@ static void a_search_is_refused_and_what_was_found_stays(void)
     REFUSED(INVALID, "detector", sinew_detector_get_points(NULL, 0, &points, &count));
     REFUSED(INVALID, "detector", sinew_detector_get_edges(NULL, 0, &edges, &count));
     REFUSED(INVALID, "detector", sinew_detector_get_gradient(NULL, 0, &view));
-    REFUSED(INVALID, "points", sinew_detector_get_points(detector, 0, NULL, &count));
-    REFUSED(INVALID, "edges", sinew_detector_get_edges(detector, 0, NULL, &count));
-    REFUSED(INVALID, "count", sinew_detector_get_points(detector, 0, &points, NULL));
-    REFUSED(INVALID, "count", sinew_detector_get_edges(detector, 0, &edges, NULL));
+    REFUSED(INVALID, "out_points", sinew_detector_get_points(detector, 0, NULL, &count));
+    REFUSED(INVALID, "out_edges", sinew_detector_get_edges(detector, 0, NULL, &count));
+    REFUSED(INVALID, "out_count", sinew_detector_get_points(detector, 0, &points, NULL));
+    REFUSED(INVALID, "out_count", sinew_detector_get_edges(detector, 0, &edges, NULL));
     REFUSED(INVALID, "out", sinew_detector_get_gradient(detector, 0, NULL));
     CHECK(points == NULL && edges == NULL && view.data == NULL && count == 77);
 

@@ -47,7 +47,7 @@ static void feel(sinew_haptic *haptic) /* the device's thread */
 {
     static const float nothing[3] = {0, 0, 0};
     float position[3], orientation[4], velocity[3], spin[3];
-    sinew_haptic_result felt;
+    sinew_haptic_report felt;
     felt.struct_size = sizeof felt;
     while (driver_wait()) { /* yours: until the next millisecond; 0: the device is disconnected */
         driver_read(position, orientation, velocity, spin); /* yours: m, x y z w, m/s, rad/s, in the world's axes */

@@ -22,7 +22,7 @@ int main(void)
     sinew_world_def world_def;
     sinew_tool_def tool_def;
     sinew_haptic_def def;
-    union { sinew_haptic_result now; unsigned char bytes[sizeof(sinew_haptic_result) + 8]; } felt;
+    union { sinew_haptic_report now; unsigned char bytes[sizeof(sinew_haptic_report) + 8]; } felt;
     sinew_haptic_contact contacts[1];
     sinew_world *world = NULL;
     sinew_haptic *haptic = NULL, *second = NULL;
@@ -73,8 +73,8 @@ int main(void)
     for (i = sizeof felt.now.struct_size; i < sizeof felt.bytes; i++)
         CHECK(felt.bytes[i] == 0xA5);
     REFUSED(INVALID_ARGUMENT, "haptic", sinew_haptic_get_contacts(NULL, contacts, 1, &count));
-    REFUSED(INVALID_ARGUMENT, "count", sinew_haptic_get_contacts(haptic, contacts, 1, NULL));
-    REFUSED(INVALID_ARGUMENT, "contacts", sinew_haptic_get_contacts(haptic, NULL, 1, &count));
+    REFUSED(INVALID_ARGUMENT, "out_count", sinew_haptic_get_contacts(haptic, contacts, 1, NULL));
+    REFUSED(INVALID_ARGUMENT, "out_contacts", sinew_haptic_get_contacts(haptic, NULL, 1, &count));
     CHECK(count == 7);
     MUST(sinew_haptic_get_contacts(haptic, NULL, 0, &count));
     CHECK(count == 0);

@@ -30,7 +30,6 @@ static void world_definitions(void)
     REFUSES_SIZES(sinew_world_def, sizeof(contract_world_def), sinew_world_def def = good_world(); def.struct_size = size,
                   sinew_world_create(&def, &out.world));
     WORLD(INVALID, "reserved", def.reserved = 1);
-    WORLD(INVALID, "reserved2", def.reserved2 = 1);
     WORLD(INVALID, "kernel", def.kernel = 5);
     WORLD(INVALID, "kernel", def.kernel = UINT32_MAX);
     WORLD(INVALID, "max_substeps", def.max_substeps = 0);
@@ -419,22 +418,22 @@ static void body_reports(void)
 
 static void rest_states(void)
 {
-    sinew_rest_state_def good;
+    sinew_equilibrium_def good;
     int i;
-    MUST(sinew_rest_state_def_init(&good, sizeof good));
-    REFUSED(INVALID, "def", sinew_rest_state_def_init(NULL, sizeof good));
-    REFUSES_SIZES(sinew_rest_state_def, sizeof(sinew_rest_state_def), (void)0,
-                  sinew_rest_state_def_init(&out.rest_def, size));
-    REFUSES_NO_BODY(sinew_body_rest_state(world, body, &good, &out.rest));
-    REFUSES_NO_BODY(sinew_body_rest_state(world, body, NULL, NULL));
-    REFUSES_SIZES(sinew_rest_state_def, sizeof(sinew_rest_state_def), sinew_rest_state_def def = good; def.struct_size = size,
-                  sinew_body_rest_state(the.world, the.body, &def, &out.rest));
-    REFUSES_RESULT_SIZES(sinew_rest_state_report, sizeof(sinew_rest_state_report), rest,
-                         sinew_body_rest_state(the.world, the.body, &good, &out.rest));
+    MUST(sinew_equilibrium_def_init(&good, sizeof good));
+    REFUSED(INVALID, "def", sinew_equilibrium_def_init(NULL, sizeof good));
+    REFUSES_SIZES(sinew_equilibrium_def, sizeof(sinew_equilibrium_def), (void)0,
+                  sinew_equilibrium_def_init(&out.rest_def, size));
+    REFUSES_NO_BODY(sinew_body_solve_equilibrium(world, body, &good, &out.rest));
+    REFUSES_NO_BODY(sinew_body_solve_equilibrium(world, body, NULL, NULL));
+    REFUSES_SIZES(sinew_equilibrium_def, sizeof(sinew_equilibrium_def), sinew_equilibrium_def def = good; def.struct_size = size,
+                  sinew_body_solve_equilibrium(the.world, the.body, &def, &out.rest));
+    REFUSES_RESULT_SIZES(sinew_equilibrium_report, sizeof(sinew_equilibrium_report), rest,
+                         sinew_body_solve_equilibrium(the.world, the.body, &good, &out.rest));
     for (i = 0; i < OR_NEGATIVE; i++) {
-        sinew_rest_state_def def = good;
+        sinew_equilibrium_def def = good;
         def.tolerance = bad[i];
-        REFUSED(INVALID, "tolerance", sinew_body_rest_state(the.world, the.body, &def, &out.rest));
+        REFUSED(INVALID, "tolerance", sinew_body_solve_equilibrium(the.world, the.body, &def, &out.rest));
     }
 }
 
@@ -496,7 +495,6 @@ static void tool_definitions(void)
                   sinew_tool_create(the.world, &def, &out.tool));
     TOOL(SPHERE, INVALID, "reserved0", def.reserved0 = 1);
     TOOL(SPHERE, INVALID, "reserved", def.reserved = 1);
-    TOOL(BOX, INVALID, "reserved1", def.reserved1 = 1);
     TOOL(BOX, INVALID, "half_extents[0] is 0", def.half_extents[0] = 0.0f);
     TOOL(BOX, INVALID, "half_extents[1] is -1", def.half_extents[1] = -1.0f);
     TOOL(BOX, INVALID, "half_extents[2] is 10000000000", def.half_extents[2] = 1e10f);

@@ -42,8 +42,8 @@ static struct outputs {
     sinew_storage_report storage;
     sinew_solver_report solver;
     sinew_enclosed_report enclosed;
-    sinew_rest_state_def rest_def;
-    sinew_rest_state_report rest;
+    sinew_equilibrium_def rest_def;
+    sinew_equilibrium_report rest;
     sinew_mesh *mesh;
     sinew_mesh_view mesh_view;
     sinew_surface_point surface_point;
@@ -54,6 +54,7 @@ static struct outputs {
     sinew_strain strain;
     sinew_attachment_id attachments[2];
     sinew_suture_def suture_def;
+    sinew_attachment_def attachment_def;
     sinew_suture_report suture;
     sinew_contact contacts[2];
     sinew_contact_change changes[2];

@@ -170,13 +170,13 @@ static void rigid_bodies(void)
 static void results(void)
 {
     REFUSES_NO_TOOL(sinew_tool_get_contacts(world, tool, out.contacts, 2, &out.count));
-    REFUSED(INVALID, "contacts", sinew_tool_get_contacts(the.world, the.tool, NULL, 2, &out.count));
-    REFUSED(INVALID, "contacts", sinew_tool_get_contacts(the.world, the.tool, out.contacts, SIZE_MAX, &out.count));
-    REFUSED(INVALID, "count", sinew_tool_get_contacts(the.world, the.tool, out.contacts, 2, NULL));
+    REFUSED(INVALID, "out_contacts", sinew_tool_get_contacts(the.world, the.tool, NULL, 2, &out.count));
+    REFUSED(INVALID, "out_contacts", sinew_tool_get_contacts(the.world, the.tool, out.contacts, SIZE_MAX, &out.count));
+    REFUSED(INVALID, "out_count", sinew_tool_get_contacts(the.world, the.tool, out.contacts, 2, NULL));
     REFUSED(INVALID, "world", sinew_world_get_contact_changes(NULL, out.changes, 2, &out.count));
-    REFUSED(INVALID, "changes", sinew_world_get_contact_changes(the.world, NULL, 2, &out.count));
-    REFUSED(INVALID, "changes", sinew_world_get_contact_changes(the.world, out.changes, SIZE_MAX, &out.count));
-    REFUSED(INVALID, "count", sinew_world_get_contact_changes(the.world, out.changes, 2, NULL));
+    REFUSED(INVALID, "out_changes", sinew_world_get_contact_changes(the.world, NULL, 2, &out.count));
+    REFUSED(INVALID, "out_changes", sinew_world_get_contact_changes(the.world, out.changes, SIZE_MAX, &out.count));
+    REFUSED(INVALID, "out_count", sinew_world_get_contact_changes(the.world, out.changes, 2, NULL));
     REFUSES_NO_TOOL(sinew_tool_get_pose(world, tool, out.position, out.orientation));
     REFUSES_NO_BODY(sinew_body_is_closed(world, body, &out.closed));
     rigid_bodies();

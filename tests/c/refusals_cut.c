@@ -10,7 +10,7 @@ static void cuts(void)
     REFUSED(INVALID, "start", sinew_body_cut(the.world, the.body, NULL, end, NULL));
     REFUSED(INVALID, "end", sinew_body_cut(the.world, the.body, start, NULL, NULL));
     small.struct_size = 1;
-    REFUSED(INVALID, "report", sinew_body_cut(the.world, the.body, start, end, &small));
+    REFUSED(INVALID, "out_report", sinew_body_cut(the.world, the.body, start, end, &small));
     REFUSED(UNSUPPORTED, "spare_nodes", sinew_body_cut(the.world, the.body, start, end, NULL));
 }
 
@@ -26,7 +26,7 @@ static void reports(void)
     REFUSES_NO_BODY(sinew_body_get_triangles(world, body, &triangles));
     REFUSED(INVALID, "out", sinew_body_get_triangles(the.world, the.body, NULL));
     REFUSES_NO_BODY(sinew_body_get_pieces(world, body, pieces, 9, &count));
-    REFUSED(INVALID, "pieces", sinew_body_get_pieces(the.world, the.body, pieces, 8, &count));
+    REFUSED(INVALID, "out_pieces", sinew_body_get_pieces(the.world, the.body, pieces, 8, &count));
     REFUSES_NO_BODY(sinew_body_get_node_mass(world, body, 0, &out.force[0]));
     REFUSED(INVALID, "node", sinew_body_get_node_mass(the.world, the.body, 9, &out.force[0]));
     REFUSED(INVALID, "out", sinew_body_get_node_mass(the.world, the.body, 0, NULL));

@@ -64,12 +64,16 @@ static void calls(void)
     REFUSED(INVALID, "out", sinew_body_get_tear_report(the.world, the.body, NULL));
     report.struct_size = 1;
     REFUSED(INVALID, "out", sinew_body_get_tear_report(the.world, the.body, &report));
-    REFUSES_NO_BODY(sinew_body_set_tear_limits(world, body, joined, 1, numbers, NULL));
-    REFUSED(UNSUPPORTED, "most_tears", sinew_body_set_tear_limits(the.world, the.body, joined, 1, numbers, NULL));
-    REFUSED(INVALID, "pairs", sinew_body_set_tear_limits(the.world, the.body, NULL, 1, numbers, NULL));
-    REFUSED(INVALID, "pairs[0]", sinew_body_set_tear_limits(the.world, the.body, apart, 1, numbers, NULL));
-    REFUSED(INVALID, "strains[0]", sinew_body_set_tear_limits(the.world, the.body, joined, 1, bad, NULL));
-    REFUSED(INVALID, "forces[0]", sinew_body_set_tear_limits(the.world, the.body, joined, 1, NULL, bad));
+    REFUSES_NO_BODY(sinew_body_get_tear_limits(world, body, joined, 1, out.numbers[0], NULL));
+    REFUSED(UNSUPPORTED, "most_tears", sinew_body_get_tear_limits(the.world, the.body, joined, 1, out.numbers[0], NULL));
+    REFUSED(INVALID, "pairs", sinew_body_get_tear_limits(the.world, the.body, NULL, 1, NULL, out.numbers[0]));
+    REFUSED(INVALID, "pairs[0]", sinew_body_get_tear_limits(the.world, the.body, apart, 1, NULL, out.numbers[0]));
+    REFUSES_NO_BODY(sinew_body_set_tear_limits(world, body, joined, numbers, NULL, 1));
+    REFUSED(UNSUPPORTED, "most_tears", sinew_body_set_tear_limits(the.world, the.body, joined, numbers, NULL, 1));
+    REFUSED(INVALID, "pairs", sinew_body_set_tear_limits(the.world, the.body, NULL, numbers, NULL, 1));
+    REFUSED(INVALID, "pairs[0]", sinew_body_set_tear_limits(the.world, the.body, apart, numbers, NULL, 1));
+    REFUSED(INVALID, "strains[0]", sinew_body_set_tear_limits(the.world, the.body, joined, bad, NULL, 1));
+    REFUSED(INVALID, "forces[0]", sinew_body_set_tear_limits(the.world, the.body, joined, NULL, bad, 1));
 }
 
 int main(void)

@@ -12,25 +12,25 @@ static void springs(void)
     const uint32_t two[] = {0, 1, 0, 8};
     int i;
     REFUSES_NO_BODY(sinew_body_get_spring_pairs(world, body, out.pairs, 1));
-    REFUSED(INVALID, "pairs", sinew_body_get_spring_pairs(the.world, the.body, out.pairs, 1));
-    REFUSED(INVALID, "pairs", sinew_body_get_spring_pairs(the.world, the.body, NULL, 16));
+    REFUSED(INVALID, "out_pairs", sinew_body_get_spring_pairs(the.world, the.body, out.pairs, 1));
+    REFUSED(INVALID, "out_pairs", sinew_body_get_spring_pairs(the.world, the.body, NULL, 16));
     REFUSES_NO_BODY(sinew_body_get_springs(world, body, joined, 1, out.numbers[0], out.numbers[1]));
     REFUSED(INVALID, "pairs", sinew_body_get_springs(the.world, the.body, NULL, 1, out.numbers[0], out.numbers[1]));
-    REFUSES_NO_BODY(sinew_body_set_springs(world, body, joined, 1, numbers, numbers));
-    REFUSED(INVALID, "pairs", sinew_body_set_springs(the.world, the.body, NULL, 1, numbers, numbers));
+    REFUSES_NO_BODY(sinew_body_set_springs(world, body, joined, numbers, numbers, 1));
+    REFUSED(INVALID, "pairs", sinew_body_set_springs(the.world, the.body, NULL, numbers, numbers, 1));
     REFUSES_NO_BODY(sinew_body_get_spring_strains(world, body, joined, numbers, 1, out.numbers[0]));
-    REFUSED(INVALID, "strains", sinew_body_get_spring_strains(the.world, the.body, joined, numbers, 1, NULL));
+    REFUSED(INVALID, "out_strains", sinew_body_get_spring_strains(the.world, the.body, joined, numbers, 1, NULL));
     REFUSED(INVALID, "pairs[0]", sinew_body_get_spring_strains(the.world, the.body, beyond, numbers, 1, out.numbers[0]));
     for (i = 0; i < 3; i++) {
         REFUSED(INVALID, "pairs[0]", sinew_body_get_springs(the.world, the.body, bad_pairs[i], 1, out.numbers[0], NULL));
-        REFUSED(INVALID, "pairs[0]", sinew_body_set_springs(the.world, the.body, bad_pairs[i], 1, numbers, NULL));
+        REFUSED(INVALID, "pairs[0]", sinew_body_set_springs(the.world, the.body, bad_pairs[i], numbers, NULL, 1));
         REFUSED(INVALID, "pairs[0]", sinew_body_get_spring_strains(the.world, the.body, bad_pairs[i], NULL, 1, out.numbers[0]));
     }
-    REFUSED(INVALID, "pairs[1]", sinew_body_set_springs(the.world, the.body, two, 2, numbers, numbers));
+    REFUSED(INVALID, "pairs[1]", sinew_body_set_springs(the.world, the.body, two, numbers, numbers, 2));
     REFUSED(INVALID, "pairs[1]", sinew_body_get_springs(the.world, the.body, two, 2, out.numbers[0], out.numbers[1]));
     for (i = 0; i < OR_NEGATIVE; i++) {
-        REFUSED(INVALID, "stiffnesses[0]", sinew_body_set_springs(the.world, the.body, joined, 1, &bad[i], numbers));
-        REFUSED(INVALID, "rest_lengths[0]", sinew_body_set_springs(the.world, the.body, joined, 1, numbers, &bad[i]));
+        REFUSED(INVALID, "stiffnesses[0]", sinew_body_set_springs(the.world, the.body, joined, &bad[i], numbers, 1));
+        REFUSED(INVALID, "rest_lengths[0]", sinew_body_set_springs(the.world, the.body, joined, numbers, &bad[i], 1));
         REFUSED(INVALID, "rest_lengths[0]", sinew_body_get_spring_strains(the.world, the.body, joined, &bad[i], 1, out.numbers[0]));
     }
 }
@@ -59,19 +59,19 @@ static void strains(void)
     REFUSED(INVALID, "triangles", sinew_body_get_triangle_strains(the.world, the.body, rest, 9, NULL, 1, &out.strain));
     REFUSED(INVALID, "triangles[0]", sinew_body_get_triangle_strains(the.world, the.body, rest, 9, twice, 1, &out.strain));
     REFUSED(INVALID, "triangles[0]", sinew_body_get_triangle_strains(the.world, the.body, rest, 9, outside + 1, 1, &out.strain));
-    REFUSED(INVALID, "strains", sinew_body_get_triangle_strains(the.world, the.body, rest, 9, corners, 1, NULL));
+    REFUSED(INVALID, "out_strains", sinew_body_get_triangle_strains(the.world, the.body, rest, 9, corners, 1, NULL));
     REFUSED(INVALID, "rest_positions[2]", sinew_body_get_tetrahedron_strains(
         the.world, the.body, spoiled(rest, 27, 7, NAN), 9, corners, 1, &out.strain));
     REFUSED(INVALID, "tetrahedra[0]", sinew_body_get_tetrahedron_strains(the.world, the.body, rest, 9, twice, 1, &out.strain));
     REFUSED(INVALID, "tetrahedra[0]", sinew_body_get_tetrahedron_strains(the.world, the.body, rest, 9, outside, 1, &out.strain));
-    REFUSED(INVALID, "strains", sinew_body_get_tetrahedron_strains(the.world, the.body, rest, 9, corners, 1, NULL));
-    REFUSED(INVALID, "corners", sinew_mean_at_nodes(corners, 1, numbers, 1, out.numbers[0], 9));
-    REFUSED(INVALID, "corners", sinew_mean_at_nodes(corners, 5, numbers, 1, out.numbers[0], 9));
-    REFUSED(INVALID, "elements", sinew_mean_at_nodes(NULL, 4, numbers, 1, out.numbers[0], 9));
-    REFUSED(INVALID, "elements[0]", sinew_mean_at_nodes(outside, 4, numbers, 1, out.numbers[0], 9));
-    REFUSED(INVALID, "values", sinew_mean_at_nodes(corners, 4, NULL, 1, out.numbers[0], 9));
-    REFUSED(INVALID, "values[0]", sinew_mean_at_nodes(corners, 4, bad, 1, out.numbers[0], 9));
-    REFUSED(INVALID, "means", sinew_mean_at_nodes(corners, 4, numbers, 1, NULL, 9));
+    REFUSED(INVALID, "out_strains", sinew_body_get_tetrahedron_strains(the.world, the.body, rest, 9, corners, 1, NULL));
+    REFUSED(INVALID, "corners", sinew_util_average_to_nodes(corners, 1, numbers, 1, out.numbers[0], 9));
+    REFUSED(INVALID, "corners", sinew_util_average_to_nodes(corners, 5, numbers, 1, out.numbers[0], 9));
+    REFUSED(INVALID, "elements", sinew_util_average_to_nodes(NULL, 4, numbers, 1, out.numbers[0], 9));
+    REFUSED(INVALID, "elements[0]", sinew_util_average_to_nodes(outside, 4, numbers, 1, out.numbers[0], 9));
+    REFUSED(INVALID, "values", sinew_util_average_to_nodes(corners, 4, NULL, 1, out.numbers[0], 9));
+    REFUSED(INVALID, "values[0]", sinew_util_average_to_nodes(corners, 4, bad, 1, out.numbers[0], 9));
+    REFUSED(INVALID, "out_means", sinew_util_average_to_nodes(corners, 4, numbers, 1, NULL, 9));
 }
 
 static sinew_body_values good_values(void)
@@ -102,7 +102,6 @@ static void pictures(void)
     VALUES(INVALID, "values", values.node_count = 8);
     VALUES(INVALID, "values[1]", values.values = spoiled(numbers, 9, 1, INFINITY));
     VALUES(INVALID, "colours", values.colours = 2);
-    VALUES(INVALID, "reserved", values.reserved = 1);
     VALUES(INVALID, "low", values.low = 1);
     for (i = 0; i < NOT_FINITE; i++) {
         VALUES(INVALID, "low", values.low = bad[i]);

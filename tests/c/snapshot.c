@@ -86,7 +86,7 @@ static void compare(const sinew_world *a, const sinew_world *b)
 static sinew_world *undo(sinew_world *world, const unsigned char *bytes, size_t size)
 {
     sinew_world *before = NULL;
-    MUST(sinew_world_load_snapshot(bytes, size, 1, NULL, NULL, &before)); /* one thread, no job system */
+    MUST(sinew_world_load_snapshot(bytes, size, NULL, &before)); /* one thread, no job system */
     sinew_world_destroy(world);
     return before;
 }
@@ -104,6 +104,7 @@ static unsigned char *save(const sinew_world *world, size_t *size)
 int main(void)
 {
     sinew_world *world = a_scene(), *twin = NULL, *untouched = NULL;
+    sinew_world_def def;
     unsigned char *bytes = NULL, *again;
     size_t size = 0, size_again = 0, at;
     int number;
@@ -111,7 +112,9 @@ int main(void)
         if (number == SAVED) {
             bytes = save(world, &size);
             CHECK(bytes != NULL);
-            MUST(sinew_world_load_snapshot(bytes, size, 2, NULL, NULL, &twin));
+            MUST(sinew_world_def_init(&def, sizeof def));
+            def.thread_count = 2;
+            MUST(sinew_world_load_snapshot(bytes, size, &def, &twin));
             compare(world, twin);
         }
         step(world, number);
@@ -129,17 +132,18 @@ int main(void)
     CHECK(memcmp(again, again + size_again, size_again) == 0);
 
     refused(sinew_world_save_snapshot(world, again, size_again - 1), SINEW_STATUS_INVALID_ARGUMENT, "size is");
-    refused(sinew_world_save_snapshot(world, NULL, size_again), SINEW_STATUS_INVALID_ARGUMENT, "bytes");
+    refused(sinew_world_save_snapshot(world, NULL, size_again), SINEW_STATUS_INVALID_ARGUMENT, "out_bytes");
     refused(sinew_world_save_snapshot(NULL, again, size_again), SINEW_STATUS_INVALID_ARGUMENT, "world");
     refused(sinew_world_get_snapshot_size(world, NULL), SINEW_STATUS_INVALID_ARGUMENT, "out");
-    refused(sinew_world_load_snapshot(NULL, 4, 1, NULL, NULL, &untouched), SINEW_STATUS_INVALID_ARGUMENT, "bytes");
-    refused(sinew_world_load_snapshot(bytes, size, 1, NULL, NULL, NULL), SINEW_STATUS_INVALID_ARGUMENT, "out");
-    refused(sinew_world_load_snapshot(bytes, size, 1000, NULL, NULL, &untouched), SINEW_STATUS_INVALID_ARGUMENT, "thread_count");
-    refused(sinew_world_load_snapshot(bytes, size - 1, 1, NULL, NULL, &untouched), SINEW_STATUS_INVALID_ARGUMENT, "size is");
-    refused(sinew_world_load_snapshot(bytes, 0, 1, NULL, NULL, &untouched), SINEW_STATUS_INVALID_ARGUMENT, "header");
+    refused(sinew_world_load_snapshot(NULL, 4, NULL, &untouched), SINEW_STATUS_INVALID_ARGUMENT, "bytes");
+    refused(sinew_world_load_snapshot(bytes, size, NULL, NULL), SINEW_STATUS_INVALID_ARGUMENT, "out");
+    def.thread_count = 1000;
+    refused(sinew_world_load_snapshot(bytes, size, &def, &untouched), SINEW_STATUS_INVALID_ARGUMENT, "thread_count");
+    refused(sinew_world_load_snapshot(bytes, size - 1, NULL, &untouched), SINEW_STATUS_INVALID_ARGUMENT, "size is");
+    refused(sinew_world_load_snapshot(bytes, 0, NULL, &untouched), SINEW_STATUS_INVALID_ARGUMENT, "header");
     for (at = 0; at < size; at += 1 + size / 500) {
         bytes[at] ^= 16;
-        CHECK(sinew_world_load_snapshot(bytes, size, 1, NULL, NULL, &untouched) != SINEW_STATUS_OK);
+        CHECK(sinew_world_load_snapshot(bytes, size, NULL, &untouched) != SINEW_STATUS_OK);
         bytes[at] ^= 16;
     }
     CHECK(untouched == NULL);

@@ -103,6 +103,20 @@ int main(void)
         SIZES("out->struct_size", sinew_surface_point, point.struct_size, sinew_world_find_nearest(world, from, 2, &point));
     }
     {
+        sinew_world_def def;
+        sinew_world *twin;
+        uint8_t *bytes;
+        size_t size = 0;
+        MUST(sinew_world_get_snapshot_size(world, &size));
+        bytes = (uint8_t *)malloc(size);
+        CHECK(bytes != NULL);
+        MUST(sinew_world_save_snapshot(world, bytes, size));
+        MUST(sinew_world_def_init(&def, sizeof def));
+        SIZES("def->struct_size", sinew_world_def, def.struct_size, sinew_world_load_snapshot(bytes, size, &def, &twin));
+        sinew_world_destroy(twin);
+        free(bytes);
+    }
+    {
         sinew_profile profile;
         MUST(sinew_world_set_profiling(world, 1));
         SIZES("out->struct_size", sinew_profile, profile.struct_size, sinew_world_get_profile(world, &profile));
@@ -135,11 +149,30 @@ int main(void)
         sinew_embedding_destroy(embedding);
     }
     {
+        DEFINITION(attachment, def);
+        def.body = body;
+        def.other = other;
+        def.nodes = def.other_nodes = cells;
+        def.count = 1;
+        SIZES("def->struct_size", sinew_attachment_def, def.struct_size, sinew_attachment_create(world, &def, &suture));
+        MUST(sinew_attachment_release(world, suture));
+    }
+    {
         DEFINITION(suture, def);
         sinew_suture_report report;
+        sinew_surface_point point, other_point;
+        memset(&point, 0, sizeof point);
+        point.struct_size = sizeof point;
+        memcpy(point.weights, weights, sizeof weights);
+        other_point = point;
+        point.body = body;
+        other_point.body = other;
+        SIZES("point->struct_size", sinew_surface_point, point.struct_size,
+              sinew_suture_create(world, &point, &other_point, &def, &suture));
+        MUST(sinew_attachment_release(world, suture));
         SIZES("def->struct_size", sinew_suture_def, def.struct_size,
-              sinew_body_suture_points(world, body, 0, weights, other, 0, weights, &def, &suture));
-        SIZES("report->struct_size", sinew_suture_report, report.struct_size, sinew_suture_get_report(world, suture, &report));
+              sinew_suture_create(world, &point, &other_point, &def, &suture));
+        SIZES("out_report->struct_size", sinew_suture_report, report.struct_size, sinew_suture_get_report(world, suture, &report));
         MUST(sinew_attachment_release(world, suture));
     }
     {
@@ -149,7 +182,7 @@ int main(void)
         def.bodies[1] = other;
         def.pixel = 0.01f;
         SIZES("def->struct_size", sinew_detector_def, def.struct_size, sinew_detector_create(world, &def, &detector));
-        SIZES("report->struct_size", sinew_detector_report, report.struct_size, sinew_detector_find(detector, world, &report));
+        SIZES("out_report->struct_size", sinew_detector_report, report.struct_size, sinew_detector_find(detector, world, &report));
         sinew_detector_destroy(detector);
     }
     {
@@ -169,10 +202,10 @@ int main(void)
     }
     {
         DEFINITION(haptic, def);
-        sinew_haptic_result result;
+        sinew_haptic_report result;
         def.tool = tool;
         SIZES("def->struct_size", sinew_haptic_def, def.struct_size, sinew_haptic_create(world, &def, &haptic));
-        SIZES("out->struct_size", sinew_haptic_result, result.struct_size,
+        SIZES("out->struct_size", sinew_haptic_report, result.struct_size,
               sinew_haptic_tick(haptic, from, NULL, NULL, NULL, 1e-3f, &result));
         sinew_haptic_destroy(haptic);
     }
@@ -217,17 +250,17 @@ int main(void)
     }
     {
         static const uint32_t corners[4] = {0, 2, 6, 8};
-        DEFINITION(rest_state, def);
-        sinew_rest_state_report report;
+        DEFINITION(equilibrium, def);
+        sinew_equilibrium_report report;
         for (i = 0; i < 4; i++)
             MUST(sinew_body_pin(world, body, corners[i]));
-        SIZES("def->struct_size", sinew_rest_state_def, def.struct_size, sinew_body_rest_state(world, body, &def, NULL));
-        SIZES("report->struct_size", sinew_rest_state_report, report.struct_size, sinew_body_rest_state(world, body, NULL, &report));
+        SIZES("def->struct_size", sinew_equilibrium_def, def.struct_size, sinew_body_solve_equilibrium(world, body, &def, NULL));
+        SIZES("out_report->struct_size", sinew_equilibrium_report, report.struct_size, sinew_body_solve_equilibrium(world, body, NULL, &report));
     }
     {
         sinew_cut_report report;
         sinew_topology_changes changes;
-        SIZES("report->struct_size", sinew_cut_report, report.struct_size, sinew_body_cut(world, other, start, end, &report));
+        SIZES("out_report->struct_size", sinew_cut_report, report.struct_size, sinew_body_cut(world, other, start, end, &report));
         SIZES("out->struct_size", sinew_topology_changes, changes.struct_size,
               sinew_body_get_topology_changes(world, other, 0, &changes));
     }

@@ -90,12 +90,12 @@ static void springs(void)
         CHECK(stiffnesses[i] > 0 && lengths[i] > 0.4f * LENGTH);
         stiffnesses[i] *= 2, lengths[i] /= 1.25f;
     }
-    MUST(sinew_body_set_springs(world, body, pairs, count, stiffnesses, NULL));
-    MUST(sinew_body_set_springs(world, body, pairs, count, NULL, lengths));
+    MUST(sinew_body_set_springs(world, body, pairs, stiffnesses, NULL, count));
+    MUST(sinew_body_set_springs(world, body, pairs, NULL, lengths, count));
     MUST(sinew_body_get_spring_strains(world, body, pairs, NULL, count, strains));
     for (i = 0; i < count; i++)
         CHECK_NEAR(strains[i], 0.25, 1e-5);
-    MUST(sinew_mean_at_nodes(pairs, 2, strains, count, means, NODES));
+    MUST(sinew_util_average_to_nodes(pairs, 2, strains, count, means, NODES));
     for (i = 0; i < NODES; i++)
         CHECK_NEAR(means[i], 0.25, 1e-5);
     for (i = 0; i < count; i++)
