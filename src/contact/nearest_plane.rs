@@ -129,3 +129,45 @@ impl LastMet {
         found.filter(|closest| closest.distance <= within)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::cuboid;
+    use crate::def::Detection;
+    use crate::random::Random;
+
+    /// Edges and faces wander about a box: what is kept of them misses nothing that is found anew, and is as far away.
+    #[test]
+    fn what_is_kept_is_what_would_be_found() {
+        let (positions, triangles) = cuboid::surface(Vec3::splat(0.01));
+        let solid = MeshSolid::shared(&positions, &triangles, Detection::Exact, 0.0).expect("a box");
+        let (within, mut random) = (1e-3, Random(5));
+        let (mut compared, mut kept_count) = (0, 0);
+        for count in [2, 3] {
+            for _ in 0..300 {
+                let start = random.vector() * 0.013;
+                let mut corners = [0, 1, 2].map(|_| start + random.vector() * 0.004);
+                let (drift, mut last) = (random.vector() * 4e-6, LastMet::NONE);
+                for _ in 0..100 {
+                    corners = corners.map(|corner| corner + drift + random.vector() * 2e-6);
+                    let corners = &corners[..count];
+                    let found = solid.closest(corners, within, false).filter(|found| found.inside);
+                    let before = last.points;
+                    let kept = last.closest((0, &solid), corners, within, false);
+                    kept_count += usize::from(last.points == before);
+                    let Some(found) = found else { continue };
+                    let Some(kept) = kept else {
+                        panic!("{corners:?}: {found:?} is missed");
+                    };
+                    if kept.inside {
+                        compared += 1;
+                        let off = (kept.distance - found.distance).abs();
+                        assert!(off <= TOUCHING * solid.flat(), "{corners:?}: {kept:?}, {found:?}");
+                    }
+                }
+            }
+        }
+        assert!(compared > 1000 && kept_count > compared, "{compared}, {kept_count}");
+    }
+}
