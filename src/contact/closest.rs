@@ -2,8 +2,6 @@
 
 use glam::Vec3;
 
-use crate::codec::saved;
-
 /// The closest that a node, edge or face comes to a solid.
 ///
 /// Nodes, edges and faces each answer for what is between their ends: an edge or a face that is closest at its border says so, and a smaller
@@ -19,5 +17,3 @@ pub(crate) struct Closest {
     /// Whether the feature's point lies within it, and not at its border, where a smaller feature is met instead.
     pub inside: bool,
 }
-
-saved! { Closest { weights, distance, normal, inside } }
