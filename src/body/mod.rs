@@ -49,7 +49,7 @@ pub use tune::SpringState;
 
 use crate::base::{BodyId, Error, Result, memory};
 use crate::codec::saved;
-use crate::contact::{Contact, Contacts, ToolPath};
+use crate::contact::{Contact, Contacts, ToolPath, ToolPlaces};
 use crate::cutting::CutMaterial;
 use crate::forces::Forces;
 use crate::material::Made;
@@ -109,8 +109,8 @@ impl Systems for Slots<Body> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Needs {
     pub tolerance: bool,
-    /// 0: no contacts.
-    pub tools: usize,
+    /// None: no contacts.
+    pub tools: Option<ToolPlaces>,
     pub kernel: ChosenKernel,
     pub steps: Steps,
 }
@@ -196,8 +196,8 @@ impl Body {
         };
         body.place(definition.positions);
         body.system.make_solver(definition)?;
-        if needs.tools > 0 {
-            body.make_contacts(needs.tools)?;
+        if let Some(tools) = needs.tools {
+            body.make_contacts(tools)?;
         }
         body.system.make_sleeper(definition.sleep)?;
         if definition.spare_nodes > 0 {
@@ -293,7 +293,7 @@ impl Body {
         self.system.solver_report()
     }
 
-    pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {
+    pub(crate) fn make_contacts(&mut self, tools: ToolPlaces) -> Result<()> {
         match &mut self.system.contacts {
             Some(contacts) => contacts.reserve(tools)?,
             None => {

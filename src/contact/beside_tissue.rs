@@ -29,10 +29,11 @@ impl Contacts {
 
     /// One sweep over the contacts, on the velocities of the substep: the most that one of them changed, m/s.
     pub(crate) fn sweep(&mut self, velocities: &mut Vectors, sweep: Sweep) -> f32 {
+        let of_nodes = self.nodes.sweep(velocities, sweep);
         if self.constraints.is_empty() {
-            self.nodes.sweep(velocities, sweep)
+            of_nodes
         } else {
-            self.presses.sweep(velocities, sweep)
+            of_nodes.max(self.presses.sweep(velocities, sweep))
         }
     }
 

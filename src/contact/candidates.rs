@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::features::{Feature, Features};
 use super::mesh_solid::MeshSolid;
+use super::nearest_plane::{LastMet, NearestPlane};
 use super::path::ToolPath;
 use super::room::{Room, sides_of};
 use super::sweep::Corners;
@@ -36,12 +37,16 @@ pub(super) struct Candidates {
     /// How far nodes might move since the list was made, m, and where they were then; below 0: it is not known.
     whole_slack: f32,
     firsts: Vectors,
-    /// The corners of what is near, each once; none where only planes are.
+    /// The corners of what is near, each once, and those of edges and faces first; none where only planes are.
     corners: Vec<Corner>,
-    /// Of each node, while the list is made, the closest point of the meshes that it may meet.
+    /// How many are those of edges and faces.
+    shared: usize,
+    /// Of each node, as the list was made, the closest point of the meshes that it may meet.
     surface: Vec<NearestPlane>,
     /// The same for the nodes of the list, as it was found last.
     pub planes: Vec<NearestPlane>,
+    /// How the edges and faces of the list met a mesh last, those behind its nodes; none where no mesh is near.
+    pub met: Vec<LastMet>,
     /// No edge of what is near can be longer while the list is good, m.
     longest: f32,
     /// Of each node, while the list is made, on which sides of all that the zones reach it is, a bit for each; then, of those that are
@@ -50,32 +55,8 @@ pub(super) struct Candidates {
 }
 
 saved! { Candidates {
-    near, masks, zones, slack, reach, whole_slack, firsts, corners, longest, surface, planes, marks,
+    near, masks, zones, slack, reach, whole_slack, firsts, corners, shared, longest, surface, planes, met, marks,
 } }
-
-/// The plane through the point of a mesh that is closest to a node, across the way to it, in the mesh's own frame: as the mesh is seen from
-/// near by.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct NearestPlane {
-    /// The tool's place in the world; [`NearestPlane::NONE`]: nothing is known.
-    pub slot: u32,
-    /// Where the node was.
-    pub point: Vec3,
-    /// How far the mesh is, m, below 0 inside; where there is no normal, at least so far.
-    pub distance: f32,
-    pub normal: Vec3,
-}
-
-saved! { NearestPlane { slot, point, distance, normal } }
-
-impl NearestPlane {
-    pub const NONE: Self = Self {
-        slot: u32::MAX,
-        point: Vec3::ZERO,
-        distance: f32::INFINITY,
-        normal: Vec3::ZERO,
-    };
-}
 
 /// A corner of what is near, over a slice.
 #[derive(Clone, Copy, Debug)]
@@ -102,8 +83,10 @@ impl Candidates {
             whole_slack: -1.0,
             firsts: Vectors::zeros(features.node_count as usize)?,
             longest: 0.0,
-            surface: memory::filled(NearestPlane::NONE, features.node_count as usize)?,
-            planes: memory::reserved(features.node_count as usize)?,
+            shared: 0,
+            surface: Vec::new(),
+            planes: Vec::new(),
+            met: Vec::new(),
             corners: memory::reserved(features.node_count as usize)?,
             marks: memory::filled(0, features.node_count as usize)?,
         })
@@ -114,15 +97,35 @@ impl Candidates {
         memory::reserve(&mut self.near, count)?;
         memory::reserve(&mut self.masks, count)?;
         self.corners.try_reserve(nodes.saturating_sub(self.corners.len()))?;
+        if !self.surface.is_empty() {
+            self.reserve_met(count, nodes)?;
+        }
+        Ok(self.marks.try_reserve(nodes.saturating_sub(self.marks.len()))?)
+    }
+
+    /// Makes room for how these features meet meshes.
+    pub fn reserve_meshes(&mut self, features: &Features) -> Result<()> {
+        let nodes = features.node_count as usize;
+        self.reserve_met(features.count(), nodes)?;
+        self.surface.resize(nodes, NearestPlane::NONE);
+        Ok(())
+    }
+
+    fn reserve_met(&mut self, count: usize, nodes: usize) -> Result<()> {
         memory::reserve(&mut self.surface, nodes)?;
         memory::reserve(&mut self.planes, nodes)?;
-        Ok(self.marks.try_reserve(nodes.saturating_sub(self.marks.len()))?)
+        memory::reserve(&mut self.met, count - nodes)
     }
 
     /// Makes room for `tools` tools.
     pub fn reserve(&mut self, tools: usize) -> Result<()> {
         self.zones.try_reserve(tools.saturating_sub(self.zones.len()))?;
         Ok(())
+    }
+
+    /// How many of what is near are nodes, which come first.
+    pub fn node_count(&self, features: &Features) -> usize {
+        self.near.partition_point(|&index| index < features.node_count)
     }
 
     pub fn near(&self) -> &[u32] {
@@ -133,6 +136,14 @@ impl Candidates {
     pub fn invalidate(&mut self) {
         self.slack = -1.0;
         self.whole_slack = -1.0;
+    }
+
+    /// A tool is gone, and another may come to its place.
+    pub fn forget_tool(&mut self, slot: usize) {
+        let planes = self.surface.iter_mut().chain(&mut self.planes);
+        let planes = planes.filter(|plane| plane.slot as usize == slot);
+        planes.for_each(|plane| *plane = NearestPlane::NONE);
+        self.invalidate();
     }
 
     /// Whether the list is good for these tools on their ways and a body with this filter.
@@ -176,6 +187,9 @@ impl Candidates {
         origin: DVec3,
         [margin, slack]: [f32; 2],
     ) {
+        for (&node, plane) in self.near.iter().zip(&self.planes) {
+            self.surface[node as usize] = *plane;
+        }
         self.near.clear();
         self.masks.clear();
         self.corners.clear();
@@ -232,7 +246,10 @@ impl Candidates {
             let within = reach + 2.0 * edges.fold(0.0, f32::max);
             measure_nodes(&mut self.surface, (positions, bindings), meshes(), within);
         }
+        // What was found where a node was nearly is not looked for again.
+        let flat = meshes().map(|(_, solid)| solid.flat()).fold(0.0, f32::max);
         self.planes.clear();
+        self.met.clear();
         for index in 0..count as u32 {
             let Some(feature) = features.get(index) else {
                 continue;
@@ -255,15 +272,17 @@ impl Candidates {
                     && tool.radius().is_none_or(|radius| sags(corners.len(), length, radius))
                     && (tool.mesh().is_none() || !has_meshes)
             };
-            let of_meshes = has_meshes && meets_mesh(&self.surface, (feature, length), corners, meshes(), reach);
+            let of_meshes = has_meshes && meets_mesh(&self.surface, (feature, length), corners, meshes(), reach + flat);
             let mask = self.zones.iter().zip(tools.clone()).enumerate();
             let mask = mask.filter(|&(_, (zone, tool))| of_meshes && tool.mesh().is_some() || meets((zone, tool)));
             let mask = mask.fold(0, |mask, (place, _)| mask | zone_bit(place));
             if mask != 0 {
                 self.near.push(index);
                 self.masks.push(mask);
-                if corners.len() == 1 {
+                if has_meshes && corners.len() == 1 {
                     self.planes.push(self.surface[index as usize]);
+                } else if has_meshes {
+                    self.met.push(LastMet::NONE);
                 }
             }
         }
@@ -276,12 +295,15 @@ impl Candidates {
             near, corners, marks, ..
         } = self;
         corners.clear();
+        self.shared = 0;
         if !self.zones.iter().any(Zone::is_bounded) {
             return;
         }
-        let features = || near.iter().filter_map(|&index| features.get(index));
+        let nodes = near.partition_point(|&index| index < features.node_count);
+        let (nodes, shared) = near.split_at(nodes);
+        let edges_first = || shared.iter().chain(nodes).filter_map(|&index| features.get(index));
         let mut longest = 0.0_f32;
-        for feature in features() {
+        for feature in edges_first() {
             feature
                 .nodes()
                 .iter()
@@ -292,7 +314,7 @@ impl Candidates {
                 longest = edges.fold(longest, f32::max);
             }
         }
-        for feature in features() {
+        for feature in edges_first() {
             for &node in feature.nodes() {
                 let mark = &mut marks[node as usize];
                 if *mark == NOT_LISTED {
@@ -305,14 +327,19 @@ impl Candidates {
                     });
                 }
             }
+            if feature.nodes().len() > 1 {
+                self.shared = corners.len();
+            }
         }
         // Both of its ends may move.
         self.longest = longest.sqrt() + 2.0 * self.reach;
     }
 
-    /// Sees where in a slice the corners of what is near start and how far they go, and on which sides of the room they stay.
-    pub fn see_corners(&mut self, room: &Room, way_of: impl Fn(usize) -> (Vec3, Vec3)) {
-        for corner in &mut self.corners {
+    /// Sees where in a slice the corners of what is near, or only those of edges and faces, start and how far they go, and on which sides of the room
+    /// they stay.
+    pub fn see_corners(&mut self, room: &Room, only_shared: bool, way_of: impl Fn(usize) -> (Vec3, Vec3)) {
+        let count = if only_shared { self.shared } else { self.corners.len() };
+        for corner in &mut self.corners[..count] {
             (corner.start, corner.step) = way_of(corner.node as usize);
             corner.sides = room.sides(corner.start, corner.step, self.longest);
         }
@@ -374,8 +401,12 @@ impl Candidates {
     ) {
         self.whole_slack = -1.0;
         self.marks.resize(features.node_count as usize, 0);
-        self.surface.resize(features.node_count as usize, NearestPlane::NONE);
+        let has_meshes = !self.surface.is_empty();
+        if has_meshes {
+            self.surface.resize(features.node_count as usize, NearestPlane::NONE);
+        }
         self.planes.clear();
+        self.met.clear();
         if self.slack < 0.0 {
             return;
         }
@@ -403,8 +434,11 @@ impl Candidates {
             self.zones.iter().any(meets) && self.near.binary_search(&index).is_err()
         });
         memory::merge(&mut self.near, fresh, |&index| index);
-        let nodes = self.near.partition_point(|&index| index < features.node_count);
-        self.planes.resize(nodes, NearestPlane::NONE);
+        let nodes = self.node_count(features);
+        if has_meshes {
+            self.planes.resize(nodes, NearestPlane::NONE);
+            self.met.resize(self.near.len() - nodes, LastMet::NONE);
+        }
         self.masks.clear();
         self.masks.resize(self.near.len(), !0);
         self.list_corners(features, (positions, Some(bindings)));
@@ -442,15 +476,17 @@ pub(super) fn longest_edge(corners: &[Vec3]) -> f32 {
     (0..corners.len()).flat_map(from).fold(0.0, f32::max).sqrt()
 }
 
-/// Finds the point of the meshes that is closest to each node, where that is no further than `within` and what the mesh may move.
+/// Finds the point of the meshes that is closest to each node, where that is no further than `within` and what the mesh may move. Of a mesh alone it is
+/// known already where a node has hardly moved.
 fn measure_nodes<'a>(
     surface: &mut [NearestPlane],
     (positions, bindings): (&Vectors, Option<&Bindings>),
     meshes: impl Iterator<Item = (&'a Zone, &'a MeshSolid)> + Clone,
     within: f32,
 ) {
+    let is_one = meshes.clone().nth(1).is_none();
     for (node, nearest) in surface.iter_mut().enumerate() {
-        *nearest = NearestPlane::NONE;
+        let mut last = std::mem::replace(nearest, NearestPlane::NONE);
         let place = match bindings {
             None => positions.get(node),
             Some(bindings) => bindings.vector(positions, node),
@@ -469,6 +505,10 @@ fn measure_nodes<'a>(
                 continue;
             }
             let point = standing.own(place);
+            if is_one && last.serves(slot, point, [solid.flat(), within + allowance]) {
+                *nearest = last;
+                continue;
+            }
             let reach = (within + allowance).min(nearest.distance);
             if let Some(closest) = solid.closest(&[point], reach, false) {
                 *nearest = NearestPlane {
@@ -477,6 +517,8 @@ fn measure_nodes<'a>(
                     distance: closest.distance,
                     normal: closest.normal,
                 };
+            } else if is_one {
+                *nearest = NearestPlane::beyond(slot, point, reach);
             }
         }
     }

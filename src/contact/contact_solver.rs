@@ -15,9 +15,13 @@ impl Contacts {
             self.solve_nodes(meeting, slice);
             return;
         }
-        // Edges and faces share nodes: all contacts are solved together.
+        // Edges and faces share nodes: all their contacts are solved together. The other nodes answer each by itself.
+        self.presses.list_nodes(&self.constraints);
         for index in 0..self.nodes.len() {
             let contact = *self.nodes.get(index);
+            if !self.presses.has(contact.node) {
+                continue;
+            }
             let geometry = contact.geometry(meeting);
             self.add(
                 meeting,
@@ -27,7 +31,9 @@ impl Contacts {
                 Some(geometry),
             );
         }
-        self.nodes.clear();
+        let presses = &self.presses;
+        self.nodes.retain(|contact| !presses.has(contact.node));
+        self.solve_nodes(meeting, slice);
         let first = self
             .presses
             .solve(&mut self.constraints, meeting.velocities, slice.sweeps);

@@ -19,6 +19,7 @@ use super::press::Presses;
 use super::report::Touch;
 use super::rigid::RigidState;
 use super::supports::Supports;
+use super::tool::ToolPlaces;
 use crate::base::{Result, Stage, Stopwatch, memory};
 use crate::codec::saved;
 use crate::def::{BodyContact, CollisionFilter};
@@ -105,8 +106,8 @@ saved! { Contacts {
 } leaves { driven: Driven::default() } }
 
 impl Contacts {
-    /// For a body with nodes in these places and this surface, of which this is asked, in a world with `tools` tools.
-    pub fn new(positions: &Vectors, surface: &[[u32; 3]], contact: &BodyContact, tools: usize) -> Result<Self> {
+    /// For a body with nodes in these places and this surface, of which this is asked, in a world with these tools.
+    pub fn new(positions: &Vectors, surface: &[[u32; 3]], contact: &BodyContact, tools: ToolPlaces) -> Result<Self> {
         let features = Features::new(positions.len(), surface, |node| positions.get(node))?;
         let mut contacts = Self {
             thickness: contact.thickness,
@@ -134,13 +135,17 @@ impl Contacts {
         Ok(contacts)
     }
 
-    /// Makes room for `tools` tools, at so many places in the world.
-    pub fn reserve(&mut self, tools: usize) -> Result<()> {
+    /// Makes room for these tools.
+    pub fn reserve(&mut self, places: ToolPlaces) -> Result<()> {
+        let tools = places.count;
         self.driven.reserve_ways(tools)?;
         self.loads.try_reserve(tools.saturating_sub(self.loads.len()))?;
         self.reserve_together(self.features.count(), tools)?;
         self.touched.try_reserve(tools.saturating_sub(self.touched.len()))?;
         self.touched.resize(tools.max(self.touched.len()), [false; 2]);
+        if places.has_meshes {
+            self.candidates.reserve_meshes(&self.features)?;
+        }
         self.candidates.reserve(tools)
     }
 
@@ -292,8 +297,7 @@ impl Contacts {
         if index < self.loads.len() {
             self.loads.remove(index);
         }
-        // Another may come to its place.
-        self.look_again();
+        self.candidates.forget_tool(slot);
         self.holds.forget_tool(slot);
         self.touches.retain(|touch| touch.slot != slot);
         if let Some(pair) = self.touched.get_mut(slot) {

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::constraint::Constraint;
 use super::features::Feature;
 use super::meeting::{Meeting, Slice};
+use super::nearest_plane::LastMet;
 use super::path::{Motion, Placement, Solid};
 use super::supports::{MOST, Supports};
 use super::sweep::{Corners, Segment, Separation};
@@ -150,13 +151,14 @@ pub(super) fn round_geometry(
     }
 }
 
-/// How a feature meets what a mesh encloses over the slice.
+/// How a feature meets what a mesh encloses over the slice; `last` is how it met the tool at this place in the world last.
 pub(super) fn meet_mesh(
     meeting: &Meeting,
     slice: &Slice,
     motion: &Motion,
     (feature, corners): (Feature, &Corners),
     [from, to]: [&Placement; 2],
+    last: Option<(usize, &mut LastMet)>,
 ) -> Option<ContactGeometry> {
     let solid = motion.mesh?;
     let count = corners.count;
@@ -174,7 +176,7 @@ pub(super) fn meet_mesh(
     let supports = Supports::of(feature, meeting.bindings);
     let mut nodes = supports.nodes().iter();
     let is_pinned = nodes.any(|&node| meeting.mobility.of(node as usize) == 0.0);
-    let (closest, time) = own.approach_mesh(solid, meeting.thickness, travel + meeting.slack, is_pinned)?;
+    let (closest, time) = own.approach_mesh(solid, meeting.thickness, travel + meeting.slack, is_pinned, last)?;
     if !closest.inside {
         return None;
     }

@@ -10,6 +10,7 @@ use super::exact::ExactSolid;
 use super::exact::pierced::WayOut;
 use super::image_space::LayeredImage;
 use super::ridges::Ridges;
+use super::sweep::FLAT;
 
 use crate::base::{Error, Result, StateHasher, memory, not_negative};
 use crate::codec::{Reader, Saved, Writer, shape_of_name};
@@ -201,6 +202,11 @@ impl MeshSolid {
     /// Half of its least extent, m.
     pub fn thickness(&self) -> f32 {
         0.5 * (self.bounds.max - self.bounds.min).min_element()
+    }
+
+    /// What moves no further sees it as flat, m.
+    pub fn flat(&self) -> f32 {
+        FLAT * self.thickness()
     }
 
     /// Of everything that what it answers depends on.

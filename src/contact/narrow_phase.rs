@@ -37,17 +37,11 @@ impl Contacts {
     fn find_among_candidates(&mut self, meeting: &mut Meeting, slice: &Slice, [start, end]: [f64; 2]) {
         // Contacts that an equation is to know of, or has seen, are constraints all of them.
         let node_by_node = !slice.foresees && self.holds.is_empty();
-        let count = self.candidates.near().len();
         let all = self.candidates.masks.iter().fold(0, |all, mask| all | mask);
-        let is_alone = meeting.bindings.is_none()
+        let is_one = meeting.bindings.is_none()
             && meeting.neighbor_speed.is_none()
             && all.count_ones() == 1
-            && all.leading_zeros() > 0
-            && self
-                .candidates
-                .near()
-                .last()
-                .is_some_and(|&last| last < self.features.node_count);
+            && all.leading_zeros() > 0;
         let mut zone = 0;
         for (place, tool) in meeting.tools.iter().enumerate() {
             if !tool.filter.meets(self.filter) {
@@ -61,55 +55,72 @@ impl Contacts {
                 continue;
             }
             let motion = tool.motion(start, end, meeting.dt, meeting.origin);
-            let room = motion.room(meeting, slice);
-            let nodes = if node_by_node && yields.is_none() {
-                self.find_nodes(meeting, slice, (place, &motion), (bit, is_alone))
-            } else {
-                0
-            };
-            // Points that are bound to nodes are left.
-            let first = if meeting.bindings.is_none() { nodes } else { 0 };
-            if let Some(room) = room.as_ref().filter(|_| first < count) {
-                self.candidates.see_corners(room, |corner| meeting.way(slice, corner));
-            }
-            for candidate in first..count {
-                if self.candidates.masks[candidate] & bit == 0 {
-                    continue;
-                }
-                let index = self.candidates.near()[candidate];
-                let is_bound = || meeting.bindings.is_some_and(|bindings| bindings.get(index).is_some());
-                if candidate < nodes && !is_bound() {
-                    continue;
-                }
-                let Some(feature) = self.features.get(index) else {
-                    continue;
-                };
-                if room.is_none() {
-                    self.touch_plane(meeting, slice, (place, &motion), feature);
-                } else if let Some(corners) = self.candidates.corners(feature) {
-                    self.touch(meeting, slice, (place, &motion), (feature, &corners));
-                }
+            let takes_nodes = node_by_node && yields.is_none();
+            self.find_features(meeting, slice, (place, &motion), (bit, takes_nodes));
+            if takes_nodes {
+                // Nodes that share none with a touching edge or face, and meet no other tool, answer each by itself.
+                let is_alone = is_one && self.constraints.is_empty();
+                self.find_nodes(meeting, slice, (place, &motion), (bit, is_alone));
             }
         }
     }
 
-    /// Adds the contacts of nodes with a tool, but for points that are bound to nodes: how many of the candidates are either.
+    /// Adds the contacts of edges and faces with a tool, and those of nodes but where these are taken node by node and not bound to others.
+    fn find_features(
+        &mut self,
+        meeting: &mut Meeting,
+        slice: &Slice,
+        (place, motion): (usize, &Motion),
+        (bit, node_by_node): (u32, bool),
+    ) {
+        let (nodes, count) = (self.candidates.node_count(&self.features), self.candidates.near().len());
+        let skips_nodes = node_by_node && meeting.bindings.is_none();
+        let first = if skips_nodes { nodes } else { 0 };
+        if first == count {
+            return;
+        }
+        let room = motion.room(meeting, slice);
+        if let Some(room) = &room {
+            self.candidates
+                .see_corners(room, skips_nodes, |corner| meeting.way(slice, corner));
+        }
+        for candidate in first..count {
+            if self.candidates.masks[candidate] & bit == 0 {
+                continue;
+            }
+            let index = self.candidates.near()[candidate];
+            let is_bound = || meeting.bindings.is_some_and(|bindings| bindings.get(index).is_some());
+            if node_by_node && candidate < nodes && !is_bound() {
+                continue;
+            }
+            let Some(feature) = self.features.get(index) else {
+                continue;
+            };
+            if room.is_none() {
+                self.touch_plane(meeting, slice, (place, motion), feature);
+            } else if let Some(corners) = self.candidates.corners(feature) {
+                let met = candidate.checked_sub(nodes);
+                self.touch(meeting, slice, (place, motion), (feature, &corners, met));
+            }
+        }
+    }
+
+    /// Adds the contacts of nodes with a tool, but for points that are bound to nodes.
     fn find_nodes(
         &mut self,
         meeting: &mut Meeting,
         slice: &Slice,
         (tool, motion): (usize, &Motion),
         (bit, is_alone): (u32, bool),
-    ) -> usize {
-        let near = self.candidates.near();
-        let count = near.partition_point(|&index| index < self.features.node_count);
+    ) {
+        let count = self.candidates.node_count(&self.features);
         let look = NodeLook::new(meeting, slice, motion, meeting.tools[tool].slot);
         let is_even = is_alone && meeting.is_even(slice) && self.held.is_empty();
         let is_pressed = is_even && self.press_nodes(meeting, (tool, motion), &look, count);
         let left = if is_pressed { self.undecided.len() } else { count };
         for place in 0..left {
             let (node, candidate) = match self.undecided.get(place).filter(|_| is_pressed) {
-                Some(&node) => (node, count),
+                Some(&node) => (node, self.candidates.near[..count].partition_point(|&near| near < node)),
                 None if self.candidates.masks[place] & bit == 0 => continue,
                 None => (self.candidates.near()[place], place),
             };
@@ -135,11 +146,10 @@ impl Contacts {
                 self.settle_node(meeting, slice, &contact);
             }
         }
-        count
     }
 
-    /// Gives the impulses of a round tool or a mesh to the nodes that it touches, in closed form; nodes whose motion has to be swept are left to be
-    /// looked at. `false`: it is neither.
+    /// Gives the impulses of a round tool or a mesh to the nodes that it touches, in closed form; nodes whose motion has to be swept, or that see
+    /// a mesh otherwise than before, are left to be looked at. `false`: it is neither.
     fn press_nodes(
         &mut self,
         meeting: &mut Meeting,
@@ -153,9 +163,6 @@ impl Contacts {
                 spin: motion.spin,
             },
             (Solid::Mesh(from), Solid::Mesh(to)) => {
-                for (&node, plane) in self.candidates.near[..count].iter().zip(&mut self.candidates.planes) {
-                    look.refresh(meeting, meeting.positions.get(node as usize), plane);
-                }
                 let Some(planes) = self.candidates.planes.get(..count) else {
                     return false;
                 };
@@ -209,13 +216,13 @@ impl Contacts {
         }
     }
 
-    /// Adds the contact of one feature with a tool of any other shape.
+    /// Adds the contact of one feature with a tool of any other shape; of an edge or face, which it is of those that are near.
     fn touch(
         &mut self,
         meeting: &mut Meeting,
         slice: &Slice,
         (tool, motion): (usize, &Motion),
-        (feature, corners): (Feature, &Corners),
+        (feature, corners, met): (Feature, &Corners, Option<usize>),
     ) {
         if self.is_held(feature, meeting.tools[tool].slot, meeting.bindings) {
             return;
@@ -223,7 +230,9 @@ impl Contacts {
         let of_tool = (tool, motion.friction);
         if let (Solid::Mesh(from), Solid::Mesh(to)) = (motion.from, motion.to) {
             if !self.is_known(slice, (tool, feature, 0)) {
-                let found = meet_mesh(meeting, slice, motion, (feature, corners), [&from, &to]);
+                let last = met.and_then(|met| self.candidates.met.get_mut(met));
+                let last = last.map(|last| (meeting.tools[tool].slot, last));
+                let found = meet_mesh(meeting, slice, motion, (feature, corners), [&from, &to], last);
                 self.add(meeting, slice, of_tool, (feature, 0), found);
             }
             return;

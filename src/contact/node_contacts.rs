@@ -5,14 +5,15 @@
 
 use glam::{BVec3, Vec3};
 
-use super::candidates::NearestPlane;
 use super::distance::closest_on_segment;
 use super::features::Feature;
 use super::impulses::{Effort, LEVERAGE, Sweep, pushed_out, relax};
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded, mesh_geometry, round_geometry};
 use super::meeting::{Meeting, Slice};
+use super::mesh_solid::MeshSolid;
+use super::nearest_plane::NearestPlane;
 use super::path::{Motion, Solid};
-use super::sweep::{Corners, FLAT, Segment, Separation, TOUCHING};
+use super::sweep::{Corners, Segment, Separation, TOUCHING};
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::soa::Vectors;
@@ -109,34 +110,23 @@ impl<'a> NodeLook<'a> {
 
     /// A mesh is seen as flat by what moves no further, m.
     pub fn flat(&self) -> f32 {
-        FLAT * self.motion.mesh.map_or(0.0, |solid| solid.thickness())
+        self.motion.mesh.map_or(0.0, MeshSolid::flat)
     }
 
     /// Makes the plane through the mesh's closest point one of where the node is, unless it still serves or the node cannot come near.
-    #[inline]
-    pub fn refresh(&self, meeting: &Meeting, start: Vec3, plane: &mut NearestPlane) {
+    fn refresh(&self, meeting: &Meeting, start: Vec3, plane: &mut NearestPlane) {
         let (Solid::Mesh(from), Some(solid)) = (self.motion.from, self.motion.mesh) else {
             return;
         };
         let own = from.own(start);
-        let (flat, near) = (self.flat(), meeting.thickness + self.closing);
-        let moved = own.distance(plane.point);
-        let is_known = plane.slot as usize == self.slot;
-        let serves = plane.normal != Vec3::ZERO && moved <= flat;
-        if is_known && serves {
+        let (flat, near) = (solid.flat(), meeting.thickness + self.closing);
+        if plane.serves(self.slot, own, [flat, near]) {
             return;
         }
-        if is_known && plane.distance - moved > near {
-            (plane.point, plane.distance, plane.normal) = (own, plane.distance - moved, Vec3::ZERO);
-            return;
+        *plane = NearestPlane::beyond(self.slot, own, near + flat);
+        if let Some(closest) = solid.closest(&[own], plane.distance, false) {
+            (plane.distance, plane.normal) = (closest.distance, closest.normal);
         }
-        let closest = solid.closest(&[own], near + flat, false);
-        *plane = NearestPlane {
-            slot: self.slot as u32,
-            point: own,
-            distance: closest.map_or(near + flat, |closest| closest.distance),
-            normal: closest.map_or(Vec3::ZERO, |closest| closest.normal),
-        };
     }
 
     /// A mesh is the plane through its closest point, as long as the node has not moved far against it.
@@ -166,7 +156,7 @@ impl<'a> NodeLook<'a> {
         if meeting.drifts && to.own(start + step).distance_squared(own) > flat * flat {
             let corners = Corners::of_node(start, step);
             let feature = Feature::node(node as u32);
-            return meet_mesh(meeting, slice, self.motion, (feature, &corners), [&from, &to]);
+            return meet_mesh(meeting, slice, self.motion, (feature, &corners), [&from, &to], None);
         }
         if !meeting.drifts && distance > meeting.thickness + TOUCHING * solid.thickness() {
             return None;
@@ -379,6 +369,10 @@ impl NodeContacts {
             self.0.push(contact);
         }
         has_room
+    }
+
+    pub fn retain(&mut self, stays: impl Fn(&NodeContact) -> bool) {
+        self.0.retain(stays);
     }
 
     pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, NodeContact> {

@@ -158,16 +158,26 @@ impl Presses {
         memory::reserve(&mut self.backs, if count > 0 { MOST * contacts } else { 0 })
     }
 
+    /// Lists the nodes of these contacts.
+    pub fn list_nodes(&mut self, constraints: &[Constraint]) {
+        self.nodes.clear();
+        for constraint in constraints {
+            self.nodes.extend_from_slice(constraint.nodes());
+        }
+        self.nodes.sort_unstable();
+        self.nodes.dedup();
+    }
+
+    /// Whether a node is listed.
+    pub fn has(&self, node: u32) -> bool {
+        self.nodes.binary_search(&node).is_ok()
+    }
+
     /// Gives the impulses of these contacts, for which there is room, in so many sweeps at most: the most that one of the first sweep
     /// changed, m/s.
     pub fn solve(&mut self, constraints: &mut [Constraint], velocities: &mut Vectors, sweeps: u32) -> f32 {
+        self.list_nodes(constraints);
         let Self { presses, nodes, .. } = self;
-        nodes.clear();
-        for constraint in &*constraints {
-            nodes.extend_from_slice(constraint.nodes());
-        }
-        nodes.sort_unstable();
-        nodes.dedup();
         let place = |node: u32| nodes.binary_search(&node).unwrap_or_default() as u32;
         presses.clear();
         presses.extend(

@@ -1,12 +1,12 @@
 //! Contacts of nodes with one tool, round or a mesh, sixteen nodes at a time.
 //!
 //! The same contact as that of `node_contacts.rs`, in closed form. Nodes whose motion has to be swept are left to that: those that do not touch a
-//! round tool as the slice begins, but may within it, and those that go far against a mesh.
+//! round tool as the slice begins, but may within it, and those that go far against a mesh, or have gone far since they last looked at it.
 
 use glam::{DVec3, Mat3, Quat, Vec3};
 
-use super::candidates::NearestPlane;
 use super::impulses::pushed_out;
+use super::nearest_plane::NearestPlane;
 use super::path::Placement;
 use super::sweep::{Segment, TOUCHING};
 use crate::geometry::Bounds;
@@ -46,7 +46,7 @@ pub(super) struct PressNodes<'a> {
 pub(super) enum PressingSolid<'a> {
     /// The segment within it, and how fast it turns, rad/s.
     Round { segment: Segment, spin: Vec3 },
-    /// As its planes show it to each of the nodes; nodes that move further against it than `flat`, m, are left.
+    /// As its planes show it to each of the nodes; nodes that have moved further than `flat`, m, since, or do so now, are left.
     Mesh {
         planes: &'a [NearestPlane],
         slot: u32,
@@ -77,6 +77,37 @@ pub(super) struct PressedNodes {
     /// N m s, about the tool's position.
     pub angular_impulse: DVec3,
     pub velocities: Bounds,
+}
+
+/// The same of each lane.
+struct PressedLanes {
+    impulse: [[f64; LANES]; 3],
+    angular_impulse: [[f64; LANES]; 3],
+    low: [Sixteen; 3],
+    high: [Sixteen; 3],
+}
+
+impl PressedLanes {
+    const NONE: Self = Self {
+        impulse: [[0.0; LANES]; 3],
+        angular_impulse: [[0.0; LANES]; 3],
+        low: [[f32::INFINITY; LANES]; 3],
+        high: [[f32::NEG_INFINITY; LANES]; 3],
+    };
+
+    fn sum(&self) -> PressedNodes {
+        let sums = |lanes: &[[f64; LANES]; 3]| DVec3::from_array(lanes.map(|lanes| -lanes.iter().sum::<f64>()));
+        let least = |lanes: Sixteen| lanes.into_iter().fold(f32::INFINITY, f32::min);
+        let most = |lanes: Sixteen| lanes.into_iter().fold(f32::NEG_INFINITY, f32::max);
+        PressedNodes {
+            impulse: sums(&self.impulse),
+            angular_impulse: sums(&self.angular_impulse),
+            velocities: Bounds {
+                min: self.low.map(least).into(),
+                max: self.high.map(most).into(),
+            },
+        }
+    }
 }
 
 /// A value for each lane.
@@ -124,21 +155,17 @@ impl Loops for PressNodes<'_> {
 
     #[inline(always)]
     fn run(mut self) -> PressedNodes {
-        let mut pressed = PressedNodes {
-            impulse: DVec3::ZERO,
-            angular_impulse: DVec3::ZERO,
-            velocities: Bounds::EMPTY,
-        };
+        let mut pressed = PressedLanes::NONE;
         for (index, chunk) in self.nodes.chunks(LANES).enumerate() {
             self.take(index * LANES, chunk, &mut pressed);
         }
-        pressed
+        pressed.sum()
     }
 }
 
 impl PressNodes<'_> {
     #[inline(always)]
-    fn take(&mut self, first: usize, chunk: &[u32], pressed: &mut PressedNodes) {
+    fn take(&mut self, first: usize, chunk: &[u32], pressed: &mut PressedLanes) {
         let substep = self.substep;
         let part_out = pushed_out(substep);
         let mut nodes = [chunk[0] as usize; LANES];
@@ -212,20 +239,20 @@ impl PressNodes<'_> {
                 0.0
             }
         });
-        let sum = |lanes: &Sixteen| lanes.iter().map(|&lane| f64::from(lane)).sum::<f64>();
-        let sums = |[x, y, z]: &[Sixteen; 3]| DVec3::new(sum(x), sum(y), sum(z));
-        pressed.impulse -= sums(&given);
-        pressed.angular_impulse -= sums(&turned);
+        for k in 0..3 {
+            for lane in 0..LANES {
+                pressed.impulse[k][lane] += f64::from(given[k][lane]);
+                pressed.angular_impulse[k][lane] += f64::from(turned[k][lane]);
+            }
+        }
 
         let depth = each(|lane| if touches[lane] { (-gap[lane]).max(0.0) } else { 0.0 });
         if is_run(&nodes) {
             let first = nodes[0];
-            let mut low = [f32::INFINITY; 3];
-            let mut high = [f32::NEG_INFINITY; 3];
             for k in 0..3 {
                 let after = &mut self.velocities[k][first..first + LANES];
                 let next = &mut self.next_positions[k][first..first + LANES];
-                let (mut least, mut most) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+                let (low, high) = (&mut pressed.low[k], &mut pressed.high[k]);
                 for lane in 0..LANES {
                     let velocity = velocities[k][lane] + change[k][lane];
                     let moved = positions[k][lane] + velocity * substep;
@@ -234,16 +261,10 @@ impl PressNodes<'_> {
                     let moved = if is_given { moved } else { next[lane] };
                     let out = normal[k][lane] * (part_out * depth[lane]);
                     next[lane] = if depth[lane] > 0.0 { moved + out } else { moved };
-                    least[lane] = if is_given { velocity } else { least[lane] };
-                    most[lane] = if is_given { velocity } else { most[lane] };
+                    low[lane] = if is_given { velocity.min(low[lane]) } else { low[lane] };
+                    high[lane] = if is_given { velocity.max(high[lane]) } else { high[lane] };
                 }
-                low[k] = least.iter().copied().fold(f32::INFINITY, f32::min);
-                high[k] = most.iter().copied().fold(f32::NEG_INFINITY, f32::max);
             }
-            pressed.velocities = pressed.velocities.and(&Bounds {
-                min: low.into(),
-                max: high.into(),
-            });
             return;
         }
         for lane in 0..chunk.len() {
@@ -252,20 +273,17 @@ impl PressNodes<'_> {
                 continue;
             }
             let node = nodes[lane];
-            let mut velocity = Vec3::ZERO;
             for k in 0..3 {
-                velocity[k] = velocities[k][lane];
                 if is_given {
-                    velocity[k] += change[k][lane];
-                    self.velocities[k][node] = velocity[k];
-                    self.next_positions[k][node] = positions[k][lane] + velocity[k] * substep;
+                    let velocity = velocities[k][lane] + change[k][lane];
+                    self.velocities[k][node] = velocity;
+                    self.next_positions[k][node] = positions[k][lane] + velocity * substep;
+                    pressed.low[k][lane] = velocity.min(pressed.low[k][lane]);
+                    pressed.high[k][lane] = velocity.max(pressed.high[k][lane]);
                 }
                 if depth[lane] > 0.0 {
                     self.next_positions[k][node] += normal[k][lane] * (part_out * depth[lane]);
                 }
-            }
-            if is_given {
-                pressed.velocities = pressed.velocities.with(velocity);
             }
         }
     }
@@ -319,14 +337,17 @@ impl PressNodes<'_> {
         });
         let velocities = gathered(self.velocities.each_ref().map(|axis| &**axis), nodes);
         let speed = dot(&velocities, &normal);
-        let mut touches = [false; LANES];
-        for (lane, &node) in chunk.iter().enumerate() {
-            let is_free = self.inverse_masses[node as usize] > 0.0;
+        let inverse_masses = each(|lane| self.inverse_masses[nodes[lane]]);
+        let (mut touches, mut may_touch) = ([false; LANES], [false; LANES]);
+        for lane in 0..LANES {
+            let is_free = inverse_masses[lane] > 0.0 && lane < chunk.len();
             let comes_to = distance[lane] + (speed[lane] * self.substep - ahead[lane]).min(0.0);
             touches[lane] = is_free && distance[lane] <= touching && distance[lane] > 0.0;
-            if is_free && !touches[lane] && comes_to <= touching {
-                self.undecided.push(node);
-            }
+            may_touch[lane] = is_free && !touches[lane] && comes_to <= touching;
+        }
+        if may_touch.contains(&true) {
+            let undecided = chunk.iter().zip(may_touch).filter(|&(_, may_touch)| may_touch);
+            self.undecided.extend(undecided.map(|(&node, _)| node));
         }
         let (spin, centre) = (spin.to_array(), self.centre.to_array());
         let surface = vectors(|k, lane| normal[k][lane] * radius);
@@ -364,11 +385,17 @@ impl PressNodes<'_> {
         let moved = vectors(|k, lane| own[k][lane] - plane(lane).point[k]);
         let along = dot(&own_normal, &moved);
         let distance = each(|lane| plane(lane).distance + along[lane]);
+        let ways = dot(&moved, &moved);
         let mut touches = [false; LANES];
         for (lane, &node) in chunk.iter().enumerate() {
-            let NearestPlane { slot: seen, normal, .. } = plane(lane);
             let is_free = self.inverse_masses[node as usize] > 0.0;
-            touches[lane] = is_free && *seen == slot && *normal != Vec3::ZERO && distance[lane] <= near;
+            let is_known = plane(lane).slot == slot;
+            let is_flat = is_known && plane(lane).normal != Vec3::ZERO && ways[lane] <= flat * flat;
+            let is_far = is_known && !is_flat && plane(lane).distance - ways[lane].sqrt() > near;
+            touches[lane] = is_free && is_flat && distance[lane] <= near;
+            if is_free && !is_flat && !is_far {
+                self.undecided.push(node);
+            }
         }
         if !touches.iter().any(|&touches| touches) {
             return None;

@@ -17,6 +17,8 @@ pub(super) struct Ridges {
     tree: Option<Tree>,
     /// By how much the surface turns at the sharpest convex edge of each of them, rad.
     turns: Vec<f32>,
+    /// At the sharpest of all, rad.
+    sharpest: f32,
 }
 
 impl Ridges {
@@ -58,18 +60,20 @@ impl Ridges {
             0 => None,
             count => Some(Tree::new(count, |ridge| corners(ridges[ridge as usize] as usize))?),
         };
-        Ok(Self { tree, turns })
+        let sharpest = turns.iter().copied().fold(0.0, f32::max);
+        Ok(Self { tree, turns, sharpest })
     }
 
     /// Whether a ridge within `reach` of these bounds may be deeper than `depth` within a chord of this length whose ends lie on the surface, m: at
     /// most `length turn / 4`.
     pub fn are_near(&self, bounds: &Bounds, reach: f32, length: f32, depth: f32) -> bool {
+        let is_deep = |turn: f32| 0.25 * length * turn > depth;
         let mut is_found = false;
-        let Some(tree) = &self.tree else {
+        let Some(tree) = self.tree.as_ref().filter(|_| is_deep(self.sharpest)) else {
             return false;
         };
         tree.near(bounds, reach * reach, |place| {
-            is_found |= 0.25 * length * self.turns[tree.triangle(place) as usize] > depth;
+            is_found |= is_deep(self.turns[tree.triangle(place) as usize]);
             if is_found { -1.0 } else { reach * reach }
         });
         is_found

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::closest::Closest;
 use super::distance::{closest_of_segments, closest_on_segment, closest_on_triangle};
 use super::mesh_solid::MeshSolid;
+use super::nearest_plane::LastMet;
 use crate::geometry::Bounds;
 
 /// A gap of this part of the tool's radius, or of half its least extent, counts as touching.
@@ -289,13 +290,14 @@ impl Corners {
     }
 
     /// The same for what a mesh encloses, in whose own frame the corners are: also when that is, a fraction of the substep. They touch
-    /// where they are `clearance` apart.
-    pub fn approach_mesh(
+    /// where they are `clearance` apart. `last` is how they met the tool at this place in the world last.
+    pub(super) fn approach_mesh(
         &self,
         solid: &MeshSolid,
         clearance: f32,
         margin: f32,
         is_pinned: bool,
+        last: Option<(usize, &mut LastMet)>,
     ) -> Option<(Closest, f32)> {
         let closest_at = |time: f32, within: f32| solid.closest(&self.at(time)[..self.count], within, is_pinned);
         let closing = self.steps[..self.count]
@@ -304,11 +306,16 @@ impl Corners {
         let touching = TOUCHING * solid.thickness();
         let within = clearance + margin.max(touching);
         let mut time = 0.0;
-        let mut closest = closest_at(0.0, within + closing)?;
+        let mut closest = match last {
+            Some((slot, last)) => {
+                last.closest((slot, solid), &self.points[..self.count], within + closing, is_pinned)?
+            }
+            None => closest_at(0.0, within + closing)?,
+        };
         for _ in 0..ADVANCES {
             let gap = closest.distance - clearance;
             // So short a way sees the solid as flat.
-            if gap <= touching || closing * (1.0 - time) <= FLAT * solid.thickness() {
+            if gap <= touching || closing * (1.0 - time) <= solid.flat() {
                 break;
             }
             time += gap / closing;

@@ -157,6 +157,13 @@ pub(crate) enum Form {
 
 saved_enum!(Form { 0 => Rounded { radius, half_length }, 1 => HalfSpace, 2 => Mesh(solid) });
 
+/// How many tools contacts need room for, and whether some are meshes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ToolPlaces {
+    pub count: usize,
+    pub has_meshes: bool,
+}
+
 /// A tool of a world.
 #[derive(Clone, Debug)]
 pub(crate) struct Tool {
@@ -189,6 +196,10 @@ saved! { Tool {
 const SLENDEREST: f32 = 1e4;
 
 impl Tool {
+    pub fn is_mesh(&self) -> bool {
+        matches!(self.form, Form::Mesh(_))
+    }
+
     pub fn new(definition: &ToolDefinition) -> Result<Self> {
         let positive = |name: &str, value: f32| {
             above_zero(name, value)?;

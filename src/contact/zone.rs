@@ -2,9 +2,10 @@
 
 use glam::{DVec3, Vec3};
 
-use super::candidates::{NearestPlane, longest_edge};
+use super::candidates::longest_edge;
 use super::features::Feature;
 use super::mesh_solid::MeshSolid;
+use super::nearest_plane::NearestPlane;
 use super::path::{Placement, Solid, ToolPath};
 use crate::def::CollisionFilter;
 use crate::geometry::Bounds;

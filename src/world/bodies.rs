@@ -30,7 +30,7 @@ impl World {
         };
         let mut body = Body::new(definition, needs)?;
         if let Some(contacts) = &mut body.system_mut().contacts {
-            contacts.reserve_dynamic(needs.tools, self.dynamic_count())?;
+            contacts.reserve_dynamic(self.tools.places(), self.dynamic_count())?;
         }
         self.outcomes.try_reserve(self.bodies.places() + 1)?;
         let id = self.bodies.insert(body)?;

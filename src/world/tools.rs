@@ -6,7 +6,7 @@ use super::World;
 #[cfg(doc)]
 use crate::base::Error;
 use crate::base::{BodyId, Result, ToolId};
-use crate::contact::{Contact, ContactChange, Contacts, Pose, Tool, ToolDefinition, ToolPath};
+use crate::contact::{Contact, ContactChange, Contacts, Pose, Tool, ToolDefinition, ToolPath, ToolPlaces};
 use crate::def::CollisionFilter;
 
 impl World {
@@ -18,13 +18,15 @@ impl World {
     pub fn create_tool(&mut self, definition: &ToolDefinition) -> Result<ToolId> {
         let tool = Tool::new(definition)?;
         let count = self.tools.places() + 1;
+        let has_meshes = tool.is_mesh() || self.tools.iter().any(|(_, tool)| tool.is_mesh());
+        let tools = ToolPlaces { count, has_meshes };
         self.paths.try_reserve(count)?;
         let made = self
             .bodies
             .iter_mut()
-            .try_for_each(|(_, body)| body.make_contacts(count));
+            .try_for_each(|(_, body)| body.make_contacts(tools));
         let id = made.and_then(|()| self.tools.insert(tool));
-        if id.is_err() && self.tool_places() == 0 {
+        if id.is_err() && self.tool_places().is_none() {
             self.drop_contacts();
         }
         let id = ToolId(id?);
@@ -66,7 +68,7 @@ impl World {
         self.paths.clear();
         self.leave_haptics(tool);
         self.release_all_of(tool);
-        if self.tool_places() == 0 {
+        if self.tool_places().is_none() {
             self.drop_contacts();
         }
         self.contacts_mut()
@@ -74,13 +76,12 @@ impl World {
         Ok(())
     }
 
-    /// How many places contacts need for tools.
-    pub(super) fn tool_places(&self) -> usize {
-        if self.tools.iter().next().is_some() {
-            self.tools.places()
-        } else {
-            0
-        }
+    /// What contacts need for tools; `None`: there are none.
+    pub(super) fn tool_places(&self) -> Option<ToolPlaces> {
+        self.tools.iter().next().map(|_| ToolPlaces {
+            count: self.tools.places(),
+            has_meshes: self.tools.iter().any(|(_, tool)| tool.is_mesh()),
+        })
     }
 
     /// A world without tools keeps nothing for them.
