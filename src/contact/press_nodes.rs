@@ -313,7 +313,8 @@ impl PressNodes<'_> {
         let [first, last] = segment.steps.map(|step| step.to_array());
         let axis = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
         let square = axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2];
-        let per_square = if square > 0.0 { 1.0 / square } else { 0.0 };
+        // No branch here: compilers take what is the same for all nodes out of the loop over them, also where there is no segment.
+        let per_square = 1.0 / square.max(f32::MIN_POSITIVE);
         let from_a = vectors(|k, lane| positions[k][lane] - a[k]);
         let along = each(|lane| {
             let part = from_a[0][lane] * axis[0] + from_a[1][lane] * axis[1] + from_a[2][lane] * axis[2];
