@@ -45,9 +45,11 @@ pub(super) struct NearRun {
     end: u32,
     /// How far apart it and they were, together with how far the bodies had moved by then, m.
     pub apart: f32,
+    /// Whether it was outside the other body when that was seen last.
+    pub is_outside: bool,
 }
 
-saved! { NearRun { number, first, end, apart } }
+saved! { NearRun { number, first, end, apart, is_outside } }
 
 /// What of two bodies is near: corners of the first with triangles of the second, the other way round, and edges with edges.
 #[derive(Clone, Copy, Debug)]
@@ -86,6 +88,15 @@ impl NearRun {
     /// What is near it, of all features that are listed.
     pub fn of<'a>(&self, features: &'a mut [Near]) -> &'a mut [Near] {
         &mut features[self.first as usize..self.end as usize]
+    }
+
+    /// How far away anything is at most that it can meet, m, after bodies have moved so far: only what may be inside another is led out of it.
+    pub fn reach(&self, search: &PairSearch, moved: f32) -> f32 {
+        if self.is_outside && self.apart > moved {
+            search.reach_of_edges()
+        } else {
+            search.reach()
+        }
     }
 }
 
@@ -245,6 +256,7 @@ impl Pairs {
                 first: first as u32,
                 end: self.features.len() as u32,
                 apart: nearest,
+                is_outside: false,
             };
             put(&mut self.runs, run)?;
         }

@@ -47,8 +47,9 @@ pub(super) struct PairTouch {
 enum From<'a> {
     /// Trees or images.
     Search,
-    /// They are known: triangles near a corner, edges near an edge, and how far the bodies have moved since these were listed, m.
-    Known(&'a mut [Near], f32),
+    /// They are known: triangles near a corner, edges near an edge; how far the bodies have moved since these were listed, and how far away anything is
+    /// at most that it can meet, m.
+    Known(&'a mut [Near], [f32; 2]),
 }
 
 /// A search over a step of `dt` seconds for what comes closer than `radius`, m, and for what comes within `ahead` of that, m: impulses may lead it there.
@@ -81,21 +82,27 @@ impl PairSearch<'_> {
         let [mut of_first, of_second] = kept.map(Option::as_mut);
         if let Some(Known { runs, features, moved }) = known {
             let [corners, others, edges] = runs;
-            let reach = self.reach();
             for (runs, [of_nodes, of_faces], mut kept) in [
                 (corners, [first, second], of_first.as_deref_mut()),
                 (others, [second, first], of_second),
             ] {
-                for run in runs.iter_mut().filter(|run| run.apart - moved <= reach) {
-                    let from = From::Known(run.of(features), moved);
+                for run in runs {
+                    let reach = run.reach(self, moved);
+                    if !(run.apart - moved <= reach) {
+                        continue;
+                    }
+                    let from = From::Known(run.of(features), [moved, reach]);
                     let corner = run.number as usize;
                     let parties = [of_nodes, of_faces];
-                    run.apart = moved + self.node_with_faces(parties, corner, from, kept.as_deref_mut(), &mut see);
+                    let least;
+                    (least, run.is_outside) =
+                        self.node_with_faces(parties, corner, from, kept.as_deref_mut(), &mut see);
+                    run.apart = moved + least;
                 }
             }
             let reach = self.reach_of_edges();
             for run in edges.iter_mut().filter(|run| run.apart - moved <= reach) {
-                let (from, edge) = (From::Known(run.of(features), moved), run.number as usize);
+                let (from, edge) = (From::Known(run.of(features), [moved, reach]), run.number as usize);
                 run.apart = moved + self.edge_with_edges(edge, from, of_first.as_deref_mut(), &mut see);
             }
             return;
@@ -134,8 +141,8 @@ impl PairSearch<'_> {
         reach: f32,
         mut see: impl FnMut(usize) -> f32,
     ) -> f32 {
-        if let From::Known(triangles, moved) = from {
-            return nearest_of(triangles, (moved, self.reach()), |triangle| see(triangle as usize));
+        if let From::Known(triangles, [moved, reach]) = from {
+            return nearest_of(triangles, (moved, reach), |triangle| see(triangle as usize));
         }
         let mut least = f32::INFINITY;
         let see = |triangle| least = least.min(see(triangle));
@@ -176,7 +183,8 @@ impl PairSearch<'_> {
         }
     }
 
-    /// Shows where a corner of the first surface meets the second: how far anything that it was compared with is from it at first, m.
+    /// Shows where a corner of the first surface meets the second: how far anything that it was compared with is from it at first, m, and whether it is
+    /// outside.
     fn node_with_faces(
         &self,
         [of_nodes, of_faces]: [Party; 2],
@@ -184,7 +192,7 @@ impl PairSearch<'_> {
         from: From,
         kept: Option<&mut Clearances>,
         see: &mut impl FnMut(PairTouch),
-    ) -> f32 {
+    ) -> (f32, bool) {
         let shift = shift(of_nodes.skin, of_faces.skin);
         let node = of_nodes.skin.nodes[corner];
         let (place, step) = self.way(of_nodes, node, shift, of_faces.skin.drift);
@@ -203,7 +211,10 @@ impl PairSearch<'_> {
         let is_solid = of_faces.skin.is_closed && !self.is_of_one();
         let depth = if is_solid { of_faces.skin.depth() } else { 0.0 };
         let reach = (self.radius + self.ahead).max(depth) + of_faces.skin.spread;
-        let far = self.reach();
+        let far = match from {
+            From::Search => self.reach(),
+            From::Known(_, [_, reach]) => reach,
+        };
         let near = Bounds::of([place].into_iter()).extended(far);
         let least = self.near_corner((corner, from), of_faces.skin, &around, reach, |triangle| {
             let nodes = of_faces.skin.triangles[triangle];
@@ -274,7 +285,7 @@ impl PairSearch<'_> {
             let offset = if is_behind { found.offset } else { -found.offset };
             self.show(sides, offset, (clearance, shift), see);
         }
-        least
+        (least, !is_behind)
     }
 
     /// The same of an edge of the first surface and edges of the second.
@@ -345,10 +356,8 @@ impl PairSearch<'_> {
         };
         let reach = self.radius + self.ahead + second.skin.spread;
         match &second.skin.images {
-            _ if let From::Known(others, moved) = from => {
-                least = nearest_of(others, (moved, self.reach_of_edges()), |other| {
-                    see_edges([other, NONE, NONE])
-                });
+            _ if let From::Known(others, of) = from => {
+                least = nearest_of(others, of.into(), |other| see_edges([other, NONE, NONE]));
             }
             Some(images) if self.in_images => {
                 // The box about all of a long edge is mostly beside it.
