@@ -3,9 +3,9 @@
 use glam::{DVec3, Vec3};
 
 use super::System;
-use super::attempt::Carry;
 use super::closing::Closed;
 use super::kick::Inertia;
+use super::step_request::Carry;
 use super::substep::Part;
 use crate::codec::saved;
 use crate::simd::Loops;

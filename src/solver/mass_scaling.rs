@@ -9,7 +9,7 @@
 //! masses is found as it is with any others. Where motion makes elements so stiff that a step would be refused, the sums of their nodes are
 //! made again for how they are deformed (`relief.rs`), within the same bound on the mass.
 
-use super::attempt::RESERVE as RESERVE_AT_REST;
+use super::stability::RESERVE as RESERVE_AT_REST;
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::def::Carried;

@@ -8,8 +8,8 @@
 use std::array::from_fn;
 
 use super::System;
-use super::attempt::StepRequest;
 use super::kick::{Inertia, Kick, Survey};
+use super::step_request::StepRequest;
 use super::substep::{Part, Pass, Written};
 use crate::nodes::Pin;
 use crate::soa::{TILE, TileForces, Vectors, View, tile_count, tile_nodes};

@@ -8,8 +8,9 @@
 //! stiffer still, as far as there is mass for that.
 
 use super::System;
-use super::attempt::{StepRequest, fewer_substeps};
 use super::mass_scaling::MARGIN;
+use super::needs::fewer_substeps;
+use super::step_request::StepRequest;
 use super::verlet::begin;
 use crate::soa::Masses;
 use crate::threads::Team;

@@ -15,6 +15,9 @@ use crate::codec::saved;
 use crate::soa::{Masses, Rates, Vectors};
 use crate::springs::{Springs, separation};
 
+/// The part of the longest stable substep that is used.
+pub(crate) const RESERVE: f32 = 0.8;
+
 /// How far neighbours may move against each other before the limit is estimated again, as a fraction of the length over
 /// which the matrices of their springs change. It then changes by less than what a chosen substep keeps in reserve.
 const TRAVEL_BEFORE_ESTIMATE: f32 = 0.25;

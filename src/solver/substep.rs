@@ -5,9 +5,9 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::System;
-use super::attempt::StepRequest;
 use super::closing::{Closed, ClosingKick};
 use super::kick::{Drift, Inertia, Kick, Survey, TileKick, look};
+use super::step_request::StepRequest;
 use crate::forces::Sum;
 use crate::nodes::{NodeDamping, Pin};
 use crate::simd::ChosenKernel;

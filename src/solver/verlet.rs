@@ -9,7 +9,6 @@
 use glam::DVec3;
 
 use super::System;
-use super::attempt::{Carry, StepRequest};
 use super::closing::{ClosingKick, close_aside, may_stay_open};
 use super::energy_monitor::Account;
 use super::energy_sums::TileSums;
@@ -18,6 +17,7 @@ use super::pipeline::{self, DEEPEST, Plan};
 use super::sleep::Sleeper;
 use super::slow_down::{keep_energy, slow_down};
 use super::stability::Stability;
+use super::step_request::{Carry, StepRequest};
 use super::substep::{Part, VelocityTime, kick_and_drift};
 use crate::base::{Stage, Stopwatch};
 use crate::contact::{Contacts, Meeting};

@@ -14,8 +14,8 @@ use crate::geometry::Bounds;
 use crate::nodes::Mobility;
 use crate::soa::{Vectors, tile_count, tile_nodes};
 use crate::solver::System;
-use crate::solver::attempt::StepRequest;
 use crate::solver::kick::look;
+use crate::solver::step_request::StepRequest;
 
 /// The longest step near a tool, s.
 pub(super) const LONGEST: f64 = 1e-3;

@@ -16,12 +16,13 @@ mod estimate;
 mod gradient;
 mod iterations;
 mod loops;
+mod parts;
 mod pressed;
 mod rigid;
 mod step;
 
-pub(super) use step::run;
-pub(crate) use step::{begin_parts, end_part, next_part, parts_near};
+pub(super) use parts::run;
+pub(crate) use parts::{begin_parts, end_part, next_part, parts_near};
 
 use glam::Vec3;
 

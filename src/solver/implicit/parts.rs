@@ -1,0 +1,223 @@
+//! In how many parts a step of IMPLICIT or NEWTON is taken.
+
+use super::step::{Formula, Substep};
+use super::{End, Implicit, contact};
+use crate::def::SolverReport;
+use crate::solver::System;
+use crate::solver::grasp::Lapse;
+use crate::solver::step_request::{Carry, StepRequest};
+use crate::solver::verlet::{StepResult, TooLong, begin};
+use crate::threads::Team;
+
+/// How often a step that has gained energy is taken again in four times as many parts.
+const CUTS: u32 = 4;
+
+/// A step is not cut into more parts than this because it has gained energy.
+const PARTS: u32 = 1 << 12;
+
+/// The part of the budget that there is for each part of a step, at least: those into which a tool or a tolerance cuts it.
+const SHARE: u32 = 32;
+
+/// Takes the step in `substeps` equal parts, each a solved equation. Where one ends with more energy than was put in, it was
+/// not solved; then the step is taken again in shorter parts, which are easier to solve, and in the end its motion is slowed
+/// down. How many parts were taken, and what came of them; refused is what is near something and would take more parts than a step may.
+pub(in crate::solver) fn run(
+    body: &mut System,
+    request: &StepRequest,
+    substeps: u32,
+    middle: u32,
+    start: Carry,
+    team: &Team,
+) -> Result<(u32, StepResult), TooLong> {
+    let mut end = End::NotFinite;
+    let mut parts = 1;
+    if let Some(mut implicit) = body.implicit.take() {
+        implicit.report = SolverReport::BEFORE;
+        implicit.left = (implicit.budget.saturating_mul(request.substeps.max(1))).min(implicit.allowed);
+        let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
+            .ceil()
+            .max(1.0);
+        let short = short.min(f64::from(u32::MAX / 4 / substeps)) as u32;
+        let mut is_near = contact::is_near(body);
+        let is_long = contact::may_be_long(body, &implicit, request);
+        if is_near && !is_long {
+            parts = short;
+        }
+        implicit.grant(substeps.saturating_mul(parts));
+        let mut cuts = 0;
+        loop {
+            if is_near && short > 1 && parts >= short && substeps * short > request.most_parts() {
+                body.implicit = Some(implicit);
+                return Err(TooLong {
+                    stable_substep: contact::LONGEST as f32,
+                });
+            }
+            let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
+            // What a small budget does not solve in so many parts it does not solve in more.
+            let is_spent = is_near && cuts > 0 && whole[0] / 4 > implicit.budget;
+            let is_last_resort = cuts == CUTS || whole[0].saturating_mul(4) > PARTS || is_spent;
+            let may_be_shorter = is_long && parts < short && contact::is_near(body);
+            end = run_in_parts(body, &mut implicit, request, whole, is_last_resort, team);
+            match end {
+                End::Fine => break,
+                // Then there was nothing near before, and the equation knew of nothing.
+                End::Near if is_long && !is_near => is_near = true,
+                End::Near => {
+                    is_near = true;
+                    parts = if is_long {
+                        shorter(parts, short)
+                    } else {
+                        parts.max(short)
+                    };
+                    implicit.grant(substeps.saturating_mul(parts));
+                }
+                End::Gained | End::NotFinite if may_be_shorter => {
+                    parts = shorter(parts, short);
+                    implicit.grant_again(substeps.saturating_mul(parts));
+                }
+                End::Gained | End::NotFinite if is_last_resort => break,
+                End::Gained | End::NotFinite => {
+                    cuts += 1;
+                    parts = parts.saturating_mul(4);
+                }
+            }
+        }
+        body.implicit = Some(implicit);
+    }
+    let taken = StepResult {
+        carry: start,
+        finite: end == End::Fine,
+    };
+    Ok((substeps.saturating_mul(parts), taken))
+}
+
+/// In how many parts a step is tried near tools that was not solved in so many, and that may be taken in `short`.
+fn shorter(parts: u32, short: u32) -> u32 {
+    let next = parts.saturating_mul(4);
+    if next < short / 2 { next } else { short }
+}
+
+impl Implicit {
+    /// Lets a step of so many parts have its share for each.
+    fn grant(&mut self, parts: u32) {
+        let share = (self.budget.min(self.allowed) / SHARE).max(1);
+        self.left = self.left.max(share.saturating_mul(parts));
+    }
+
+    /// The same where longer parts were tried before: a small budget is there again.
+    fn grant_again(&mut self, parts: u32) {
+        self.left = self.left.max(self.budget.min(self.allowed).min(SHARE));
+        self.grant(parts);
+    }
+}
+
+fn run_in_parts(
+    body: &mut System,
+    implicit: &mut Implicit,
+    request: &StepRequest,
+    [substeps, middle]: [u32; 2],
+    is_last_resort: bool,
+    team: &Team,
+) -> End {
+    begin(body, request);
+    implicit.begin();
+    for index in 0..substeps {
+        let end = take_part(body, implicit, request, [index, substeps], is_last_resort, team);
+        if end != End::Fine {
+            return end;
+        }
+        body.state.advance();
+        if index + 1 == middle
+            && let Some(coarse) = &mut body.coarse
+        {
+            coarse.pass_middle(body.state.newest().0);
+        }
+    }
+    End::Fine
+}
+
+/// Takes one of equal parts of a step, up to where it becomes current.
+fn take_part(
+    body: &mut System,
+    implicit: &mut Implicit,
+    request: &StepRequest,
+    [index, substeps]: [u32; 2],
+    is_last_resort: bool,
+    team: &Team,
+) -> End {
+    let step = f64::from(request.dt) / f64::from(substeps);
+    let order = if implicit.is_attached { 1 } else { implicit.order };
+    let substep = Substep {
+        request,
+        step,
+        start: f64::from(index) / f64::from(substeps),
+        end: f64::from(index + 1) / f64::from(substeps),
+        is_first: index == 0,
+        equations: substeps - index,
+        formula: Formula::new(order, step, f64::from(implicit.last(index == 0).step)),
+        team,
+    };
+    body.lead_grasps(request.tools, [substep.start, substep.end]);
+    let is_together = request.neighbor_speed.is_some() && body.meets_tissue();
+    implicit.recall_pressed(substep.is_first, is_together);
+    let end = substep.take_safely(body, implicit, is_last_resort);
+    if end != End::Fine {
+        return end;
+    }
+    for pin in body.pins.iter_mut() {
+        pin.force_sum += pin.solved.as_dvec3();
+    }
+    let Formula { time, carried } = implicit.taken;
+    let lapse = Lapse {
+        time,
+        carried,
+        at: substep.end,
+        moved: 1.0,
+        is_next: true,
+    };
+    body.feel_grasps(request.tools, lapse);
+    End::Fine
+}
+
+/// In how many parts a step near a tool or other tissue is to be taken at least.
+pub(crate) fn parts_near(dt: f32) -> u32 {
+    (f64::from(dt) / contact::LONGEST)
+        .ceil()
+        .clamp(1.0, f64::from(u32::MAX / 4)) as u32
+}
+
+/// Begins a step of so many parts that are taken one by one.
+pub(crate) fn begin_parts(body: &mut System, request: &StepRequest, parts: u32) {
+    begin(body, request);
+    if let Some(implicit) = &mut body.implicit {
+        implicit.report = SolverReport::BEFORE;
+        implicit.left = implicit.budget.min(implicit.allowed);
+        implicit.grant(parts);
+        implicit.begin();
+    }
+}
+
+/// Takes one of equal parts of such a step, up to where it becomes current: whether it gained no energy, or as a last resort was slowed
+/// down.
+pub(crate) fn next_part(
+    body: &mut System,
+    request: &StepRequest,
+    part_of: [u32; 2],
+    is_last_resort: bool,
+    team: &Team,
+) -> bool {
+    let Some(mut implicit) = body.implicit.take() else {
+        return true;
+    };
+    let end = take_part(body, &mut implicit, request, part_of, is_last_resort, team);
+    body.implicit = Some(implicit);
+    end == End::Fine
+}
+
+/// Ends such a part, after which other tissue may have changed where it led.
+pub(crate) fn end_part(body: &mut System) {
+    if let Some(implicit) = &mut body.implicit {
+        implicit.settle_deflection();
+    }
+    body.state.advance();
+}
