@@ -8,7 +8,7 @@ use crate::codec::saved;
 
 /// Substeps between two comparisons, at least, and how many more there may be: at even intervals, comparisons might meet a mode in its
 /// turning points alone. A comparison takes about as long as two substeps.
-const PERIOD: [u32; 2] = [110, 41];
+const PERIOD: [u32; 2] = [66, 25];
 
 /// The number of comparisons after which the kinetic energy is known. Nothing is taken off before.
 const LEARNED: u32 = 3;

@@ -2,7 +2,7 @@
 //!
 //! Leapfrog conserves the energy of a linear oscillator at any substep below the limit, but not that of a spring that turns by a good
 //! part of a radian within a substep, as compressed springs do when their ends pass each other. Such a body gains a little energy each
-//! time, and without damping it gains without end. So every 130 substeps or so the energy is compared with a reference: the energy at the
+//! time, and without damping it gains without end. So every 80 substeps or so the energy is compared with a reference: the energy at the
 //! first comparison, plus the work of forces, pins and tools since. Excess energy is taken off the velocities. A body that often has
 //! some takes shorter substeps. Bodies that take their substeps together share one account: contacts and attachments hand energy on between
 //! them, and gain none.
