@@ -642,6 +642,10 @@ public:
     return check(sinew_world_get_user_data(get(), &out)), out;
   }
   void set_profiling(bool enabled) { check(sinew_world_set_profiling(get(), enabled)); }
+  bool profiling() const {
+    std::uint32_t out = 0;
+    return check(sinew_world_get_profiling(get(), &out)), out != 0;
+  }
   sinew_profile profile() const { // of the last step, where profiling is on
     auto out = sized<sinew_profile>();
     return check(sinew_world_get_profile(get(), &out)), out;
@@ -729,6 +733,27 @@ private:
 // Messages up to a level, from all threads; nullptr: none.
 inline void set_log_callback(std::uint32_t level, sinew_log callback, void *context = nullptr) {
   check(sinew_set_log_callback(level, callback, context));
+}
+struct log_callback {
+  std::uint32_t level;
+  sinew_log callback;
+  void *context;
+};
+inline log_callback get_log_callback() {
+  log_callback out{};
+  return check(sinew_get_log_callback(&out.level, &out.callback, &out.context)), out;
+}
+
+// All memory of the library, in a build that has it; before any other call.
+struct allocator {
+  sinew_alloc alloc;
+  sinew_dealloc dealloc;
+  void *context;
+};
+inline void set_allocator(const allocator &of) { check(sinew_set_allocator(of.alloc, of.dealloc, of.context)); }
+inline allocator get_allocator() { // nullptr: the system's
+  allocator out{};
+  return check(sinew_get_allocator(&out.alloc, &out.dealloc, &out.context)), out;
 }
 
 // Replays a recording, up to the first step whose state differs.

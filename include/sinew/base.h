@@ -55,7 +55,7 @@ SINEW_BEGIN
 // ---- Version ------------------------------------------------------------------------------------
 
 #define SINEW_VERSION_MAJOR 0  ///< Major version of this header.
-#define SINEW_VERSION_MINOR 1  ///< Minor version of this header.
+#define SINEW_VERSION_MINOR 2  ///< Minor version of this header.
 #define SINEW_VERSION_PATCH 0  ///< Patch version of this header.
 /// Version of this header as one number: major << 16 | minor << 8 | patch.
 #define SINEW_VERSION (((SINEW_VERSION_MAJOR << 16) | (SINEW_VERSION_MINOR << 8)) | SINEW_VERSION_PATCH)

@@ -97,13 +97,11 @@ typedef struct sinew_body_def {
   /// IMPLICIT, NEWTON: error of the linear solve, 1e-6 to 1, relative to the displacement that
   /// forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
   float accuracy;
-  uint32_t reserved1;              ///< Reserved; must be 0.
   /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1;
   /// default 0.001. A step that would be refused may add more. Mass is added only if it saves 1/4
   /// of the substeps, never with fixed substeps or a tolerance. It adds inertia but no weight. See
   /// sinew_solver_report.
   float mass_scaling;
-  uint32_t reserved2;              ///< Reserved; must be 0.
   /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells. Corner bits: x 1, y 2,
   /// z 4. Springs are the edges and face diagonals.
   const uint32_t *cells;

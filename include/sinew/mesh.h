@@ -91,7 +91,7 @@ typedef struct sinew_mesh_view {
   size_t dropped_triangles;        ///< Number of degenerate or duplicate triangles dropped.
   size_t dropped_tetrahedra;       ///< Number of degenerate or duplicate tetrahedra dropped.
   size_t flipped_tetrahedra;       ///< Number of inverted tetrahedra corrected.
-  uint32_t closed;  ///< 1: every surface edge is used equally often in both directions; 0: open.
+  uint32_t is_closed;  ///< 1: every surface edge is used equally often in both directions; 0: open.
   const uint32_t *cells;  ///< 8 * cell_count node indices of cubes; corner bits: x 1, y 2, z 4.
   size_t cell_count;               ///< Number of cells.
 } sinew_mesh_view;

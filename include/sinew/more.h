@@ -93,7 +93,7 @@ sinew_status sinew_world_get_total_wrench(const sinew_world *world, const sinew_
 typedef struct sinew_contact_change {
   sinew_tool_id tool;  ///< Tool of the contact.
   sinew_body_id body;  ///< Body of the contact.
-  uint32_t begun;      ///< 1: the contact began; 0: it ended.
+  uint32_t has_begun;  ///< 1: the contact began; 0: it ended.
 } sinew_contact_change;
 
 /// Writes the contacts that began or ended in the last step.
@@ -162,6 +162,7 @@ sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
 /// The first calls measure. A step can be late if the scene became slower. For a bitwise replay
 /// record `work` of `report`, which is nullable.
+/// Errors: those of sinew_world_step_with_budget; SINEW_STATUS_UNSUPPORTED on WebAssembly.
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
     sinew_step_report *report);
 

@@ -94,7 +94,7 @@ typedef struct sinew_detector_report {
   uint32_t point_counts[2];  ///< Number of entries of sinew_detector_get_points.
   uint32_t edge_counts[2];   ///< Number of entries of sinew_detector_get_edges.
   uint32_t unlisted[2];      ///< Number of edge parts beyond four per edge on average.
-  uint32_t closed[2];  ///< 1: closed; 0: open, and nothing is found inside; not checked again.
+  uint32_t is_closed[2];  ///< 1: closed; 0: open, and nothing is found inside; not checked again.
 } sinew_detector_report;
 
 /// Finds the overlap of the two bodies at their current positions.

@@ -67,7 +67,7 @@ extern "C" {
 // ---- Version ------------------------------------------------------------------------------------
 
 #define SINEW_VERSION_MAJOR 0  ///< Major version of this header.
-#define SINEW_VERSION_MINOR 1  ///< Minor version of this header.
+#define SINEW_VERSION_MINOR 2  ///< Minor version of this header.
 #define SINEW_VERSION_PATCH 0  ///< Patch version of this header.
 /// Version of this header as one number: major << 16 | minor << 8 | patch.
 #define SINEW_VERSION (((SINEW_VERSION_MAJOR << 16) | (SINEW_VERSION_MINOR << 8)) | SINEW_VERSION_PATCH)
@@ -358,7 +358,7 @@ typedef struct sinew_mesh_view {
   size_t dropped_triangles;        ///< Number of degenerate or duplicate triangles dropped.
   size_t dropped_tetrahedra;       ///< Number of degenerate or duplicate tetrahedra dropped.
   size_t flipped_tetrahedra;       ///< Number of inverted tetrahedra corrected.
-  uint32_t closed;  ///< 1: every surface edge is used equally often in both directions; 0: open.
+  uint32_t is_closed;  ///< 1: every surface edge is used equally often in both directions; 0: open.
   const uint32_t *cells;  ///< 8 * cell_count node indices of cubes; corner bits: x 1, y 2, z 4.
   size_t cell_count;               ///< Number of cells.
 } sinew_mesh_view;
@@ -457,13 +457,11 @@ typedef struct sinew_body_def {
   /// IMPLICIT, NEWTON: error of the linear solve, 1e-6 to 1, relative to the displacement that
   /// forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
   float accuracy;
-  uint32_t reserved1;              ///< Reserved; must be 0.
   /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1;
   /// default 0.001. A step that would be refused may add more. Mass is added only if it saves 1/4
   /// of the substeps, never with fixed substeps or a tolerance. It adds inertia but no weight. See
   /// sinew_solver_report.
   float mass_scaling;
-  uint32_t reserved2;              ///< Reserved; must be 0.
   /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells. Corner bits: x 1, y 2,
   /// z 4. Springs are the edges and face diagonals.
   const uint32_t *cells;
@@ -1011,7 +1009,7 @@ typedef struct sinew_detector_report {
   uint32_t point_counts[2];  ///< Number of entries of sinew_detector_get_points.
   uint32_t edge_counts[2];   ///< Number of entries of sinew_detector_get_edges.
   uint32_t unlisted[2];      ///< Number of edge parts beyond four per edge on average.
-  uint32_t closed[2];  ///< 1: closed; 0: open, and nothing is found inside; not checked again.
+  uint32_t is_closed[2];  ///< 1: closed; 0: open, and nothing is found inside; not checked again.
 } sinew_detector_report;
 
 /// Finds the overlap of the two bodies at their current positions.
@@ -1639,7 +1637,7 @@ sinew_status sinew_world_get_total_wrench(const sinew_world *world, const sinew_
 typedef struct sinew_contact_change {
   sinew_tool_id tool;  ///< Tool of the contact.
   sinew_body_id body;  ///< Body of the contact.
-  uint32_t begun;      ///< 1: the contact began; 0: it ended.
+  uint32_t has_begun;  ///< 1: the contact began; 0: it ended.
 } sinew_contact_change;
 
 /// Writes the contacts that began or ended in the last step.
@@ -1708,6 +1706,7 @@ sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
 /// The first calls measure. A step can be late if the scene became slower. For a bitwise replay
 /// record `work` of `report`, which is nullable.
+/// Errors: those of sinew_world_step_with_budget; SINEW_STATUS_UNSUPPORTED on WebAssembly.
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
     sinew_step_report *report);
 
@@ -1789,7 +1788,7 @@ typedef struct sinew_solver_report {
   float error;
   double added_mass;       ///< [kg] VERLET: total mass that mass_scaling adds.
   uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved.
-  uint32_t converged;  ///< IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding.
+  uint32_t has_converged;  ///< IMPLICIT, NEWTON: 1 if each solve reached its tolerance or rounding.
   uint32_t solver;         ///< Solver in use, a sinew_solver value; never AUTO.
   uint32_t auto_substeps;  ///< Substeps of VERLET on creation; above 150 AUTO takes IMPLICIT.
   float auto_step;  ///< [s] AUTO: step length of the choice, the mean so far or 1/60 s; else 0.
@@ -1903,13 +1902,17 @@ sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
     const sinew_picture_def *def, const sinew_body_values *coloured, size_t count,
     const char *path);
 
-// sinew/debug.h: profile, debug drawing, recording, log.
+// sinew/debug.h: profile, debug drawing, recording, log, allocator.
 
 // ---- Profile ------------------------------------------------------------------------------------
 
 /// Turns the profile of each step on (1) or off (0, the default).
 /// A step that is not profiled reads no clock. Profiling changes no result.
+/// Errors: SINEW_STATUS_UNSUPPORTED on WebAssembly, which has no clock.
 sinew_status sinew_world_set_profiling(sinew_world *world, uint32_t enabled);
+
+/// Writes 1 if steps are profiled, else 0.
+sinew_status sinew_world_get_profiling(const sinew_world *world, uint32_t *out);
 
 /// Times and counts of the last step, taken or refused.
 /// Times of stages are summed over threads. Counts of contacts are summed over all substeps.
@@ -1994,7 +1997,7 @@ typedef struct sinew_replay_report {
   uint64_t first_difference;  ///< Number of the first step that differs, from 1; 0: none.
   uint64_t recorded_hash;     ///< State hash after that step in the recording; else 0.
   uint64_t replayed_hash;     ///< State hash after that step in the replay; else 0.
-  uint32_t cut_short;         ///< 1 if the file ends within a step, else 0.
+  uint32_t is_cut_short;      ///< 1 if the file ends within a step, else 0.
 } sinew_replay_report;
 
 /// Replays a recording and compares the state hash after each step, up to the first difference.
@@ -2004,7 +2007,7 @@ typedef struct sinew_replay_report {
 /// SINEW_STATUS_UNSUPPORTED for another library version.
 sinew_status sinew_replay(const char *path, uint32_t thread_count, sinew_replay_report *out);
 
-// ---- Log ----------------------------------------------------------------------------------------
+// ---- Log and memory -----------------------------------------------------------------------------
 
 /// Callback that receives a message, which is valid during the call only.
 /// It may run on any thread that calls the library. It must not call the library.
@@ -2022,6 +2025,28 @@ typedef enum sinew_log_level {
 /// `level` is a sinew_log_level value. `callback` (none) and `context` are nullable. Other threads
 /// may still be in the callback that it replaces.
 sinew_status sinew_set_log_callback(uint32_t level, sinew_log callback, void *context);
+
+/// Writes the level, callback and context of sinew_set_log_callback; all outputs are nullable.
+sinew_status sinew_get_log_callback(uint32_t *out_level, sinew_log *out_callback,
+    void **out_context);
+
+/// Callback that returns `size` bytes at a multiple of `alignment`, or NULL without memory.
+typedef void *(*sinew_alloc)(void *context, size_t size, size_t alignment);
+
+/// Callback that frees memory of sinew_alloc; `size` and `alignment` are those of its request.
+typedef void (*sinew_dealloc)(void *context, void *memory, size_t size, size_t alignment);
+
+/// Sets the functions that allocate all memory of the library, until the process ends.
+/// Call it before every other function. Both run on any thread that uses the library, and must not
+/// call it. `context` is nullable. Thread stacks, and memory of the C library such as for files,
+/// are not routed.
+/// Errors: SINEW_STATUS_UNSUPPORTED without the cargo feature `allocator`;
+/// SINEW_STATUS_INVALID_ARGUMENT after the first allocation, also for the message of a failed call.
+sinew_status sinew_set_allocator(sinew_alloc alloc, sinew_dealloc dealloc, void *context);
+
+/// Writes what sinew_set_allocator has set, else NULL; all outputs are nullable.
+sinew_status sinew_get_allocator(sinew_alloc *out_alloc, sinew_dealloc *out_dealloc,
+    void **out_context);
 
 #ifdef __cplusplus
 }

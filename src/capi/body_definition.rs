@@ -44,9 +44,7 @@ impl sinew_body_def {
             order: 0,
             iterations: 0,
             accuracy: 0.0,
-            reserved1: 0,
             mass_scaling: BodyDefinition::default().mass_scaling,
-            reserved2: 0,
             cells: std::ptr::null(),
             cell_count: 0,
             material: SINEW_MATERIAL_NONE,
@@ -224,8 +222,6 @@ impl sinew_body_def {
     /// Every array is NULL or has as many entries as the definition states.
     pub(super) unsafe fn definition<'a>(&self) -> Result<BodyDefinition<'a>> {
         memory::reserved("reserved", self.reserved)?;
-        memory::reserved("reserved1", self.reserved1)?;
-        memory::reserved("reserved2", self.reserved2)?;
         if self.springs.is_null() && self.spring_count > 0 {
             return Err(Error::invalid(format!(
                 "springs is NULL while spring_count is {}",

@@ -34,7 +34,7 @@ pub struct sinew_contact_change {
     /// Body of the contact.
     pub body: sinew_body_id,
     /// 1: the contact began; 0: it ended.
-    pub begun: u32,
+    pub has_begun: u32,
 }
 
 impl From<Contact> for sinew_contact {
@@ -55,7 +55,7 @@ impl From<ContactChange> for sinew_contact_change {
         Self {
             tool: change.tool.into(),
             body: change.body.into(),
-            begun: change.begun.into(),
+            has_begun: change.begun.into(),
         }
     }
 }

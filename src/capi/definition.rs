@@ -119,15 +119,11 @@ pub struct sinew_body_def {
     ///
     /// 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
     pub accuracy: f32,
-    /// Reserved; must be 0.
-    pub reserved1: u32,
     /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1; default 0.001.
     ///
     /// A step that would be refused may add more. Mass is added only if it saves 1/4 of the substeps, never with fixed
     /// substeps or a tolerance. It adds inertia but no weight. See sinew_solver_report.
     pub mass_scaling: f32,
-    /// Reserved; must be 0.
-    pub reserved2: u32,
     /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells.
     ///
     /// Corner bits: x 1, y 2, z 4. Springs are the edges and face diagonals.
@@ -275,18 +271,7 @@ pub struct sinew_body_def {
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
 unsafe impl Versioned for sinew_body_def {
-    const SIZES: &'static [usize] = &[
-        offset_of!(Self, order),
-        offset_of!(Self, mass_scaling),
-        offset_of!(Self, cells),
-        offset_of!(Self, home_stiffnesses),
-        offset_of!(Self, retardation_time),
-        offset_of!(Self, contact_thickness),
-        offset_of!(Self, spare_nodes),
-        offset_of!(Self, sleep_speed),
-        offset_of!(Self, element_law),
-        size_of::<Self>(),
-    ];
+    const SIZES: &'static [usize] = &[offset_of!(Self, order), size_of::<Self>()];
 }
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).

@@ -24,7 +24,7 @@ pub struct sinew_replay_report {
     /// State hash after that step in the replay; else 0.
     pub replayed_hash: u64,
     /// 1 if the file ends within a step, else 0.
-    pub cut_short: u32,
+    pub is_cut_short: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -39,7 +39,7 @@ impl From<ReplayReport> for sinew_replay_report {
             first_difference: difference.map_or(0, |difference| difference.step),
             recorded_hash: difference.map_or(0, |difference| difference.recorded),
             replayed_hash: difference.map_or(0, |difference| difference.replayed),
-            cut_short: u32::from(report.is_cut_short),
+            is_cut_short: u32::from(report.is_cut_short),
         }
     }
 }

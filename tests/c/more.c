@@ -45,7 +45,7 @@ static void older_definitions_refuse_cells(void)
     static const uint32_t cells[3] = {2, 2, 2};
     char message[256];
     MUST(sinew_mesh_create_lattice(1, cells, &lattice));
-    MUST(sinew_body_def_init(&def, offsetof(sinew_body_def, cells)));
+    MUST(sinew_body_def_init(&def, offsetof(sinew_body_def, order)));
     positions = def.positions;
     CHECK(sinew_body_def_set_mesh(&def, lattice) == SINEW_STATUS_UNSUPPORTED);
     sinew_last_error(message, sizeof message);
@@ -363,6 +363,7 @@ static void profiles(void)
     sinew_body_def def = of_mesh(mesh);
     sinew_body_id body;
     sinew_profile profile;
+    uint32_t is_on = 7;
     char message[256];
     memset(&profile, 0x5a, sizeof profile);
     profile.struct_size = sizeof profile;
@@ -372,7 +373,13 @@ static void profiles(void)
     CHECK(strstr(message, "sinew_world_set_profiling") != NULL);
     REFUSED("enabled", sinew_world_set_profiling(world, 2));
     REFUSED("world", sinew_world_set_profiling(NULL, 1));
+    MUST(sinew_world_get_profiling(world, &is_on));
+    CHECK(is_on == 0);
     MUST(sinew_world_set_profiling(world, 1));
+    MUST(sinew_world_get_profiling(world, &is_on));
+    CHECK(is_on == 1);
+    REFUSED("out", sinew_world_get_profiling(world, NULL));
+    REFUSED("world", sinew_world_get_profiling(NULL, &is_on));
     MUST(sinew_world_get_profile(world, &profile));
     CHECK(profile.step == 0 && profile.bodies == 0);
     MUST(sinew_world_step(world, 1e-3f, NULL));
@@ -491,7 +498,7 @@ static void recordings(void)
     MUST(sinew_world_stop_recording(world, &steps));
     CHECK(steps == 10);
     MUST(sinew_replay(path, 1, &report));
-    CHECK(report.steps == 10 && report.first_difference == 0 && report.cut_short == 0);
+    CHECK(report.steps == 10 && report.first_difference == 0 && report.is_cut_short == 0);
     REFUSED("path", sinew_replay(NULL, 1, &report));
     REFUSED("out", sinew_replay(path, 1, NULL));
     REFUSED("thread_count", sinew_replay(path, 257, &report));
@@ -522,9 +529,17 @@ static void messages(void)
     heard it = {0, 0, ""};
     const float gravity[3] = {NAN, 0, 0};
     char last[512];
+    uint32_t level = 7;
+    sinew_log callback = hear;
+    void *context = &it;
     REFUSED("level", sinew_set_log_callback(4, hear, &it));
+    MUST(sinew_get_log_callback(&level, &callback, &context));
+    CHECK(level == SINEW_LOG_OFF && callback == NULL && context == NULL);
     CHECK(sinew_world_set_gravity(world, gravity) == SINEW_STATUS_INVALID_ARGUMENT && it.count == 0);
     MUST(sinew_set_log_callback(SINEW_LOG_WARNING, hear, &it));
+    MUST(sinew_get_log_callback(&level, &callback, &context));
+    MUST(sinew_get_log_callback(NULL, NULL, NULL));
+    CHECK(level == SINEW_LOG_WARNING && callback == hear && context == &it);
     MUST(sinew_world_step(world, 1e-3f, NULL));
     CHECK(it.count == 0);
     CHECK(sinew_world_set_gravity(world, gravity) == SINEW_STATUS_INVALID_ARGUMENT);
