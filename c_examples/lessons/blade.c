@@ -7,6 +7,7 @@
  * Output:
  *   cut 58 mm in 60 steps
  *   largest force 0.5 N
+ *   it ended at z = 9 mm; there after its end: no
  *   work / (toughness * length) = 1.0
  */
 #include "../example.h"
@@ -59,6 +60,10 @@ int main(void) {
   /* The blade travels 60 mm: 1 mm outside of the sheet, and its cut lags behind by the deformation. */
   printf("cut %.0f mm in 60 steps\n", 1e3 * length);
   printf("largest force %.1f N\n", largest);
+  float reached[3];
+  CHECK(sinew_blade_get_pose(world, blade, reached, NULL));
+  CHECK(sinew_blade_destroy(world, blade)); /* what it has cut stays cut */
+  printf("it ended at z = %.0f mm; there after its end: %s\n", 1e3 * reached[2], sinew_blade_is_valid(world, blade) ? "yes" : "no");
   printf("work / (toughness * length) = %.1f\n", work / (TOUGHNESS * length));
   sinew_world_destroy(world);
   return 0;
