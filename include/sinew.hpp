@@ -303,6 +303,10 @@ public:
     sinew::pose out{};
     return check(sinew_blade_get_pose(world(), id, out.position.data(), out.orientation.data())), out;
   }
+  std::size_t contacts(span<sinew_contact> into) const { // one for each body; how many there are
+    std::size_t count = 0;
+    return check(sinew_blade_get_contacts(world(), id, into.data(), into.size(), &count)), count;
+  }
   void set_pose(vec3 position, quat orientation) {
     check(sinew_blade_set_pose(world(), id, position.data(), orientation.data()));
   }
@@ -349,6 +353,15 @@ public:
   }
   void set_gravity_scale(float scale) { check(sinew_body_set_gravity_scale(world(), id, scale)); }
   float gravity_scale() const { return viewed<float>(sinew_body_get_gravity_scale); }
+  void set_acceleration(vec3 acceleration) { check(sinew_body_set_acceleration(world(), id, acceleration.data())); }
+  vec3 acceleration() const {
+    vec3 out{};
+    return check(sinew_body_get_acceleration(world(), id, out.data())), out;
+  }
+  std::size_t contacts(span<sinew_contact> into) const { // with bodies; how many there are
+    std::size_t count = 0;
+    return check(sinew_body_get_contacts(world(), id, into.data(), into.size(), &count)), count;
+  }
   float pressure() const { return viewed<float>(sinew_body_get_pressure); }
   void set(const sinew_body_settings &settings) { check(sinew_body_set_settings(world(), id, &settings)); }
   sinew_body_settings settings() const { return reported<sinew_body_settings>(sinew_body_get_settings); }

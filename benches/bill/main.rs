@@ -41,10 +41,10 @@ const MAKES: usize = 3;
 
 /// What goes with a body rather than in it.
 const READER: &str = "read on another thread";
-const PROFILED: &str = "stages of the step timed";
-const TAGGED: &str = "with user data";
-const SKETCHED: &str = "drawn for debugging in each step";
-const RECORDED: &str = "recorded, with a hash of each step";
+const PROFILED: &str = "hook: stages of the step timed";
+const TAGGED: &str = "hook: user data";
+const SKETCHED: &str = "hook: drawn for debugging in each step";
+const RECORDED: &str = "hook: recorded, with a hash of each step";
 const DRAWN: &str = "drawn: its surface, bound, with normals";
 
 /// A stomach where there is one, else a filled organ of as many nodes.

@@ -286,6 +286,7 @@ public static unsafe class Sinew
         public fixed float position[3];
         public fixed float orientation[4];
         public float gravity_scale;
+        public float damping_rate;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -417,6 +418,7 @@ public static unsafe class Sinew
     public struct sinew_contact
     {
         public sinew_body_id body;
+        public void* body_user_data;
         public fixed uint nodes[3];
         public fixed float weights[3];
         public fixed float point[3];
@@ -950,6 +952,12 @@ public static unsafe class Sinew
     public static extern int sinew_body_get_gravity_scale(IntPtr world, sinew_body_id body, float* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_set_acceleration(IntPtr world, sinew_body_id body, float* acceleration);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_acceleration(IntPtr world, sinew_body_id body, float* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_pin_nodes(IntPtr world, sinew_body_id body, uint* nodes, UIntPtr count);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -970,11 +978,19 @@ public static unsafe class Sinew
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_world_get_total_wrench(IntPtr world, sinew_tool_id* tools, UIntPtr count, float* point, float* out_force, float* out_torque);
 
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_contacts(IntPtr world, sinew_body_id body, sinew_contact* out_contacts, UIntPtr capacity, UIntPtr* out_count);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_blade_get_contacts(IntPtr world, sinew_blade_id blade, sinew_contact* out_contacts, UIntPtr capacity, UIntPtr* out_count);
+
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_contact_change
     {
         public sinew_tool_id tool;
         public sinew_body_id body;
+        public void* tool_user_data;
+        public void* body_user_data;
         public uint has_begun;
     }
 

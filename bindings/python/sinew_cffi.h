@@ -249,6 +249,7 @@ typedef struct sinew_body_def {
   float position[3];
   float orientation[4];
   float gravity_scale;
+  float damping_rate;
 } sinew_body_def;
 sinew_status sinew_body_def_init(sinew_body_def *def, size_t struct_size);
 sinew_status sinew_body_create(sinew_world *world, const sinew_body_def *def, sinew_body_id *out);
@@ -331,6 +332,7 @@ sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool,
     float *torque);
 typedef struct sinew_contact {
   sinew_body_id body;
+  void *body_user_data;
   uint32_t nodes[3];
   float weights[3];
   float point[3];
@@ -699,6 +701,9 @@ sinew_status sinew_body_apply_impulses(sinew_world *world, sinew_body_id body,
     const uint32_t *nodes, const float *impulses, size_t count);
 sinew_status sinew_body_set_gravity_scale(sinew_world *world, sinew_body_id body, float scale);
 sinew_status sinew_body_get_gravity_scale(const sinew_world *world, sinew_body_id body, float *out);
+sinew_status sinew_body_set_acceleration(sinew_world *world, sinew_body_id body,
+    const float *acceleration);
+sinew_status sinew_body_get_acceleration(const sinew_world *world, sinew_body_id body, float *out);
 sinew_status sinew_body_pin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
     size_t count);
 sinew_status sinew_body_unpin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
@@ -713,9 +718,15 @@ sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool,
     float *out_position, float *out_orientation);
 sinew_status sinew_world_get_total_wrench(const sinew_world *world, const sinew_tool_id *tools,
     size_t count, const float *point, float *out_force, float *out_torque);
+sinew_status sinew_body_get_contacts(const sinew_world *world, sinew_body_id body,
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
+sinew_status sinew_blade_get_contacts(const sinew_world *world, sinew_blade_id blade,
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
 typedef struct sinew_contact_change {
   sinew_tool_id tool;
   sinew_body_id body;
+  void *tool_user_data;
+  void *body_user_data;
   uint32_t has_begun;
 } sinew_contact_change;
 sinew_status sinew_world_get_contact_changes(const sinew_world *world,

@@ -17,7 +17,7 @@ int main(void) {
   sinew_body_def def = body_from_mesh(mesh);
   def.stiffness = 100.0f;
   def.node_mass = 1e-4f;
-  def.solver = SINEW_SOLVER_VERLET; /* needs some 12 substeps for this */
+  def.solver = SINEW_SOLVER_VERLET; /* needs about 12 substeps for this */
   sinew_body_id cloth;
   CHECK(sinew_body_create(world, &def, &cloth));
   sinew_mesh_destroy(mesh);

@@ -6,7 +6,7 @@
  * Output:
  *   a force of 27 mN for 1 s: 1.00 m/s
  *   an impulse of 27 mN s against it: 0.00 m/s
- *   twice the gravity, times -0.5: 0.98 m/s upward after 0.1 s
+ *   twice the gravity, times -0.5: 0.98 m/s upward after 0.1 s, 0.05 m/s with the wind
  *   set to rest and moved by 1 m: 1.00 m away
  */
 #include "../example.h"
@@ -56,8 +56,12 @@ int main(void) {
   CHECK(sinew_world_set_gravity(world, gravity));
   CHECK(sinew_body_set_gravity_scale(world, cube, -0.5f));
   CHECK(sinew_body_get_gravity_scale(world, cube, &scale));
+  const float wind[3] = {0.5f, 0, 0};
+  CHECK(sinew_body_set_acceleration(world, cube, wind)); /* m/s^2, beside gravity, until it is set again */
+  CHECK(sinew_body_get_acceleration(world, cube, gravity));
   step_world(world, 0.01, 10);
-  printf("twice the gravity, times %.1f: %.2f m/s upward after 0.1 s\n", scale, speed(world, cube, 1));
+  printf("twice the gravity, times %.1f: %.2f m/s upward after 0.1 s, %.2f m/s with the wind\n", scale, speed(world, cube, 1),
+         speed(world, cube, 0));
 
   const float rest[3 * NODES] = {0}, shift[3] = {1, 0, 0};
   sinew_vec3_view nodes;

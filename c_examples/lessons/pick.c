@@ -1,7 +1,7 @@
 /* Find the object of yours under the mouse.
  *
  * A ray hits bodies and tools, as far as its category and mask allow. Each world, body and tool stores a pointer of
- * yours, which leads from what is hit to your own object. Keep ids for long: they tell when the object is gone.
+ * yours, which leads from what is hit to your own object. Keep ids for long: they tell when the object was destroyed.
  *
  * Output:
  *   all: the ball

@@ -20,7 +20,7 @@ int main(void) {
   sinew_body_def def = body_from_mesh(mesh);
   def.stiffness = 100.0f;
   def.node_mass = 1e-4f;
-  def.node_damping = 2e-3f;
+  def.damping_rate = 20.0f; /* 1/s */
   sinew_body_id sheet;
   CHECK(sinew_body_create(world, &def, &sheet));
   sinew_mesh_destroy(mesh);

@@ -149,7 +149,7 @@ mod routed {
 /// Sets the functions that allocate all memory of the library, until the process ends.
 ///
 /// Call it before every other function. Both run on any thread that uses the library, and must not call it. `context`
-/// is nullable. Thread stacks, and memory of the C library such as for files, are not routed.
+/// is nullable. Thread stacks and memory of the C library are not routed.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED without the cargo feature `allocator`; SINEW_STATUS_INVALID_ARGUMENT after the first
 /// allocation, also for the message of a failed call.

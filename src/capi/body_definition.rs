@@ -93,6 +93,7 @@ impl sinew_body_def {
             position: [0.0; 3],
             orientation: [0.0, 0.0, 0.0, 1.0],
             gravity_scale: 1.0,
+            damping_rate: 0.0,
         }
     }
 
@@ -239,6 +240,7 @@ impl sinew_body_def {
                 rest_positions: memory::optional_array("rest_positions", self.rest_positions.cast(), nodes)?,
                 masses: values("masses", self.masses, nodes, self.node_mass)?,
                 node_dampings: values("node_dampings", self.node_dampings, nodes, self.node_damping)?,
+                damping_rate: self.damping_rate,
                 springs: memory::optional_array("springs", self.springs.cast(), springs)?,
                 stiffnesses: values("stiffnesses", self.stiffnesses, springs, self.stiffness)?,
                 rest_lengths: memory::optional_array("rest_lengths", self.rest_lengths, springs)?,

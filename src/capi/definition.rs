@@ -243,7 +243,7 @@ pub struct sinew_body_def {
     /// A surface tears at the node with the larger separating force, across it; a solid along faces. A step that tears
     /// may allocate. See sinew_body_set_tear_limits.
     pub tear_strain: f32,
-    /// [N] Force above which a spring tears; 0: never. For bodies of elements alone it is SINEW_STATUS_UNSUPPORTED.
+    /// [N] Force above which a spring tears; 0: never. SINEW_STATUS_UNSUPPORTED for elements alone.
     pub tear_force: f32,
     /// Maximum number of tears per step; 0: does not tear. Needs spare_nodes.
     pub most_tears: u32,
@@ -267,6 +267,8 @@ pub struct sinew_body_def {
     pub orientation: [f32; 4],
     /// Factor of the world's gravity on this body, finite; default 1.
     pub gravity_scale: f32,
+    /// [1/s] Drag on each node relative to its mass, added to node_damping.
+    pub damping_rate: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.

@@ -80,7 +80,7 @@ pub unsafe extern "C" fn sinew_world_stop_recording(world: *mut sinew_world, out
 
 /// Replays a recording and compares the state hash after each step, up to the first difference.
 ///
-/// `path` is UTF-8, `thread_count` as in sinew_world_def. Use the library version and the kernel of the recording.
+/// `path` is UTF-8, `thread_count` that of sinew_world_def. Use the recording's version and kernel.
 ///
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_INVALID_ARGUMENT if the file is no recording or damaged;
 /// SINEW_STATUS_UNSUPPORTED for another library version.

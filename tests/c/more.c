@@ -552,8 +552,80 @@ static void messages(void)
     sinew_world_destroy(world);
 }
 
+/* An acceleration of a body moves it as gravity of the same size does, with each solver and to the last bit. */
+static void accelerations(void)
+{
+    static const uint32_t solvers[] = {SINEW_SOLVER_VERLET, SINEW_SOLVER_IMPLICIT, SINEW_SOLVER_NEWTON};
+    static const float pull[3] = {0, -10, 0}, none[3] = {0, 0, 0}, bad[3] = {0, INFINITY, 0};
+    size_t i;
+    for (i = 0; i < 3; i++) {
+        sinew_world *worlds[2];
+        sinew_mesh *mesh = a_block();
+        sinew_body_def def = of_mesh(mesh);
+        sinew_body_id bodies[2];
+        float is[3] = {1, 1, 1};
+        uint32_t node, k;
+        def.solver = solvers[i];
+        for (k = 0; k < 2; k++) {
+            worlds[k] = a_world(k == 0 ? -10.0f : 0.0f);
+            MUST(sinew_body_create(worlds[k], &def, &bodies[k]));
+            MUST(sinew_body_pin(worlds[k], bodies[k], 0));
+        }
+        MUST(sinew_body_get_acceleration(worlds[1], bodies[1], is));
+        CHECK(memcmp(is, none, sizeof is) == 0);
+        MUST(sinew_body_set_acceleration(worlds[1], bodies[1], pull));
+        REFUSED("acceleration", sinew_body_set_acceleration(worlds[1], bodies[1], bad));
+        REFUSED("acceleration", sinew_body_set_acceleration(worlds[1], bodies[1], NULL));
+        REFUSED("out", sinew_body_get_acceleration(worlds[1], bodies[1], NULL));
+        MUST(sinew_body_get_acceleration(worlds[1], bodies[1], is));
+        CHECK(memcmp(is, pull, sizeof is) == 0);
+        for (k = 0; k < 2; k++)
+            steps(worlds[k], 0.01f, 10);
+        for (node = 0; node < 8; node++)
+            for (k = 0; k < 3; k++)
+                CHECK(position(worlds[0], bodies[0], node, k) == position(worlds[1], bodies[1], node, k));
+        CHECK(position(worlds[1], bodies[1], 7, 1) < position(worlds[1], bodies[1], 0, 1) || velocity(worlds[1], bodies[1], 7, 1) != 0);
+        sinew_mesh_destroy(mesh);
+        sinew_world_destroy(worlds[0]);
+        sinew_world_destroy(worlds[1]);
+    }
+}
+
+/* damping_rate slows down light and heavy nodes alike, beside the drag of each. */
+static void damping_rates(void)
+{
+    static const float positions[6] = {0, 0, 0, 1, 0, 0}, masses[2] = {0.1f, 10}, along[6] = {1, 0, 0, 1, 0, 0};
+    static const uint32_t no_springs[2] = {0, 0};
+    sinew_world *world = a_world(0);
+    sinew_body_def def;
+    sinew_body_id body;
+    float drag = 0;
+    MUST(sinew_body_def_init(&def, sizeof def));
+    CHECK(def.damping_rate == 0);
+    def.positions = positions;
+    def.node_count = 2;
+    def.masses = masses;
+    def.springs = no_springs;
+    def.node_damping = 0.1f;
+    def.damping_rate = -1;
+    REFUSED("damping_rate", sinew_body_create(world, &def, &body));
+    def.damping_rate = NAN;
+    REFUSED("damping_rate", sinew_body_create(world, &def, &body));
+    def.damping_rate = 2;
+    MUST(sinew_body_create(world, &def, &body));
+    MUST(sinew_body_get_node_damping(world, body, 0, &drag));
+    CHECK_NEAR(drag, 0.1 + 2 * 0.1, 1e-6);
+    MUST(sinew_body_set_velocities(world, body, along, 2));
+    steps(world, 0.01f, 50);
+    CHECK_NEAR(velocity(world, body, 0, 0), exp(-(2 + 0.1 / 0.1) * 0.5), 1e-5);
+    CHECK_NEAR(velocity(world, body, 1, 0), exp(-(2 + 0.1 / 10) * 0.5), 1e-5);
+    sinew_world_destroy(world);
+}
+
 int main(void)
 {
+    accelerations();
+    damping_rates();
     meshes_from_memory();
     a_filled_mesh_is_what_a_surface_becomes();
     a_definition_places_a_body();
