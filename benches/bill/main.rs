@@ -250,6 +250,7 @@ fn main() -> ExitCode {
                 rest_positions: Some(&mesh.positions),
                 material: None,
                 node_dampings: Values::Each(&none[..node_count]),
+                damping_rate: 0.0,
                 spring_dampings: Values::Uniform(0.0),
                 volume_stiffness: 0.0,
                 home_stiffnesses: Values::Each(&none[..node_count]),
