@@ -55,7 +55,10 @@ fuzz_target!(|bytes: &[u8]| {
     while !input.is_empty() && model.call(&mut input).is_ok() {}
     let steps = model.world.stop_recording().expect("a recording");
     for thread_count in [1, 2] {
-        let expected = ReplayReport { steps, ..ReplayReport::default() };
+        let expected = ReplayReport {
+            steps,
+            ..ReplayReport::default()
+        };
         assert_eq!(World::replay(&path, thread_count), Ok(expected));
     }
     if cfg!(planted) && steps > 0 {

@@ -53,7 +53,7 @@ fn frames(bytes: &[u8]) -> Vec<[usize; 2]> {
 #[test]
 fn random_calls_are_replayed_with_the_hashes_that_were_recorded() {
     let mut recorded = 0;
-    for seed in 10..13 {
+    for seed in 10..12 {
         let path = path(&format!("calls_{seed}"));
         let mut caller = Caller::new(seed);
         let mut worlds = vec![world(1)];
@@ -80,7 +80,7 @@ fn random_calls_are_replayed_with_the_hashes_that_were_recorded() {
         recorded += steps;
         fs::remove_file(&path).expect("the file");
     }
-    assert_eq!(recorded, 3 * 13);
+    assert_eq!(recorded, 2 * 13);
 }
 
 #[test]
