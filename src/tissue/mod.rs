@@ -211,7 +211,7 @@ impl Tissue {
         // What closes a step is half a kick, of VERLET alone.
         if !moment.drifts {
             self.touches
-                .note(&self.links, self.duration, |places| are_implicit(bodies, places));
+                .note(&self.links, self.duration, |places| !any_is_explicit(bodies, places));
         } else if moment.begins {
             self.touches.begin_island(self.islands.members(island));
         }
@@ -233,8 +233,9 @@ impl Tissue {
         let watch = Stopwatch::start(moment.profile);
         self.stop_what_meets(island, bodies, moment);
         if !moment.drifts {
-            self.touches
-                .note(&self.links, 0.5 * self.duration, |places| !are_implicit(bodies, places));
+            self.touches.note(&self.links, 0.5 * self.duration, |places| {
+                any_is_explicit(bodies, places)
+            });
         }
         watch.stop(moment.profile, Stage::ContactSolver);
         if let Some(profile) = moment.profile {
@@ -401,10 +402,10 @@ impl Tissue {
     }
 }
 
-/// Whether the bodies at these places are solved as equations.
-fn are_implicit(bodies: &impl Systems, places: [usize; 2]) -> bool {
-    let is_implicit = |place| bodies.at(place).is_some_and(|body| !body.is_explicit());
-    places.into_iter().all(is_implicit)
+/// Whether one of the bodies at these places takes half kicks.
+fn any_is_explicit(bodies: &impl Systems, places: [usize; 2]) -> bool {
+    let is_explicit = |place| bodies.at(place).is_none_or(System::is_explicit);
+    places.into_iter().any(is_explicit)
 }
 
 /// Does something with each of these bodies that tools press, or may press as tissue moves it, its skin and its contacts with tools.
