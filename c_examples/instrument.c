@@ -304,7 +304,7 @@ int main(int argc, char **argv) {
       get_wrenches(world, &pair, wrenches);
       for (i = 0; i < 2; i++) CHECK(sinew_tool_get_contacts(world, pair.jaws[i], NULL, 0, contacts + i));
       CHECK(sinew_world_get_contact_changes(world, changes, 4, &change_count));
-      while (change_count-- > 0) touching += changes[change_count].begun ? 1 : -1;
+      while (change_count-- > 0) touching += changes[change_count].has_begun ? 1 : -1;
 
       if (phase == STROKE) drag += -wrenches[2][0] / frames, touched[0] += contacts[0] > 0, touched[1] += contacts[1] > 0;
       if (phase == CLOSE) squeeze = fmin(wrenches[0][1], -wrenches[1][1]);

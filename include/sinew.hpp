@@ -303,6 +303,10 @@ public:
     sinew::pose out{};
     return check(sinew_blade_get_pose(world(), id, out.position.data(), out.orientation.data())), out;
   }
+  std::size_t contacts(span<sinew_contact> into) const { // one for each body; how many there are
+    std::size_t count = 0;
+    return check(sinew_blade_get_contacts(world(), id, into.data(), into.size(), &count)), count;
+  }
   void set_pose(vec3 position, quat orientation) {
     check(sinew_blade_set_pose(world(), id, position.data(), orientation.data()));
   }
@@ -349,6 +353,15 @@ public:
   }
   void set_gravity_scale(float scale) { check(sinew_body_set_gravity_scale(world(), id, scale)); }
   float gravity_scale() const { return viewed<float>(sinew_body_get_gravity_scale); }
+  void set_acceleration(vec3 acceleration) { check(sinew_body_set_acceleration(world(), id, acceleration.data())); }
+  vec3 acceleration() const {
+    vec3 out{};
+    return check(sinew_body_get_acceleration(world(), id, out.data())), out;
+  }
+  std::size_t contacts(span<sinew_contact> into) const { // with bodies; how many there are
+    std::size_t count = 0;
+    return check(sinew_body_get_contacts(world(), id, into.data(), into.size(), &count)), count;
+  }
   float pressure() const { return viewed<float>(sinew_body_get_pressure); }
   void set(const sinew_body_settings &settings) { check(sinew_body_set_settings(world(), id, &settings)); }
   sinew_body_settings settings() const { return reported<sinew_body_settings>(sinew_body_get_settings); }
@@ -642,6 +655,10 @@ public:
     return check(sinew_world_get_user_data(get(), &out)), out;
   }
   void set_profiling(bool enabled) { check(sinew_world_set_profiling(get(), enabled)); }
+  bool profiling() const {
+    std::uint32_t out = 0;
+    return check(sinew_world_get_profiling(get(), &out)), out != 0;
+  }
   sinew_profile profile() const { // of the last step, where profiling is on
     auto out = sized<sinew_profile>();
     return check(sinew_world_get_profile(get(), &out)), out;
@@ -729,6 +746,27 @@ private:
 // Messages up to a level, from all threads; nullptr: none.
 inline void set_log_callback(std::uint32_t level, sinew_log callback, void *context = nullptr) {
   check(sinew_set_log_callback(level, callback, context));
+}
+struct log_callback {
+  std::uint32_t level;
+  sinew_log callback;
+  void *context;
+};
+inline log_callback get_log_callback() {
+  log_callback out{};
+  return check(sinew_get_log_callback(&out.level, &out.callback, &out.context)), out;
+}
+
+// All memory of the library, in a build that has it; before any other call.
+struct allocator {
+  sinew_alloc alloc;
+  sinew_dealloc dealloc;
+  void *context;
+};
+inline void set_allocator(const allocator &of) { check(sinew_set_allocator(of.alloc, of.dealloc, of.context)); }
+inline allocator get_allocator() { // nullptr: the system's
+  allocator out{};
+  return check(sinew_get_allocator(&out.alloc, &out.dealloc, &out.context)), out;
 }
 
 // Replays a recording, up to the first step whose state differs.

@@ -20,8 +20,9 @@ use glam::Vec3;
 use held::held;
 use sinew::mesh::{Mesh, MeshFormat, load};
 use sinew::{
-    BodyContact, BodyDefinition, BodyId, BodyReader, ElementLaw, Embedding, EmbeddingDefinition, Material, Model,
-    Sleep, Solver, SpringLaw, Tearing, Values, Viscosity, World, WorldDefinition, Yielding,
+    BodyContact, BodyDefinition, BodyId, BodyReader, DebugCanvas, DebugDrawDefinition, ElementLaw, Embedding,
+    EmbeddingDefinition, Material, Model, Rgba, Sleep, Solver, SpringLaw, Tearing, Values, Viscosity, World,
+    WorldDefinition, Yielding,
 };
 
 const SUBSTEPS: u32 = 16;
@@ -40,7 +41,10 @@ const MAKES: usize = 3;
 
 /// What goes with a body rather than in it.
 const READER: &str = "read on another thread";
-const PROFILED: &str = "stages of the step timed";
+const PROFILED: &str = "hook: stages of the step timed";
+const TAGGED: &str = "hook: user data";
+const SKETCHED: &str = "hook: drawn for debugging in each step";
+const RECORDED: &str = "hook: recorded, with a hash of each step";
 const DRAWN: &str = "drawn: its surface, bound, with normals";
 
 /// A stomach where there is one, else a filled organ of as many nodes.
@@ -90,6 +94,24 @@ enum Beside {
     Reader(BodyReader),
     /// A surface with its normals.
     Drawn(Box<Embedding>),
+    Sketched,
+}
+
+/// Looks at what is drawn for debugging.
+struct Sketch;
+
+impl DebugCanvas for Sketch {
+    fn line(&mut self, ends: [Vec3; 2], color: Rgba) {
+        std::hint::black_box((ends, color));
+    }
+
+    fn point(&mut self, place: Vec3, color: Rgba) {
+        std::hint::black_box((place, color));
+    }
+
+    fn triangle(&mut self, corners: [Vec3; 3], color: Rgba) {
+        std::hint::black_box((corners, color));
+    }
 }
 
 impl<'a> Contender<'a> {
@@ -118,9 +140,21 @@ impl<'a> Contender<'a> {
         let beside = match name {
             READER => Beside::Reader(world.create_reader(body).expect("a reader")),
             DRAWN => Beside::Drawn(Box::new(world.create_embedding(body, drawn).expect("an embedding"))),
+            SKETCHED => Beside::Sketched,
             _ => Beside::Nothing,
         };
-        world.set_profiling(name == PROFILED).expect("room");
+        match name {
+            PROFILED => world.set_profiling(true).expect("room"),
+            TAGGED => {
+                world.set_user_data(1);
+                world.body_mut(body).expect("the body").set_user_data(1);
+            }
+            RECORDED => {
+                let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bill.recording");
+                world.start_recording(&path).expect("a file");
+            }
+            _ => (),
+        }
         let bytes = held() - before;
         // Every node trembles a little, so that something is worked out.
         let trembling =
@@ -164,6 +198,10 @@ impl<'a> Contender<'a> {
                 Beside::Drawn(drawn) => {
                     drawn.update(&self.world).expect("an update");
                     std::hint::black_box(drawn.normals());
+                }
+                Beside::Sketched => {
+                    let everything = DebugDrawDefinition::default();
+                    self.world.debug_draw(&everything, &mut Sketch).expect("a drawing");
                 }
             }
         });
@@ -212,6 +250,7 @@ fn main() -> ExitCode {
                 rest_positions: Some(&mesh.positions),
                 material: None,
                 node_dampings: Values::Each(&none[..node_count]),
+                damping_rate: 0.0,
                 spring_dampings: Values::Uniform(0.0),
                 volume_stiffness: 0.0,
                 home_stiffnesses: Values::Each(&none[..node_count]),
@@ -372,6 +411,9 @@ fn main() -> ExitCode {
         ),
         (READER, springs),
         (PROFILED, springs),
+        (TAGGED, springs),
+        (SKETCHED, springs),
+        (RECORDED, springs),
         (DRAWN, springs),
         (
             "springs from E",

@@ -7,7 +7,7 @@ public static unsafe class Sinew
 {
     const string Library = "sinew";
     public const uint SINEW_VERSION_MAJOR = 0;
-    public const uint SINEW_VERSION_MINOR = 1;
+    public const uint SINEW_VERSION_MINOR = 2;
     public const uint SINEW_VERSION_PATCH = 0;
     public const uint SINEW_NO_NODE = 4294967295;
     public const uint SINEW_AXIS_X = 1;
@@ -190,7 +190,7 @@ public static unsafe class Sinew
         public UIntPtr dropped_triangles;
         public UIntPtr dropped_tetrahedra;
         public UIntPtr flipped_tetrahedra;
-        public uint closed;
+        public uint is_closed;
         public uint* cells;
         public UIntPtr cell_count;
     }
@@ -237,9 +237,7 @@ public static unsafe class Sinew
         public uint order;
         public uint iterations;
         public float accuracy;
-        public uint reserved1;
         public float mass_scaling;
-        public uint reserved2;
         public uint* cells;
         public UIntPtr cell_count;
         public uint material;
@@ -288,6 +286,7 @@ public static unsafe class Sinew
         public fixed float position[3];
         public fixed float orientation[4];
         public float gravity_scale;
+        public float damping_rate;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -419,6 +418,7 @@ public static unsafe class Sinew
     public struct sinew_contact
     {
         public sinew_body_id body;
+        public void* body_user_data;
         public fixed uint nodes[3];
         public fixed float weights[3];
         public fixed float point[3];
@@ -562,7 +562,7 @@ public static unsafe class Sinew
         public fixed uint point_counts[2];
         public fixed uint edge_counts[2];
         public fixed uint unlisted[2];
-        public fixed uint closed[2];
+        public fixed uint is_closed[2];
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -952,6 +952,12 @@ public static unsafe class Sinew
     public static extern int sinew_body_get_gravity_scale(IntPtr world, sinew_body_id body, float* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_set_acceleration(IntPtr world, sinew_body_id body, float* acceleration);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_acceleration(IntPtr world, sinew_body_id body, float* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_pin_nodes(IntPtr world, sinew_body_id body, uint* nodes, UIntPtr count);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -972,12 +978,20 @@ public static unsafe class Sinew
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_world_get_total_wrench(IntPtr world, sinew_tool_id* tools, UIntPtr count, float* point, float* out_force, float* out_torque);
 
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_contacts(IntPtr world, sinew_body_id body, sinew_contact* out_contacts, UIntPtr capacity, UIntPtr* out_count);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_blade_get_contacts(IntPtr world, sinew_blade_id blade, sinew_contact* out_contacts, UIntPtr capacity, UIntPtr* out_count);
+
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_contact_change
     {
         public sinew_tool_id tool;
         public sinew_body_id body;
-        public uint begun;
+        public void* tool_user_data;
+        public void* body_user_data;
+        public uint has_begun;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -1088,7 +1102,7 @@ public static unsafe class Sinew
         public float error;
         public double added_mass;
         public uint solves;
-        public uint converged;
+        public uint has_converged;
         public uint solver;
         public uint auto_substeps;
         public float auto_step;
@@ -1171,6 +1185,9 @@ public static unsafe class Sinew
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_world_set_profiling(IntPtr world, uint enabled);
 
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_get_profiling(IntPtr world, uint* @out);
+
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_profile
     {
@@ -1233,7 +1250,7 @@ public static unsafe class Sinew
         public ulong first_difference;
         public ulong recorded_hash;
         public ulong replayed_hash;
-        public uint cut_short;
+        public uint is_cut_short;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -1243,4 +1260,13 @@ public static unsafe class Sinew
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_set_log_callback(uint level, IntPtr callback, void* context);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_get_log_callback(uint* out_level, IntPtr* out_callback, void** out_context);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_set_allocator(IntPtr alloc, IntPtr dealloc, void* context);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_get_allocator(IntPtr* out_alloc, IntPtr* out_dealloc, void** out_context);
 }

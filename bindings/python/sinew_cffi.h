@@ -1,6 +1,6 @@
 // Generated from include/sinew; do not edit. For ffi.cdef of cffi.
 #define SINEW_VERSION_MAJOR 0
-#define SINEW_VERSION_MINOR 1
+#define SINEW_VERSION_MINOR 2
 #define SINEW_VERSION_PATCH 0
 #define SINEW_NO_NODE 4294967295
 #define SINEW_AXIS_X 1
@@ -141,7 +141,7 @@ typedef struct sinew_mesh_view {
   size_t dropped_triangles;
   size_t dropped_tetrahedra;
   size_t flipped_tetrahedra;
-  uint32_t closed;
+  uint32_t is_closed;
   const uint32_t *cells;
   size_t cell_count;
 } sinew_mesh_view;
@@ -200,9 +200,7 @@ typedef struct sinew_body_def {
   uint32_t order;
   uint32_t iterations;
   float accuracy;
-  uint32_t reserved1;
   float mass_scaling;
-  uint32_t reserved2;
   const uint32_t *cells;
   size_t cell_count;
   uint32_t material;
@@ -251,6 +249,7 @@ typedef struct sinew_body_def {
   float position[3];
   float orientation[4];
   float gravity_scale;
+  float damping_rate;
 } sinew_body_def;
 sinew_status sinew_body_def_init(sinew_body_def *def, size_t struct_size);
 sinew_status sinew_body_create(sinew_world *world, const sinew_body_def *def, sinew_body_id *out);
@@ -333,6 +332,7 @@ sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool,
     float *torque);
 typedef struct sinew_contact {
   sinew_body_id body;
+  void *body_user_data;
   uint32_t nodes[3];
   float weights[3];
   float point[3];
@@ -441,7 +441,7 @@ typedef struct sinew_detector_report {
   uint32_t point_counts[2];
   uint32_t edge_counts[2];
   uint32_t unlisted[2];
-  uint32_t closed[2];
+  uint32_t is_closed[2];
 } sinew_detector_report;
 sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,
     sinew_detector_report *out_report);
@@ -701,6 +701,9 @@ sinew_status sinew_body_apply_impulses(sinew_world *world, sinew_body_id body,
     const uint32_t *nodes, const float *impulses, size_t count);
 sinew_status sinew_body_set_gravity_scale(sinew_world *world, sinew_body_id body, float scale);
 sinew_status sinew_body_get_gravity_scale(const sinew_world *world, sinew_body_id body, float *out);
+sinew_status sinew_body_set_acceleration(sinew_world *world, sinew_body_id body,
+    const float *acceleration);
+sinew_status sinew_body_get_acceleration(const sinew_world *world, sinew_body_id body, float *out);
 sinew_status sinew_body_pin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
     size_t count);
 sinew_status sinew_body_unpin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
@@ -715,10 +718,16 @@ sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool,
     float *out_position, float *out_orientation);
 sinew_status sinew_world_get_total_wrench(const sinew_world *world, const sinew_tool_id *tools,
     size_t count, const float *point, float *out_force, float *out_torque);
+sinew_status sinew_body_get_contacts(const sinew_world *world, sinew_body_id body,
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
+sinew_status sinew_blade_get_contacts(const sinew_world *world, sinew_blade_id blade,
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
 typedef struct sinew_contact_change {
   sinew_tool_id tool;
   sinew_body_id body;
-  uint32_t begun;
+  void *tool_user_data;
+  void *body_user_data;
+  uint32_t has_begun;
 } sinew_contact_change;
 sinew_status sinew_world_get_contact_changes(const sinew_world *world,
     sinew_contact_change *out_changes, size_t capacity, size_t *out_count);
@@ -783,7 +792,7 @@ typedef struct sinew_solver_report {
   float error;
   double added_mass;
   uint32_t solves;
-  uint32_t converged;
+  uint32_t has_converged;
   uint32_t solver;
   uint32_t auto_substeps;
   float auto_step;
@@ -853,6 +862,7 @@ sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
     const sinew_picture_def *def, const sinew_body_values *coloured, size_t count,
     const char *path);
 sinew_status sinew_world_set_profiling(sinew_world *world, uint32_t enabled);
+sinew_status sinew_world_get_profiling(const sinew_world *world, uint32_t *out);
 typedef struct sinew_profile {
   size_t struct_size;
   double step;
@@ -905,7 +915,7 @@ typedef struct sinew_replay_report {
   uint64_t first_difference;
   uint64_t recorded_hash;
   uint64_t replayed_hash;
-  uint32_t cut_short;
+  uint32_t is_cut_short;
 } sinew_replay_report;
 sinew_status sinew_replay(const char *path, uint32_t thread_count, sinew_replay_report *out);
 typedef void (*sinew_log)(void *context, uint32_t level, const char *message);
@@ -916,3 +926,10 @@ typedef enum sinew_log_level {
   SINEW_LOG_WARNING = 3
 } sinew_log_level;
 sinew_status sinew_set_log_callback(uint32_t level, sinew_log callback, void *context);
+sinew_status sinew_get_log_callback(uint32_t *out_level, sinew_log *out_callback,
+    void **out_context);
+typedef void *(*sinew_alloc)(void *context, size_t size, size_t alignment);
+typedef void (*sinew_dealloc)(void *context, void *memory, size_t size, size_t alignment);
+sinew_status sinew_set_allocator(sinew_alloc alloc, sinew_dealloc dealloc, void *context);
+sinew_status sinew_get_allocator(sinew_alloc *out_alloc, sinew_dealloc *out_dealloc,
+    void **out_context);

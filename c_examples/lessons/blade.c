@@ -6,7 +6,8 @@
  *
  * Output:
  *   cut 58 mm in 60 steps
- *   largest force 0.5 N
+ *   largest force 0.5 N; pressed the sheet: yes
+ *   it ended at z = 9 mm; there after its end: no
  *   work / (toughness * length) = 1.0
  */
 #include "../example.h"
@@ -43,6 +44,7 @@ int main(void) {
   CHECK(sinew_blade_create(world, &blade_def, &blade));
 
   double work = 0, length = 0, largest = 0;
+  int pressed = 0;
   float position[3] = {0.001f, 0.0f, -0.051f};
   for (int i = 0; i < 60; i++) {
     position[2] += 0.001f; /* 1 mm per step of 10 ms */
@@ -51,6 +53,9 @@ int main(void) {
     sinew_blade_report report;
     report.struct_size = sizeof report;
     CHECK(sinew_blade_get_report(world, blade, &report));
+    size_t bodies;
+    CHECK(sinew_blade_get_contacts(world, blade, NULL, 0, &bodies)); /* which bodies it presses, where and with what force */
+    pressed += bodies > 0;
     CHECK(report.status); /* a cut that fails does not fail the step */
     work += report.work;
     length += report.length;
@@ -58,7 +63,11 @@ int main(void) {
   }
   /* The blade travels 60 mm: 1 mm outside of the sheet, and its cut lags behind by the deformation. */
   printf("cut %.0f mm in 60 steps\n", 1e3 * length);
-  printf("largest force %.1f N\n", largest);
+  printf("largest force %.1f N; pressed the sheet: %s\n", largest, pressed > 50 ? "yes" : "no");
+  float reached[3];
+  CHECK(sinew_blade_get_pose(world, blade, reached, NULL));
+  CHECK(sinew_blade_destroy(world, blade)); /* what it has cut stays cut */
+  printf("it ended at z = %.0f mm; there after its end: %s\n", 1e3 * reached[2], sinew_blade_is_valid(world, blade) ? "yes" : "no");
   printf("work / (toughness * length) = %.1f\n", work / (TOUGHNESS * length));
   sinew_world_destroy(world);
   return 0;

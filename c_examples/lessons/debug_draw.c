@@ -53,6 +53,8 @@ int main(void) {
 
   CHECK(sinew_world_set_profiling(world, 1));
   step_world(world, FRAME, 3);
+  uint32_t is_profiled;
+  CHECK(sinew_world_get_profiling(world, &is_profiled));
   printf("pinned corners: %d points\n", draw(world, SINEW_DRAW_PINS).points);
   printf("box: %d lines\n", draw(world, SINEW_DRAW_BOUNDS).lines);
   printf("springs are drawn: %s\n", draw(world, SINEW_DRAW_SPRINGS).lines > 100 ? "yes" : "no");
@@ -60,7 +62,7 @@ int main(void) {
   sinew_profile profile;
   profile.struct_size = sizeof profile;
   CHECK(sinew_world_get_profile(world, &profile)); /* seconds by stage, of the last step */
-  const int timed = profile.step > 0 && profile.forces > 0 && profile.forces < profile.step;
+  const int timed = is_profiled && profile.step > 0 && profile.forces > 0 && profile.forces < profile.step;
   printf("the step was timed: %s, %u body\n", timed ? "yes" : "no", (unsigned)profile.bodies);
   sinew_world_destroy(world);
   return 0;

@@ -7,6 +7,7 @@
  *   525 nodes move 12221 vertices
  *   vertices follow the body: yes
  *   normals have length 1: yes
+ *   positions of yours draw it 1 m away: yes
  */
 #include "../example.h"
 
@@ -61,6 +62,17 @@ int main(void) {
   const double length = distance(node(normals, normals.count - 1), zero);
   printf("vertices follow the body: %s\n", apart < 1e-5 && node(nodes, nodes.count - 1)[1] < 0.015f ? "yes" : "no");
   printf("normals have length 1: %s\n", fabs(length - 1) < 1e-5 ? "yes" : "no");
+
+  /* Any positions: those of a reader's frame, or a blend of two steps. */
+  const size_t count = 3 * nodes.count;
+  float *shifted = (float *)allocate(count, sizeof *shifted);
+  for (size_t i = 0; i < count; i++) shifted[i] = node(nodes, i / 3)[i % 3] + (i % 3 == 0 ? 1.0f : 0.0f);
+  float corner[3];
+  memcpy(corner, node(vertices, 0), sizeof corner);
+  CHECK(sinew_embedding_update_from(drawn, shifted, nodes.count));
+  CHECK(sinew_embedding_get_positions(drawn, &vertices));
+  printf("positions of yours draw it 1 m away: %s\n", fabs(distance(node(vertices, 0), corner) - 1) < 1e-5 ? "yes" : "no");
+  free(shifted);
   sinew_embedding_destroy(drawn);
   sinew_world_destroy(world);
   return 0;

@@ -26,9 +26,12 @@ int main(void) {
   sinew_mesh_destroy(mesh);
   pin_below(world, beam, 0, -0.049f);
 
+  sinew_equilibrium_def search;
+  CHECK(sinew_equilibrium_def_init(&search, sizeof search));
+  search.tolerance = 1e-7f; /* m */
   sinew_equilibrium_report report;
   report.struct_size = sizeof report;
-  CHECK(sinew_body_solve_equilibrium(world, beam, NULL, &report)); /* NULL: default tolerance */
+  CHECK(sinew_body_solve_equilibrium(world, beam, &search, &report)); /* NULL in place of the definition: its defaults */
   printf("found: the largest force left is %s 1 mN\n", report.residual < 1e-3 ? "below" : "not below");
 
   sinew_vec3_view nodes;

@@ -8,6 +8,7 @@
  *   force before contact: 0.0 N
  *   the tissue pushes back: yes
  *   the force never jumped by more than 0.1 N: yes
+ *   contacts: yes, led to within 1 mm of the hand: yes
  */
 #include "../example.h"
 
@@ -53,6 +54,14 @@ int main(void) {
   printf("force before contact: %.1f N\n", fabs(before_contact));
   printf("the tissue pushes back: %s\n", last > 0.05 ? "yes" : "no");
   printf("the force never jumped by more than 0.1 N: %s\n", largest_jump <= 0.1 ? "yes" : "no");
+
+  /* What is felt, for a display: the contacts of the last tick, and where the device led the tool. */
+  size_t contacts;
+  float led[3];
+  CHECK(sinew_haptic_get_contacts(haptic, NULL, 0, &contacts));
+  CHECK(sinew_tool_get_target(world, haptic_def.tool, led, NULL));
+  printf("contacts: %s, led to within 1 mm of the hand: %s\n", contacts > 0 ? "yes" : "no",
+         distance(led, hand) < 1e-3 ? "yes" : "no");
   sinew_haptic_destroy(haptic);
   sinew_world_destroy(world);
   return 0;

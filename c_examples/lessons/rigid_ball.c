@@ -39,6 +39,9 @@ static void drop(float mass) {
   properties.struct_size = sizeof properties;
   CHECK(sinew_tool_get_mass_of_density(world, ball, mass / 0.0141372f, &properties));
   CHECK(sinew_tool_set_mass(world, ball, &properties));
+  CHECK(sinew_tool_get_mass(world, ball, &properties));
+  const float thrown[3] = {0, -0.5f, 0}, spin[3] = {0, 1, 0};
+  CHECK(sinew_tool_set_velocity(world, ball, thrown, spin)); /* m/s, rad/s */
 
   float position[3], velocity[3], force[3];
   for (int step = 0; step < 600; step++) CHECK(sinew_world_step(world, 1.0f / 60.0f, NULL));

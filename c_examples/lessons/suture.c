@@ -8,6 +8,7 @@
  *   gap before: 10.0 mm
  *   gap after: 1.0 mm
  *   the thread pulls with a force: yes
+ *   torn out: 0
  */
 #include "../example.h"
 
@@ -43,8 +44,11 @@ int main(void) {
   CHECK(sinew_world_find_nearest(world, near_left, 0.01f, &a));
   CHECK(sinew_world_find_nearest(world, near_right, 0.01f, &b));
 
+  sinew_suture_def thread;
+  CHECK(sinew_suture_def_init(&thread, sizeof thread));
+  thread.force_limit = 5.0f; /* N: with more it tears out */
   sinew_attachment_id suture;
-  CHECK(sinew_suture_create(world, &a, &b, NULL, &suture));
+  CHECK(sinew_suture_create(world, &a, &b, &thread, &suture));
   sinew_suture_report report;
   report.struct_size = sizeof report;
   CHECK(sinew_suture_get_report(world, suture, &report));
@@ -58,6 +62,9 @@ int main(void) {
   float force[3];
   CHECK(sinew_attachment_get_force(world, suture, force));
   printf("the thread pulls with a force: %s\n", force[0] > 0.01f ? "yes" : "no");
+  size_t broken;
+  CHECK(sinew_world_get_broken_attachments(world, NULL, 0, &broken)); /* in the last step */
+  printf("torn out: %u\n", (unsigned)broken);
   sinew_world_destroy(world);
   return 0;
 }

@@ -67,7 +67,7 @@ extern "C" {
 // ---- Version ------------------------------------------------------------------------------------
 
 #define SINEW_VERSION_MAJOR 0  ///< Major version of this header.
-#define SINEW_VERSION_MINOR 1  ///< Minor version of this header.
+#define SINEW_VERSION_MINOR 2  ///< Minor version of this header.
 #define SINEW_VERSION_PATCH 0  ///< Patch version of this header.
 /// Version of this header as one number: major << 16 | minor << 8 | patch.
 #define SINEW_VERSION (((SINEW_VERSION_MAJOR << 16) | (SINEW_VERSION_MINOR << 8)) | SINEW_VERSION_PATCH)
@@ -250,8 +250,7 @@ typedef struct sinew_step_report {
 
 /// Advances everything in the world by one time step.
 /// `dt` [s] is above 0. `report` is nullable. The call ends the views of positions and velocities.
-/// Errors: SINEW_STATUS_UNSTABLE if the step needs more than max_substeps, or more than the fixed
-/// number of substeps.
+/// Errors: SINEW_STATUS_UNSTABLE if the step needs more than max_substeps or the fixed substeps.
 sinew_status sinew_world_step(sinew_world *world, float dt, sinew_step_report *report);
 
 /// Sets the gravitational acceleration [m/s^2], 3 floats, from the next step on.
@@ -358,7 +357,7 @@ typedef struct sinew_mesh_view {
   size_t dropped_triangles;        ///< Number of degenerate or duplicate triangles dropped.
   size_t dropped_tetrahedra;       ///< Number of degenerate or duplicate tetrahedra dropped.
   size_t flipped_tetrahedra;       ///< Number of inverted tetrahedra corrected.
-  uint32_t closed;  ///< 1: every surface edge is used equally often in both directions; 0: open.
+  uint32_t is_closed;  ///< 1: every surface edge is used equally often in both directions; 0: open.
   const uint32_t *cells;  ///< 8 * cell_count node indices of cubes; corner bits: x 1, y 2, z 4.
   size_t cell_count;               ///< Number of cells.
 } sinew_mesh_view;
@@ -457,13 +456,11 @@ typedef struct sinew_body_def {
   /// IMPLICIT, NEWTON: error of the linear solve, 1e-6 to 1, relative to the displacement that
   /// forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
   float accuracy;
-  uint32_t reserved1;              ///< Reserved; must be 0.
   /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1;
   /// default 0.001. A step that would be refused may add more. Mass is added only if it saves 1/4
   /// of the substeps, never with fixed substeps or a tolerance. It adds inertia but no weight. See
   /// sinew_solver_report.
   float mass_scaling;
-  uint32_t reserved2;              ///< Reserved; must be 0.
   /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells. Corner bits: x 1, y 2,
   /// z 4. Springs are the edges and face diagonals.
   const uint32_t *cells;
@@ -550,8 +547,7 @@ typedef struct sinew_body_def {
   /// with the larger separating force, across it; a solid along faces. A step that tears may
   /// allocate. See sinew_body_set_tear_limits.
   float tear_strain;
-  /// [N] Force above which a spring tears; 0: never. For bodies of elements alone it is
-  /// SINEW_STATUS_UNSUPPORTED.
+  /// [N] Force above which a spring tears; 0: never. SINEW_STATUS_UNSUPPORTED for elements alone.
   float tear_force;
   uint32_t most_tears;  ///< Maximum number of tears per step; 0: does not tear. Needs spare_nodes.
   float smallest_piece;            ///< Minimum fragment size at rest: [m^2], or [m^3] for solids.
@@ -567,6 +563,7 @@ typedef struct sinew_body_def {
   float position[3];  ///< [m] Translation of all positions, after the rotation; default 0 0 0.
   float orientation[4];  ///< Rotation of positions and fibers about the origin; default 0 0 0 1.
   float gravity_scale;  ///< Factor of the world's gravity on this body, finite; default 1.
+  float damping_rate;  ///< [1/s] Drag on each node relative to its mass, added to node_damping.
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
@@ -778,14 +775,15 @@ sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id to
 sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool, float *force,
     float *torque);
 
-/// Contact between a tool and a body at the end of the last step.
+/// Contact of a tool, blade or body with a body at the end of the last step.
 typedef struct sinew_contact {
-  sinew_body_id body;  ///< Body that the tool touches.
-  uint32_t nodes[3];   ///< Nodes of the touched node, edge or face; the last is repeated below 3.
-  float weights[3];    ///< Weights of the nodes at the contact point; 0 for a repeated node.
-  float point[3];      ///< [m] Contact point on the body.
-  float normal[3];     ///< Unit normal that points away from the tool.
-  float force[3];      ///< [N] Force on the tool in the last substep; the wrench is a mean.
+  sinew_body_id body;    ///< Body that is touched.
+  void *body_user_data;  ///< Pointer of sinew_body_set_user_data.
+  uint32_t nodes[3];     ///< Nodes of what is touched, the last repeated; blade: UINT32_MAX.
+  float weights[3];      ///< Weights of the nodes at the contact point; 0 for a repeated node.
+  float point[3];        ///< [m] Contact point on the body.
+  float normal[3];       ///< Unit normal that points toward the touched body; 0 for a blade.
+  float force[3];        ///< [N] Force on the tool, blade or body in the last substep.
 } sinew_contact;
 
 /// Writes the contacts of a tool at the end of the last step.
@@ -833,8 +831,7 @@ sinew_status sinew_body_add_spring(sinew_world *world, sinew_body_id body, uint3
     float stiffness, float rest_length);
 
 /// Removes the spring between two nodes, and the tetrahedra and the bending that have this edge.
-/// The tetrahedra are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the
-/// edge.
+/// The tetrahedra are those of SINEW_MATERIAL_TETRAHEDRA. A cavity with the edge opens.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if there is nothing between the nodes.
 sinew_status sinew_body_remove_spring(sinew_world *world, sinew_body_id body, uint32_t a,
     uint32_t b);
@@ -854,8 +851,7 @@ sinew_status sinew_body_get_springs(const sinew_world *world, sinew_body_id body
 
 /// Sets stiffnesses, rest lengths or both of the springs between pairs of nodes.
 /// `pairs` holds 2 * count indices, `stiffnesses` [N/m] and `rest_lengths` [m] `count` floats each,
-/// nullable: unchanged. If a pair repeats, its last entry counts. Damping, force law and motion
-/// stay.
+/// nullable: unchanged. If a pair repeats, its last entry counts. Damping, law and motion stay.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 sinew_status sinew_body_set_springs(sinew_world *world, sinew_body_id body, const uint32_t *pairs,
     const float *stiffnesses, const float *rest_lengths, size_t count);
@@ -1011,7 +1007,7 @@ typedef struct sinew_detector_report {
   uint32_t point_counts[2];  ///< Number of entries of sinew_detector_get_points.
   uint32_t edge_counts[2];   ///< Number of entries of sinew_detector_get_edges.
   uint32_t unlisted[2];      ///< Number of edge parts beyond four per edge on average.
-  uint32_t closed[2];  ///< 1: closed; 0: open, and nothing is found inside; not checked again.
+  uint32_t is_closed[2];  ///< 1: closed; 0: open, and nothing is found inside; not checked again.
 } sinew_detector_report;
 
 /// Finds the overlap of the two bodies at their current positions.
@@ -1112,8 +1108,7 @@ sinew_status sinew_suture_def_init(sinew_suture_def *def, size_t struct_size);
 
 /// Joins two surface points of bodies by a thread, which pulls and never pushes.
 /// Body, triangle and weights of the points count. The bodies may be the same and still collide.
-/// `def` is nullable: the defaults. The thread is drawn in at no more than 0.25 m/s. It is an
-/// attachment.
+/// `def` is nullable: the defaults. It is drawn in at no more than 0.25 m/s. It is an attachment.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if both points are the same.
 sinew_status sinew_suture_create(sinew_world *world, const sinew_surface_point *point,
     const sinew_surface_point *other_point, const sinew_suture_def *def, sinew_attachment_id *out);
@@ -1595,6 +1590,13 @@ sinew_status sinew_body_set_gravity_scale(sinew_world *world, sinew_body_id body
 /// Writes the factor of the world's gravity on a body.
 sinew_status sinew_body_get_gravity_scale(const sinew_world *world, sinew_body_id body, float *out);
 
+/// Sets an acceleration [m/s^2] of a body beside gravity, such as wind, from the next step on.
+sinew_status sinew_body_set_acceleration(sinew_world *world, sinew_body_id body,
+    const float *acceleration);
+
+/// Writes the acceleration [m/s^2] of sinew_body_set_acceleration, 3 floats; 0 by default.
+sinew_status sinew_body_get_acceleration(const sinew_world *world, sinew_body_id body, float *out);
+
 // ---- Several pins -------------------------------------------------------------------------------
 
 /// Pins `count` nodes at their current positions; see sinew_body_pin.
@@ -1621,11 +1623,10 @@ sinew_status sinew_body_unpin_box(sinew_world *world, sinew_body_id body, const 
 sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body,
     float *out_forces, size_t node_count);
 
-// ---- Tools --------------------------------------------------------------------------------------
+// ---- Tools and contacts -------------------------------------------------------------------------
 
 /// Writes the pose that the last step moved a tool to, before the force_limit.
-/// Both outputs are nullable. Replaying these poses reproduces the steps, also those of a haptic
-/// handle.
+/// Both outputs are nullable. Replaying these poses reproduces the steps, also of a haptic handle.
 sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool,
     float *out_position, float *out_orientation);
 
@@ -1635,11 +1636,23 @@ sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool,
 sinew_status sinew_world_get_total_wrench(const sinew_world *world, const sinew_tool_id *tools,
     size_t count, const float *point, float *out_force, float *out_torque);
 
+/// Writes the contacts of a body with other bodies and itself; none while it sleeps.
+/// Outputs are those of sinew_tool_get_contacts.
+sinew_status sinew_body_get_contacts(const sinew_world *world, sinew_body_id body,
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
+
+/// Writes the bodies that a blade pressed in the last step, each with a mean point and force.
+/// Outputs are those of sinew_tool_get_contacts.
+sinew_status sinew_blade_get_contacts(const sinew_world *world, sinew_blade_id blade,
+    sinew_contact *out_contacts, size_t capacity, size_t *out_count);
+
 /// Contact between a tool and a body that began or ended in the last step.
 typedef struct sinew_contact_change {
-  sinew_tool_id tool;  ///< Tool of the contact.
-  sinew_body_id body;  ///< Body of the contact.
-  uint32_t begun;      ///< 1: the contact began; 0: it ended.
+  sinew_tool_id tool;    ///< Tool of the contact.
+  sinew_body_id body;    ///< Body of the contact.
+  void *tool_user_data;  ///< Pointer of sinew_tool_set_user_data.
+  void *body_user_data;  ///< Pointer of sinew_body_set_user_data.
+  uint32_t has_begun;    ///< 1: the contact began; 0: it ended.
 } sinew_contact_change;
 
 /// Writes the contacts that began or ended in the last step.
@@ -1708,6 +1721,7 @@ sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
 /// The first calls measure. A step can be late if the scene became slower. For a bitwise replay
 /// record `work` of `report`, which is nullable.
+/// Errors: those of sinew_world_step_with_budget; SINEW_STATUS_UNSUPPORTED on WebAssembly.
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
     sinew_step_report *report);
 
@@ -1789,7 +1803,7 @@ typedef struct sinew_solver_report {
   float error;
   double added_mass;       ///< [kg] VERLET: total mass that mass_scaling adds.
   uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved.
-  uint32_t converged;  ///< IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding.
+  uint32_t has_converged;  ///< IMPLICIT, NEWTON: 1 if each solve reached its tolerance or rounding.
   uint32_t solver;         ///< Solver in use, a sinew_solver value; never AUTO.
   uint32_t auto_substeps;  ///< Substeps of VERLET on creation; above 150 AUTO takes IMPLICIT.
   float auto_step;  ///< [s] AUTO: step length of the choice, the mean so far or 1/60 s; else 0.
@@ -1903,13 +1917,17 @@ sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
     const sinew_picture_def *def, const sinew_body_values *coloured, size_t count,
     const char *path);
 
-// sinew/debug.h: profile, debug drawing, recording, log.
+// sinew/debug.h: profile, debug drawing, recording, log, allocator.
 
 // ---- Profile ------------------------------------------------------------------------------------
 
 /// Turns the profile of each step on (1) or off (0, the default).
 /// A step that is not profiled reads no clock. Profiling changes no result.
+/// Errors: SINEW_STATUS_UNSUPPORTED on WebAssembly, which has no clock.
 sinew_status sinew_world_set_profiling(sinew_world *world, uint32_t enabled);
+
+/// Writes 1 if steps are profiled, else 0.
+sinew_status sinew_world_get_profiling(const sinew_world *world, uint32_t *out);
 
 /// Times and counts of the last step, taken or refused.
 /// Times of stages are summed over threads. Counts of contacts are summed over all substeps.
@@ -1994,17 +2012,16 @@ typedef struct sinew_replay_report {
   uint64_t first_difference;  ///< Number of the first step that differs, from 1; 0: none.
   uint64_t recorded_hash;     ///< State hash after that step in the recording; else 0.
   uint64_t replayed_hash;     ///< State hash after that step in the replay; else 0.
-  uint32_t cut_short;         ///< 1 if the file ends within a step, else 0.
+  uint32_t is_cut_short;      ///< 1 if the file ends within a step, else 0.
 } sinew_replay_report;
 
 /// Replays a recording and compares the state hash after each step, up to the first difference.
-/// `path` is UTF-8, `thread_count` as in sinew_world_def. Use the library version and the kernel of
-/// the recording.
+/// `path` is UTF-8, `thread_count` that of sinew_world_def. Use the recording's version and kernel.
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_INVALID_ARGUMENT if the file is no recording or damaged;
 /// SINEW_STATUS_UNSUPPORTED for another library version.
 sinew_status sinew_replay(const char *path, uint32_t thread_count, sinew_replay_report *out);
 
-// ---- Log ----------------------------------------------------------------------------------------
+// ---- Log and memory -----------------------------------------------------------------------------
 
 /// Callback that receives a message, which is valid during the call only.
 /// It may run on any thread that calls the library. It must not call the library.
@@ -2022,6 +2039,27 @@ typedef enum sinew_log_level {
 /// `level` is a sinew_log_level value. `callback` (none) and `context` are nullable. Other threads
 /// may still be in the callback that it replaces.
 sinew_status sinew_set_log_callback(uint32_t level, sinew_log callback, void *context);
+
+/// Writes the level, callback and context of sinew_set_log_callback; all outputs are nullable.
+sinew_status sinew_get_log_callback(uint32_t *out_level, sinew_log *out_callback,
+    void **out_context);
+
+/// Callback that returns `size` bytes at a multiple of `alignment`, or NULL without memory.
+typedef void *(*sinew_alloc)(void *context, size_t size, size_t alignment);
+
+/// Callback that frees memory of sinew_alloc; `size` and `alignment` are those of its request.
+typedef void (*sinew_dealloc)(void *context, void *memory, size_t size, size_t alignment);
+
+/// Sets the functions that allocate all memory of the library, until the process ends.
+/// Call it before every other function. Both run on any thread that uses the library, and must not
+/// call it. `context` is nullable. Thread stacks and memory of the C library are not routed.
+/// Errors: SINEW_STATUS_UNSUPPORTED without the cargo feature `allocator`;
+/// SINEW_STATUS_INVALID_ARGUMENT after the first allocation, also for the message of a failed call.
+sinew_status sinew_set_allocator(sinew_alloc alloc, sinew_dealloc dealloc, void *context);
+
+/// Writes what sinew_set_allocator has set, else NULL; all outputs are nullable.
+sinew_status sinew_get_allocator(sinew_alloc *out_alloc, sinew_dealloc *out_dealloc,
+    void **out_context);
 
 #ifdef __cplusplus
 }

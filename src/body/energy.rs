@@ -9,7 +9,7 @@ impl Energy {
     pub(crate) fn of(body: &Body, gravity: Vec3) -> Self {
         let mut energy = Self::default();
         let (positions, velocities) = (body.system.state.positions(), body.velocities());
-        let gravity = (gravity * body.system.gravity_scale).as_dvec3();
+        let gravity = body.system.pull(gravity).as_dvec3();
         for node in 0..body.node_count() {
             let mass = f64::from(body.system.masses[node]);
             let position = positions.get(node).as_dvec3();

@@ -26,6 +26,7 @@ impl Body {
             }
         }
         hasher.write_floats(&[system.gravity_scale]);
+        hasher.write_floats(&system.acceleration.to_array());
         hasher.write_floats(&system.masses);
         hasher.write_floats(&system.inverse_masses);
         if let Some(damping) = &system.damping {

@@ -313,19 +313,26 @@ impl Body {
     pub(crate) fn contacts_with(&self, slot: usize, body: BodyId) -> impl Iterator<Item = Contact> {
         let contacts = self.system.contacts.iter();
         let touches = contacts.flat_map(move |contacts| contacts.touches(slot));
-        touches.map(move |touch| {
-            let nodes = touch.nodes.map(|node| self.system.order.caller(node));
-            let places = nodes.map(|node| self.published.positions()[node as usize].as_dvec3());
-            let point = (0..3).map(|corner| places[corner] * f64::from(touch.weights[corner]));
-            Contact {
-                body,
-                nodes,
-                weights: touch.weights,
-                point: point.sum::<DVec3>().as_vec3(),
-                normal: touch.normal,
-                force: touch.force,
-            }
+        touches.map(move |touch| Contact {
+            normal: touch.normal,
+            force: touch.force,
+            ..self.contact_at(body, touch.nodes, touch.weights)
         })
+    }
+
+    /// A contact at a point of nodes in its own numbers, without a force.
+    pub(crate) fn contact_at(&self, body: BodyId, nodes: [u32; 3], weights: [f32; 3]) -> Contact {
+        let nodes = nodes.map(|node| self.system.order.caller(node));
+        let places = nodes.map(|node| self.published.positions()[node as usize].as_dvec3());
+        let point = (0..3).map(|corner| places[corner] * f64::from(weights[corner]));
+        Contact {
+            body,
+            nodes,
+            weights,
+            point: point.sum::<DVec3>().as_vec3(),
+            normal: Vec3::ZERO,
+            force: Vec3::ZERO,
+        }
     }
 
     /// How fast a point of its surface moves, m/s: about as the last step ended, up to half a substep before.

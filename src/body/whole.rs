@@ -125,6 +125,23 @@ impl Body {
         Ok(())
     }
 
+    /// What acts on all its nodes beside gravity, m/s²: 0 unless it was set.
+    pub fn acceleration(&self) -> Vec3 {
+        self.system.acceleration
+    }
+
+    /// Lets this acceleration act on all nodes beside gravity from the next step on: a wind, or a field that is the same everywhere.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: it is not finite.
+    pub fn set_acceleration(&mut self, acceleration: Vec3) -> Result<()> {
+        finite_vector("acceleration", acceleration)?;
+        if std::mem::replace(&mut self.system.acceleration, acceleration) != acceleration {
+            self.system.wake();
+        }
+        Ok(())
+    }
+
     /// Has tools and other bodies meet it as this filter says, from the next step on. What lies within it or them then is pushed out.
     pub fn set_collision_filter(&mut self, filter: CollisionFilter) {
         self.system.contact.filter = filter;

@@ -383,7 +383,7 @@ pub unsafe extern "C" fn sinew_body_set_pressure(
 
 /// Removes the spring between two nodes, and the tetrahedra and the bending that have this edge.
 ///
-/// The tetrahedra are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the edge.
+/// The tetrahedra are those of SINEW_MATERIAL_TETRAHEDRA. A cavity with the edge opens.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if there is nothing between the nodes.
 #[unsafe(no_mangle)]

@@ -44,9 +44,7 @@ impl sinew_body_def {
             order: 0,
             iterations: 0,
             accuracy: 0.0,
-            reserved1: 0,
             mass_scaling: BodyDefinition::default().mass_scaling,
-            reserved2: 0,
             cells: std::ptr::null(),
             cell_count: 0,
             material: SINEW_MATERIAL_NONE,
@@ -95,6 +93,7 @@ impl sinew_body_def {
             position: [0.0; 3],
             orientation: [0.0, 0.0, 0.0, 1.0],
             gravity_scale: 1.0,
+            damping_rate: 0.0,
         }
     }
 
@@ -224,8 +223,6 @@ impl sinew_body_def {
     /// Every array is NULL or has as many entries as the definition states.
     pub(super) unsafe fn definition<'a>(&self) -> Result<BodyDefinition<'a>> {
         memory::reserved("reserved", self.reserved)?;
-        memory::reserved("reserved1", self.reserved1)?;
-        memory::reserved("reserved2", self.reserved2)?;
         if self.springs.is_null() && self.spring_count > 0 {
             return Err(Error::invalid(format!(
                 "springs is NULL while spring_count is {}",
@@ -243,6 +240,7 @@ impl sinew_body_def {
                 rest_positions: memory::optional_array("rest_positions", self.rest_positions.cast(), nodes)?,
                 masses: values("masses", self.masses, nodes, self.node_mass)?,
                 node_dampings: values("node_dampings", self.node_dampings, nodes, self.node_damping)?,
+                damping_rate: self.damping_rate,
                 springs: memory::optional_array("springs", self.springs.cast(), springs)?,
                 stiffnesses: values("stiffnesses", self.stiffnesses, springs, self.stiffness)?,
                 rest_lengths: memory::optional_array("rest_lengths", self.rest_lengths, springs)?,

@@ -38,6 +38,8 @@ pub unsafe extern "C" fn sinew_world_step_with_budget(
 ///
 /// The first calls measure. A step can be late if the scene became slower. For a bitwise replay record `work` of
 /// `report`, which is nullable.
+///
+/// Errors: those of sinew_world_step_with_budget; SINEW_STATUS_UNSUPPORTED on WebAssembly.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_step_within(
     world: *mut sinew_world,

@@ -1,27 +1,35 @@
 //! What contact did in the last step.
 
+use std::ffi::c_void;
+
+use super::blade::sinew_blade_id;
 use super::body::sinew_body_id;
 use super::guard::{sinew_world, with_world};
 use super::memory;
 use super::status::sinew_status;
 use super::tool::sinew_tool_id;
+use crate::base::{BodyId, Result};
+use crate::body::Body;
 use crate::contact::{Contact, ContactChange};
+use crate::world::World;
 
-/// Contact between a tool and a body at the end of the last step.
+/// Contact of a tool, blade or body with a body at the end of the last step.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_contact {
-    /// Body that the tool touches.
+    /// Body that is touched.
     pub body: sinew_body_id,
-    /// Nodes of the touched node, edge or face; the last is repeated below 3.
+    /// Pointer of sinew_body_set_user_data.
+    pub body_user_data: *mut c_void,
+    /// Nodes of what is touched, the last repeated; blade: UINT32_MAX.
     pub nodes: [u32; 3],
     /// Weights of the nodes at the contact point; 0 for a repeated node.
     pub weights: [f32; 3],
     /// [m] Contact point on the body.
     pub point: [f32; 3],
-    /// Unit normal that points away from the tool.
+    /// Unit normal that points toward the touched body; 0 for a blade.
     pub normal: [f32; 3],
-    /// [N] Force on the tool in the last substep; the wrench is a mean.
+    /// [N] Force on the tool, blade or body in the last substep.
     pub force: [f32; 3],
 }
 
@@ -33,14 +41,23 @@ pub struct sinew_contact_change {
     pub tool: sinew_tool_id,
     /// Body of the contact.
     pub body: sinew_body_id,
+    /// Pointer of sinew_tool_set_user_data.
+    pub tool_user_data: *mut c_void,
+    /// Pointer of sinew_body_set_user_data.
+    pub body_user_data: *mut c_void,
     /// 1: the contact began; 0: it ended.
-    pub begun: u32,
+    pub has_begun: u32,
 }
 
-impl From<Contact> for sinew_contact {
-    fn from(contact: Contact) -> Self {
+fn body_user_data(world: &World, body: BodyId) -> *mut c_void {
+    world.body(body).map_or(0, Body::user_data) as *mut c_void
+}
+
+impl sinew_contact {
+    fn of(world: &World, contact: Contact) -> Self {
         Self {
             body: contact.body.into(),
+            body_user_data: body_user_data(world, contact.body),
             nodes: contact.nodes,
             weights: contact.weights,
             point: contact.point.to_array(),
@@ -50,12 +67,14 @@ impl From<Contact> for sinew_contact {
     }
 }
 
-impl From<ContactChange> for sinew_contact_change {
-    fn from(change: ContactChange) -> Self {
+impl sinew_contact_change {
+    fn of(world: &World, change: ContactChange) -> Self {
         Self {
             tool: change.tool.into(),
             body: change.body.into(),
-            begun: change.begun.into(),
+            tool_user_data: world.tool_user_data(change.tool).unwrap_or(0) as *mut c_void,
+            body_user_data: body_user_data(world, change.body),
+            has_begun: change.begun.into(),
         }
     }
 }
@@ -74,11 +93,53 @@ pub unsafe extern "C" fn sinew_tool_get_contacts(
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let found = world.contacts(tool.id())?;
-            let places = memory::output_array("out_contacts", out_contacts, capacity)?;
-            let out_count = memory::output("out_count", out_count)?;
-            *out_count = write(found.map(sinew_contact::from), places);
-            Ok(())
+            write_contacts(world, world.contacts(tool.id())?, (out_contacts, capacity, out_count))
+        })
+    }
+}
+
+/// Writes the bodies that a blade pressed in the last step, each with a mean point and force.
+///
+/// Outputs are those of sinew_tool_get_contacts.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_blade_get_contacts(
+    world: *const sinew_world,
+    blade: sinew_blade_id,
+    out_contacts: *mut sinew_contact,
+    capacity: usize,
+    out_count: *mut usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            write_contacts(
+                world,
+                world.blade_contacts(blade.id())?,
+                (out_contacts, capacity, out_count),
+            )
+        })
+    }
+}
+
+/// Writes the contacts of a body with other bodies and itself; none while it sleeps.
+///
+/// Outputs are those of sinew_tool_get_contacts.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_contacts(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out_contacts: *mut sinew_contact,
+    capacity: usize,
+    out_count: *mut usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            write_contacts(
+                world,
+                world.tissue_contacts(body.id())?,
+                (out_contacts, capacity, out_count),
+            )
         })
     }
 }
@@ -98,12 +159,31 @@ pub unsafe extern "C" fn sinew_world_get_contact_changes(
     unsafe {
         with_world(world, |world| {
             let places = memory::output_array("out_changes", out_changes, capacity)?;
-            let found = world.contact_changes().map(sinew_contact_change::from);
+            let found = world.contact_changes();
+            let found = found.map(|change| sinew_contact_change::of(world, change));
             let out_count = memory::output("out_count", out_count)?;
             *out_count = write(found, places);
             Ok(())
         })
     }
+}
+
+/// Writes contacts to an array of so many, and how many there are.
+///
+/// # Safety
+/// The pointers are NULL or have room for what they are for.
+unsafe fn write_contacts(
+    world: &World,
+    found: impl Iterator<Item = Contact>,
+    (contacts, capacity, count): (*mut sinew_contact, usize, *mut usize),
+) -> Result<()> {
+    // SAFETY: the same contract.
+    let (places, count) = unsafe {
+        let places = memory::output_array("out_contacts", contacts, capacity)?;
+        (places, memory::output("out_count", count)?)
+    };
+    *count = write(found.map(|contact| sinew_contact::of(world, contact)), places);
+    Ok(())
 }
 
 /// Writes as many as there are places for: how many there are.

@@ -119,15 +119,11 @@ pub struct sinew_body_def {
     ///
     /// 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
     pub accuracy: f32,
-    /// Reserved; must be 0.
-    pub reserved1: u32,
     /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1; default 0.001.
     ///
     /// A step that would be refused may add more. Mass is added only if it saves 1/4 of the substeps, never with fixed
     /// substeps or a tolerance. It adds inertia but no weight. See sinew_solver_report.
     pub mass_scaling: f32,
-    /// Reserved; must be 0.
-    pub reserved2: u32,
     /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells.
     ///
     /// Corner bits: x 1, y 2, z 4. Springs are the edges and face diagonals.
@@ -247,7 +243,7 @@ pub struct sinew_body_def {
     /// A surface tears at the node with the larger separating force, across it; a solid along faces. A step that tears
     /// may allocate. See sinew_body_set_tear_limits.
     pub tear_strain: f32,
-    /// [N] Force above which a spring tears; 0: never. For bodies of elements alone it is SINEW_STATUS_UNSUPPORTED.
+    /// [N] Force above which a spring tears; 0: never. SINEW_STATUS_UNSUPPORTED for elements alone.
     pub tear_force: f32,
     /// Maximum number of tears per step; 0: does not tear. Needs spare_nodes.
     pub most_tears: u32,
@@ -271,22 +267,13 @@ pub struct sinew_body_def {
     pub orientation: [f32; 4],
     /// Factor of the world's gravity on this body, finite; default 1.
     pub gravity_scale: f32,
+    /// [1/s] Drag on each node relative to its mass, added to node_damping.
+    pub damping_rate: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
 unsafe impl Versioned for sinew_body_def {
-    const SIZES: &'static [usize] = &[
-        offset_of!(Self, order),
-        offset_of!(Self, mass_scaling),
-        offset_of!(Self, cells),
-        offset_of!(Self, home_stiffnesses),
-        offset_of!(Self, retardation_time),
-        offset_of!(Self, contact_thickness),
-        offset_of!(Self, spare_nodes),
-        offset_of!(Self, sleep_speed),
-        offset_of!(Self, element_law),
-        size_of::<Self>(),
-    ];
+    const SIZES: &'static [usize] = &[offset_of!(Self, order), size_of::<Self>()];
 }
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).

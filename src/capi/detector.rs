@@ -82,7 +82,7 @@ pub struct sinew_detector_report {
     /// Number of edge parts beyond four per edge on average.
     pub unlisted: [u32; 2],
     /// 1: closed; 0: open, and nothing is found inside; not checked again.
-    pub closed: [u32; 2],
+    pub is_closed: [u32; 2],
 }
 
 /// Node of a body that lies inside the other body.
@@ -297,7 +297,7 @@ impl sinew_detector {
                 found.take_exact(overlaps, surfaces)?;
             }
         }
-        found.report.closed = closed.map(u32::from);
+        found.report.is_closed = closed.map(u32::from);
         Ok(())
     }
 }

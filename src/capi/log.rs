@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::ffi::{c_char, c_void};
 
 use super::guard::guard;
+use super::memory;
 use super::status::sinew_status;
 use crate::base::Error;
 
@@ -50,16 +51,19 @@ impl Write for Text {
     }
 }
 
+fn current() -> (sinew_log, usize) {
+    match CALLBACK.read() {
+        Ok(callback) => *callback,
+        Err(poisoned) => *poisoned.into_inner(),
+    }
+}
+
 /// Tells the callback, if it is to hear of this level.
 pub(super) fn log(level: u32, message: impl Display) {
     if level > LEVEL.load(Ordering::Acquire) {
         return;
     }
-    let (callback, context) = match CALLBACK.read() {
-        Ok(callback) => *callback,
-        Err(poisoned) => *poisoned.into_inner(),
-    };
-    let Some(callback) = callback else { return };
+    let (Some(callback), context) = current() else { return };
     let mut text = Text {
         bytes: [0; LONGEST],
         length: 0,
@@ -97,5 +101,25 @@ pub unsafe extern "C" fn sinew_set_log_callback(level: u32, callback: sinew_log,
         let level = if callback.is_some() { level } else { SINEW_LOG_OFF };
         LEVEL.store(level, Ordering::Release);
         Ok(())
+    })
+}
+
+/// Writes the level, callback and context of sinew_set_log_callback; all outputs are nullable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_get_log_callback(
+    out_level: *mut u32,
+    out_callback: *mut sinew_log,
+    out_context: *mut *mut c_void,
+) -> sinew_status {
+    guard(|| {
+        let (callback, context) = current();
+        // SAFETY: the same contract.
+        unsafe {
+            memory::write_wanted_of_three(
+                ("out_level", out_level, LEVEL.load(Ordering::Acquire)),
+                ("out_callback", out_callback, callback),
+                ("out_context", out_context, context as *mut c_void),
+            )
+        }
     })
 }

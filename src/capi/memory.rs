@@ -85,6 +85,23 @@ pub(super) unsafe fn write_wanted<A, B>((name, place, value): Output<A>, other: 
     Ok(())
 }
 
+/// Writes those of three results whose place is not NULL, or none.
+///
+/// # Safety
+/// As [`output`], for all.
+pub(super) unsafe fn write_wanted_of_three<A, B, C>(
+    first: Output<A>,
+    second: Output<B>,
+    third: Output<C>,
+) -> Result<()> {
+    // SAFETY: the same contract; the third is known to be usable before the first is written.
+    unsafe {
+        optional_output_array(third.0, third.1, 1)?;
+        write_wanted(first, second)?;
+        write_wanted(third, ("", std::ptr::null_mut(), ()))
+    }
+}
+
 /// The array of `count` values that `pointer` points to; NULL is allowed where `count` is 0.
 ///
 /// # Safety
@@ -283,7 +300,7 @@ fn aligned<T>(name: &str, pointer: *const T) -> Result<()> {
     Err(Error::invalid(format!("{name} is not aligned")))
 }
 
-fn null(name: &str) -> Error {
+pub(super) fn null(name: &str) -> Error {
     Error::invalid(format!("{name} is NULL"))
 }
 

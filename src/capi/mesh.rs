@@ -75,7 +75,7 @@ pub struct sinew_mesh_view {
     /// Number of inverted tetrahedra corrected.
     pub flipped_tetrahedra: usize,
     /// 1: every surface edge is used equally often in both directions; 0: open.
-    pub closed: u32,
+    pub is_closed: u32,
     /// 8 * cell_count node indices of cubes; corner bits: x 1, y 2, z 4.
     pub cells: *const u32,
     /// Number of cells.
@@ -123,7 +123,7 @@ impl sinew_mesh_view {
             dropped_triangles: report.dropped_triangles(),
             dropped_tetrahedra: report.dropped_tetrahedra(),
             flipped_tetrahedra: report.flipped_tetrahedra,
-            closed: u32::from(*closed),
+            is_closed: u32::from(*closed),
             cells: loaded.mesh.cells.as_ptr().cast(),
             cell_count: loaded.mesh.cells.len(),
         }

@@ -130,6 +130,9 @@ pub mod recording;
 pub mod log;
 
 #[allow(rustdoc::broken_intra_doc_links)]
+pub mod allocator;
+
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod settings;
 
 #[allow(rustdoc::broken_intra_doc_links)]

@@ -45,7 +45,7 @@ const NOTHING: sinew_detector_report = sinew_detector_report {
     point_counts: [0; 2],
     edge_counts: [0; 2],
     unlisted: [0; 2],
-    closed: [0; 2],
+    is_closed: [0; 2],
 };
 
 impl DetectorSide {

@@ -81,6 +81,8 @@ impl From<StepProfile> for sinew_profile {
 /// Turns the profile of each step on (1) or off (0, the default).
 ///
 /// A step that is not profiled reads no clock. Profiling changes no result.
+///
+/// Errors: SINEW_STATUS_UNSUPPORTED on WebAssembly, which has no clock.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_profiling(world: *mut sinew_world, enabled: u32) -> sinew_status {
     // SAFETY: the same contract.
@@ -88,6 +90,17 @@ pub unsafe extern "C" fn sinew_world_set_profiling(world: *mut sinew_world, enab
         with_world_mut(world, |world| match enabled {
             0 | 1 => world.set_profiling(enabled == 1),
             _ => Err(Error::invalid(format!("enabled is {enabled}: must be 0 or 1"))),
+        })
+    }
+}
+
+/// Writes 1 if steps are profiled, else 0.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_get_profiling(world: *const sinew_world, out: *mut u32) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            memory::write("out", out, u32::from(world.profile().is_some()))
         })
     }
 }

@@ -24,7 +24,7 @@ pub struct sinew_replay_report {
     /// State hash after that step in the replay; else 0.
     pub replayed_hash: u64,
     /// 1 if the file ends within a step, else 0.
-    pub cut_short: u32,
+    pub is_cut_short: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -39,7 +39,7 @@ impl From<ReplayReport> for sinew_replay_report {
             first_difference: difference.map_or(0, |difference| difference.step),
             recorded_hash: difference.map_or(0, |difference| difference.recorded),
             replayed_hash: difference.map_or(0, |difference| difference.replayed),
-            cut_short: u32::from(report.is_cut_short),
+            is_cut_short: u32::from(report.is_cut_short),
         }
     }
 }
@@ -80,7 +80,7 @@ pub unsafe extern "C" fn sinew_world_stop_recording(world: *mut sinew_world, out
 
 /// Replays a recording and compares the state hash after each step, up to the first difference.
 ///
-/// `path` is UTF-8, `thread_count` as in sinew_world_def. Use the library version and the kernel of the recording.
+/// `path` is UTF-8, `thread_count` that of sinew_world_def. Use the recording's version and kernel.
 ///
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_INVALID_ARGUMENT if the file is no recording or damaged;
 /// SINEW_STATUS_UNSUPPORTED for another library version.

@@ -56,8 +56,8 @@ pub struct sinew_solver_report {
     pub added_mass: f64,
     /// IMPLICIT, NEWTON: number of linear systems solved.
     pub solves: u32,
-    /// IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding.
-    pub converged: u32,
+    /// IMPLICIT, NEWTON: 1 if each solve reached its tolerance or rounding.
+    pub has_converged: u32,
     /// Solver in use, a sinew_solver value; never AUTO.
     pub solver: u32,
     /// Substeps of VERLET on creation; above 150 AUTO takes IMPLICIT.
@@ -162,7 +162,7 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
                 error: report.error,
                 added_mass: report.added_mass,
                 solves: report.solves,
-                converged: u32::from(report.converged),
+                has_converged: u32::from(report.converged),
                 solver: match choice.solver {
                     Solver::Verlet | Solver::Auto => SINEW_SOLVER_VERLET,
                     Solver::Implicit => SINEW_SOLVER_IMPLICIT,

@@ -67,7 +67,7 @@ pub unsafe extern "C" fn sinew_body_get_springs(
 /// Sets stiffnesses, rest lengths or both of the springs between pairs of nodes.
 ///
 /// `pairs` holds 2 * count indices, `stiffnesses` [N/m] and `rest_lengths` [m] `count` floats each, nullable:
-/// unchanged. If a pair repeats, its last entry counts. Damping, force law and motion stay.
+/// unchanged. If a pair repeats, its last entry counts. Damping, law and motion stay.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 #[unsafe(no_mangle)]

@@ -33,7 +33,7 @@ pub const SINEW_STATUS_INTERNAL: sinew_status = 8;
 /// Major version of this header.
 pub const SINEW_VERSION_MAJOR: u32 = 0;
 /// Minor version of this header.
-pub const SINEW_VERSION_MINOR: u32 = 1;
+pub const SINEW_VERSION_MINOR: u32 = 2;
 /// Patch version of this header.
 pub const SINEW_VERSION_PATCH: u32 = 0;
 /// Version of this header as one number: major << 16 | minor << 8 | patch.

@@ -63,7 +63,7 @@ pub unsafe extern "C" fn sinew_suture_def_init(def: *mut sinew_suture_def, struc
 /// Joins two surface points of bodies by a thread, which pulls and never pushes.
 ///
 /// Body, triangle and weights of the points count. The bodies may be the same and still collide. `def` is nullable: the
-/// defaults. The thread is drawn in at no more than 0.25 m/s. It is an attachment.
+/// defaults. It is drawn in at no more than 0.25 m/s. It is an attachment.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if both points are the same.
 #[unsafe(no_mangle)]

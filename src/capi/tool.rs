@@ -302,7 +302,7 @@ pub unsafe extern "C" fn sinew_tool_get_pose(
 
 /// Writes the pose that the last step moved a tool to, before the force_limit.
 ///
-/// Both outputs are nullable. Replaying these poses reproduces the steps, also those of a haptic handle.
+/// Both outputs are nullable. Replaying these poses reproduces the steps, also of a haptic handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_get_target(
     world: *const sinew_world,

@@ -204,6 +204,36 @@ pub unsafe extern "C" fn sinew_body_get_gravity_scale(
     unsafe { with_body(world, body, |body| memory::write("out", out, body.gravity_scale())) }
 }
 
+/// Sets an acceleration [m/s^2] of a body beside gravity, such as wind, from the next step on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_set_acceleration(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    acceleration: *const f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            body.set_acceleration(memory::vector("acceleration", acceleration)?)
+        })
+    }
+}
+
+/// Writes the acceleration [m/s^2] of sinew_body_set_acceleration, 3 floats; 0 by default.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_acceleration(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            memory::write("out", out.cast(), body.acceleration().to_array())
+        })
+    }
+}
+
 /// Stores a pointer of the caller, nullable, with a body; snapshots do not hold it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_user_data(

@@ -243,8 +243,7 @@ pub unsafe extern "C" fn sinew_world_destroy(world: *mut sinew_world) {
 ///
 /// `dt` [s] is above 0. `report` is nullable. The call ends the views of positions and velocities.
 ///
-/// Errors: SINEW_STATUS_UNSTABLE if the step needs more than max_substeps, or more than the fixed number of
-/// substeps.
+/// Errors: SINEW_STATUS_UNSTABLE if the step needs more than max_substeps or the fixed substeps.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_step(
     world: *mut sinew_world,

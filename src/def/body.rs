@@ -95,6 +95,8 @@ pub struct BodyDefinition<'a> {
     pub masses: Values<'a>,
     /// Damping of each node against the world, in N s/m, at least 0.
     pub node_dampings: Values<'a>,
+    /// Damping of each node against the world for each kilogram of its mass, in 1/s, at least 0, beside that.
+    pub damping_rate: f32,
     /// The two nodes of each spring, each pair once; `None`: the edges of the triangles, tetrahedra and cells, of
     /// the latter with the diagonals of their faces, each once.
     pub springs: Option<&'a [[u32; 2]]>,
@@ -222,6 +224,7 @@ impl Default for BodyDefinition<'_> {
             rest_positions: None,
             masses: Values::Uniform(0.0),
             node_dampings: Values::Uniform(0.0),
+            damping_rate: 0.0,
             springs: None,
             stiffnesses: Values::Uniform(0.0),
             rest_lengths: None,
@@ -309,6 +312,7 @@ impl BodyDefinition<'_> {
             self.check_masses()?;
         }
         check_values("node_damping", &self.node_dampings, nodes)?;
+        not_negative("damping_rate", self.damping_rate)?;
         node_indices("triangles", self.triangles, nodes)?;
         node_indices("tetrahedra", self.tetrahedra, nodes)?;
         node_indices("cells", self.cells, nodes)?;

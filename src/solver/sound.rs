@@ -29,5 +29,6 @@ impl System {
                 .all(|&mass| (0.0..f32::INFINITY).contains(&mass))
             && self.origin.is_finite()
             && self.gravity_scale.is_finite()
+            && self.acceleration.is_finite()
     }
 }

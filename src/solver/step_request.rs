@@ -58,7 +58,7 @@ impl StepRequest<'_> {
     /// The same with the gravity that acts on a body.
     pub fn of(&self, body: &System) -> Self {
         Self {
-            gravity: self.gravity * body.gravity_scale,
+            gravity: body.pull(self.gravity),
             ..*self
         }
     }

@@ -95,9 +95,11 @@ pub(crate) struct System {
     pub may_be_cut: Option<MayBeCut>,
     /// The part of the world's gravity that acts on it.
     pub gravity_scale: f32,
+    /// Acts on all nodes beside gravity, m/s².
+    pub acceleration: Vec3,
 }
 
-saved!(System { order, forces, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, origin, predicted_velocities, implicit, applied, early, contacts, contact, bindings, node_room, is_cut_open, grasps, carry, forces_current, forces_applied, coarse, sleeper, may_be_cut, gravity_scale } where Self::is_sound);
+saved!(System { order, forces, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, origin, predicted_velocities, implicit, applied, early, contacts, contact, bindings, node_room, is_cut_open, grasps, carry, forces_current, forces_applied, coarse, sleeper, may_be_cut, gravity_scale, acceleration } where Self::is_sound);
 
 impl System {
     /// Of a definition, in this order, with these forces and the surface in the caller's numbers. Its nodes have no positions yet, and nothing
@@ -121,12 +123,20 @@ impl System {
                 pins.hold(node, BVec3::TRUE)?;
             }
         }
-        let damping = if definition.node_dampings.all_zero() {
+        let damping = if definition.node_dampings.all_zero() && definition.damping_rate == 0.0 {
             None
         } else {
             let mut rates = memory::reserved(node_count)?;
             let damping = |node: usize| definition.node_dampings.get(order.caller(node as u32) as usize);
-            rates.extend((0..node_count).map(|node| damping(node) * inverse_masses[node]));
+            // What is held for good has no rate.
+            rates.extend((0..node_count).map(|node| {
+                let own = if inverse_masses[node] > 0.0 {
+                    definition.damping_rate
+                } else {
+                    0.0
+                };
+                damping(node) * inverse_masses[node] + own
+            }));
             Some(NodeDamping::new(rates)?)
         };
         Ok(Self {
@@ -177,6 +187,7 @@ impl System {
             sleeper: None,
             may_be_cut: None,
             gravity_scale: 1.0,
+            acceleration: Vec3::ZERO,
         })
     }
 
@@ -276,6 +287,11 @@ impl System {
                 self.forces.forget_rates();
             }
         }
+    }
+
+    /// What pulls at all of its mass in a world of this gravity, m/s².
+    pub fn pull(&self, gravity: Vec3) -> Vec3 {
+        gravity * self.gravity_scale + self.acceleration
     }
 
     /// The gravity that pulls a node with its mass as it is, given that of the body, m/s².

@@ -10,7 +10,7 @@ use crate::solver::System;
 
 /// A node, edge or face of a body, and a point of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ContactSide {
+pub(crate) struct ContactSide {
     /// Which body, by its place in the world.
     pub body: usize,
     /// Of nodes that it does not have the weight is 0.

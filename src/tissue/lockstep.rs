@@ -42,6 +42,7 @@ impl CoupledGroup<'_> {
     /// Takes the step of all islands without making it current.
     pub fn attempt(&mut self, bodies: &mut impl Systems, outcomes: &mut [Option<Outcome>]) {
         self.tissue.pushes.begin();
+        self.tissue.touches.begin();
         for island in 0..self.tissue.islands.count() {
             if self.tissue.is_asleep(island, bodies) {
                 for &place in self.tissue.islands.members(island) {
@@ -232,7 +233,7 @@ impl CoupledGroup<'_> {
         } = self;
         let (request, team) = (*request, *team);
         let request = &StepRequest {
-            neighbor_speed: Some(tissue.fastest(island, bodies, request.gravity.length() * request.dt)),
+            neighbor_speed: Some(tissue.fastest(island, bodies, request.gravity, request.dt)),
             ..*request
         };
         let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;

@@ -22,6 +22,7 @@ mod pairs;
 mod plan;
 mod search;
 mod skin;
+mod touches;
 mod warm_start;
 mod wound;
 
@@ -35,6 +36,7 @@ use self::link::Link;
 pub(crate) use self::lockstep::{CoupledBody, CoupledGroup};
 use self::pairs::Pairs;
 pub(crate) use self::skin::Skin;
+use self::touches::Touches;
 use self::warm_start::{Pushes, give_again};
 
 use crate::base::{Count, Result, Stage, Stopwatch, memory};
@@ -75,10 +77,14 @@ pub(crate) struct Tissue {
     /// Bodies that were made through each other.
     entangled: Entangled,
     links: Vec<Link>,
+    /// How long the substep of these was, s.
+    duration: f32,
     /// The contacts of earlier searches in the order of their sides.
     known: Vec<u32>,
     /// What contacts gave before.
     pub pushes: Pushes,
+    /// Where bodies press each other.
+    pub touches: Touches,
     /// What bodies are near each other with.
     pairs: Pairs,
     /// Bodies that fell asleep together.
@@ -87,7 +93,7 @@ pub(crate) struct Tissue {
     pub bonds: Bonds,
 }
 
-saved! { Tissue { islands, skins, clearances, entangled, links, known, pushes, pairs, groups, bonds } }
+saved! { Tissue { islands, skins, clearances, entangled, links, duration, known, pushes, touches, pairs, groups, bonds } }
 
 impl Tissue {
     /// Makes room for a body at this place in the world, which meets tissue.
@@ -102,6 +108,7 @@ impl Tissue {
         self.links.try_reserve(room.saturating_sub(self.links.len()))?;
         self.known.try_reserve(room.saturating_sub(self.known.len()))?;
         self.pushes.reserve(room)?;
+        self.touches.reserve(room)?;
         let features = |skin: &Skin| skin.nodes.capacity() + skin.edges.capacity();
         let known = self.skins.iter().flatten().map(features).sum::<usize>();
         self.pairs.reserve(known + features(&skin), self.islands.room())?;
@@ -166,6 +173,7 @@ impl Tissue {
     pub fn shed(&mut self, place: usize) {
         self.entangled.leave(place);
         self.pushes.leave(place);
+        self.touches.leave(place);
         if let Some(skin) = self.skins.get_mut(place) {
             *skin = None;
         }
@@ -200,6 +208,14 @@ impl Tissue {
         } else {
             self.pushes.keep(&self.links);
         }
+        // What closes a step is half a kick, of VERLET alone.
+        if !moment.drifts {
+            self.touches
+                .note(&self.links, self.duration, |places| !any_is_explicit(bodies, places));
+        } else if moment.begins {
+            self.touches.begin_island(self.islands.members(island));
+        }
+        self.duration = moment.duration;
         self.links.clear();
         for &place in self.islands.members(island) {
             let place = place as usize;
@@ -216,6 +232,11 @@ impl Tissue {
         watch.stop(moment.profile, Stage::BroadPhase);
         let watch = Stopwatch::start(moment.profile);
         self.stop_what_meets(island, bodies, moment);
+        if !moment.drifts {
+            self.touches.note(&self.links, 0.5 * self.duration, |places| {
+                any_is_explicit(bodies, places)
+            });
+        }
         watch.stop(moment.profile, Stage::ContactSolver);
         if let Some(profile) = moment.profile {
             profile.count(Count::TissueContacts, self.links.len());
@@ -379,6 +400,12 @@ impl Tissue {
             }
         }
     }
+}
+
+/// Whether one of the bodies at these places takes half kicks.
+fn any_is_explicit(bodies: &impl Systems, places: [usize; 2]) -> bool {
+    let is_explicit = |place| bodies.at(place).is_none_or(System::is_explicit);
+    places.into_iter().any(is_explicit)
 }
 
 /// Does something with each of these bodies that tools press, or may press as tissue moves it, its skin and its contacts with tools.

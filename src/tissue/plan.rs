@@ -113,13 +113,13 @@ impl Tissue {
         all.fold(1.0, f32::max).ceil().min(1e6) as u32
     }
 
-    /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after gravity has given as much as this, m/s.
-    pub fn fastest(&self, island: usize, bodies: &impl Systems, fall: f32) -> f32 {
+    /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after a step in this gravity.
+    pub fn fastest(&self, island: usize, bodies: &impl Systems, gravity: Vec3, dt: f32) -> f32 {
         let members = self.islands.members(island).iter();
         let members = members.filter_map(|&place| bodies.at(place as usize));
         let speeds = members.map(|body| {
             let all = velocities(body);
-            all.magnitudes().length() + fall * body.gravity_scale.abs()
+            all.magnitudes().length() + dt * body.pull(gravity).length()
         });
         speeds.fold(0.0, f32::max)
     }

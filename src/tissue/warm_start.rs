@@ -16,7 +16,7 @@ use crate::codec::saved;
 const AFTER_FIRST: f32 = 2.0;
 
 /// One of so many contacts that there is room for presses at most; what others gave is not recalled.
-const PRESSING: usize = 3;
+pub(super) const PRESSING: usize = 3;
 
 /// What a contact gave in the last substep, N s.
 #[derive(Clone, Copy, Debug)]

@@ -120,9 +120,12 @@ pub(super) struct Proxy {
     pub forward: DVec3,
     /// Whether the true edge was outside of the tissue as the last step ended; `None`: it is not known.
     pub was_outside: Option<bool>,
+    /// What it did to the blade in the last step, N, and where, m.
+    pub felt: DVec3,
+    pub felt_at: DVec3,
 }
 
-saved! { Proxy { body, stroke, last, uncut, behind, holds, size, force, forward, was_outside } }
+saved! { Proxy { body, stroke, last, uncut, behind, holds, size, force, forward, was_outside, felt, felt_at } }
 
 /// A thread between tissue and the true edge.
 #[derive(Clone, Copy, Debug)]

@@ -177,13 +177,18 @@ impl World {
         blade.pose = blade.target.take().unwrap_or(blade.pose);
         let middle = 0.5 * (before + blade.pose.position.as_dvec3());
         let (mut force, mut torque, mut work) = (DVec3::ZERO, DVec3::ZERO, 0.0);
-        for hold in blade.proxies.iter().flat_map(|proxy| &proxy.holds) {
-            let bonds = self.tissue.as_ref().map(|tissue| &tissue.bonds);
-            let on_tissue = bonds.map_or(Vec3::ZERO, |bonds| bonds.force_of(hold.id)).as_dvec3();
-            let Lead { from, to } = hold.way;
-            force -= on_tissue;
-            torque -= (0.5 * (from + to) - middle).cross(on_tissue);
-            work += on_tissue.dot(to - from);
+        for proxy in &mut blade.proxies {
+            (proxy.felt, proxy.felt_at) = (DVec3::ZERO, DVec3::ZERO);
+            for hold in &proxy.holds {
+                let bonds = self.tissue.as_ref().map(|tissue| &tissue.bonds);
+                let on_tissue = bonds.map_or(Vec3::ZERO, |bonds| bonds.force_of(hold.id)).as_dvec3();
+                let Lead { from, to } = hold.way;
+                proxy.felt -= on_tissue;
+                proxy.felt_at += (to + hold.offset) / proxy.holds.len() as f64;
+                torque -= (0.5 * (from + to) - middle).cross(on_tissue);
+                work += on_tissue.dot(to - from);
+            }
+            force += proxy.felt;
         }
         // Finite, whatever the step's length.
         let finite = |sum: DVec3| sum.as_vec3().clamp(Vec3::MIN, Vec3::MAX);

@@ -204,7 +204,7 @@ impl World {
         self.check_not_attached(body)?;
         let gravity = self.definition.gravity;
         let body = self.bodies.get_mut(body.0)?;
-        let gravity = gravity * body.system().gravity_scale;
+        let gravity = body.system().pull(gravity);
         body.rest_state(gravity, definition)
     }
 

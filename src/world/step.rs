@@ -239,6 +239,7 @@ impl World {
         if let Some(tissue) = tissue {
             tissue.bonds.commit(outcomes, dt);
             tissue.pushes.commit();
+            tissue.touches.commit();
             let took = |place: usize| matches!(outcomes.get(place), Some(Some(Outcome::Done { .. })));
             rest_islands(tissue, bodies, took);
         }
@@ -402,7 +403,7 @@ fn commit_bodies(
                 let system = body.system_mut();
                 system.fade(dt, team);
                 if goes_alone(place) {
-                    system.doze(dt, (tools, gravity * system.gravity_scale), team);
+                    system.doze(dt, (tools, system.pull(gravity)), team);
                 } else {
                     system.doze_together(dt);
                 }

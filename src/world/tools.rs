@@ -1,11 +1,11 @@
 //! The tools of a world.
 
-use glam::{Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 
 use super::World;
 #[cfg(doc)]
 use crate::base::Error;
-use crate::base::{BodyId, Result, ToolId};
+use crate::base::{BladeId, BodyId, Result, ToolId};
 use crate::contact::{Contact, ContactChange, Contacts, Pose, Tool, ToolDefinition, ToolPath, ToolPlaces};
 use crate::def::CollisionFilter;
 
@@ -182,6 +182,50 @@ impl World {
         let slot = self.tools.place(tool.0)?;
         let bodies = self.bodies.iter_ids();
         Ok(bodies.flat_map(move |(id, body)| body.contacts_with(slot, BodyId(id))))
+    }
+
+    /// Where a body was pressed by other bodies, or by itself, when the last step ended, as if it were a tool: with points of the others and
+    /// forces on it. Bodies that sleep have none.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`](crate::Error::StaleId).
+    pub fn tissue_contacts(&self, body: BodyId) -> Result<impl Iterator<Item = Contact>> {
+        let place = self.bodies.place(body.0)?;
+        let touches = self.tissue.iter().flat_map(|tissue| tissue.touches.iter());
+        Ok(touches.flat_map(move |touch| {
+            let sides = [(0, 1.0), (1, -1.0)].into_iter();
+            sides.filter_map(move |(own, sign)| {
+                let other = &touch.sides[1 - own];
+                if touch.sides[own].body != place {
+                    return None;
+                }
+                let (id, content) = (self.bodies.id_at(other.body)?, self.bodies.at(other.body)?);
+                // A snapshot may hold any number.
+                let are_there = other.nodes.iter().all(|&node| (node as usize) < content.node_count());
+                are_there.then(|| Contact {
+                    normal: touch.normal * -sign,
+                    force: touch.force * sign,
+                    ..content.contact_at(BodyId(id), other.nodes, other.weights)
+                })
+            })
+        }))
+    }
+
+    /// The bodies that a blade pressed in the last step: the mean of the points that it held, without nodes, and the force on the blade.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`](crate::Error::StaleId).
+    pub fn blade_contacts(&self, blade: BladeId) -> Result<impl Iterator<Item = Contact>> {
+        let pressed = self.blades.get(blade.0)?.proxies.iter();
+        let pressed = pressed.filter(|proxy| proxy.felt != DVec3::ZERO);
+        Ok(pressed.map(|proxy| Contact {
+            body: proxy.body,
+            nodes: [u32::MAX; 3],
+            weights: [0.0; 3],
+            point: proxy.felt_at.as_vec3(),
+            normal: Vec3::ZERO,
+            force: proxy.felt.as_vec3().clamp(Vec3::MIN, Vec3::MAX),
+        }))
     }
 
     /// The tools and bodies that began or ceased to touch in the last step: with a tool or body that was destroyed nothing ceases.

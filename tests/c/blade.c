@@ -37,6 +37,26 @@ static sinew_body_id a_sheet(sinew_world *world, float toughness_of_it)
     return body;
 }
 
+/* The one body that a blade presses bears all of its force, near its edge. */
+static void pressed(const sinew_world *world, sinew_blade_id blade, sinew_body_id sheet, const sinew_blade_report *report)
+{
+    sinew_contact contact;
+    float place[3];
+    size_t count = 77;
+    int axis;
+    MUST(sinew_blade_get_contacts(world, blade, NULL, 0, &count));
+    CHECK(count == (report->force[0] != 0.0f));
+    if (count != 1)
+        return;
+    MUST(sinew_blade_get_contacts(world, blade, &contact, 1, &count));
+    MUST(sinew_blade_get_pose(world, blade, place, NULL));
+    CHECK(memcmp(&contact.body, &sheet, sizeof sheet) == 0 && contact.nodes[0] == UINT32_MAX);
+    for (axis = 0; axis < 3; axis++) {
+        CHECK_NEAR(contact.force[axis], report->force[axis], 1e-6);
+        CHECK_NEAR(contact.point[axis], place[axis], 0.01);
+    }
+}
+
 static void a_stroke(float toughness_of_it, int steps_of_it)
 {
     sinew_world *world = a_world(0);
@@ -46,6 +66,7 @@ static void a_stroke(float toughness_of_it, int steps_of_it)
     sinew_blade_report report;
     double work = 0, told = 0, length = 0, largest = 0;
     uint32_t pieces = 0;
+    size_t count;
     int step;
     MUST(sinew_blade_def_init(&def, sizeof def));
     CHECK(def.stiffness == 1000.0f && def.orientation[3] == 1.0f && def.collision_mask == UINT32_MAX);
@@ -60,6 +81,7 @@ static void a_stroke(float toughness_of_it, int steps_of_it)
         MUST(sinew_world_step(world, 1.0f / (float)steps_of_it, NULL));
         MUST(sinew_blade_get_report(world, blade, &report));
         CHECK(report.struct_size == sizeof report && report.status == SINEW_STATUS_OK);
+        pressed(world, blade, sheet, &report);
         work -= (double)report.force[0] * 0.1 / steps_of_it;
         told += report.work;
         length += report.length;
@@ -74,6 +96,7 @@ static void a_stroke(float toughness_of_it, int steps_of_it)
     CHECK(report.force[0] == 0.0f && report.lag == 0.0); /* it is out */
     MUST(sinew_blade_destroy(world, blade));
     CHECK(sinew_blade_get_report(world, blade, &report) == SINEW_STATUS_STALE_ID);
+    CHECK(sinew_blade_get_contacts(world, blade, NULL, 0, &count) == SINEW_STATUS_STALE_ID);
     sinew_world_destroy(world);
 }
 

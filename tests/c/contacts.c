@@ -11,8 +11,8 @@ static const double cloth_weight = CLOTH_NODES * 1e-3 * 10;
 static const uint32_t cube_triangles[3 * CUBE_TRIANGLES] = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
                                                             2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
 
-/* Where a tool's definition ended before it had a resolution, and a body's before it had a thickness. */
-enum { OLD_TOOL = sizeof(contract_tool_def), OLD_BODY = offsetof(sinew_body_def, contact_thickness) };
+/* Where a tool's definition ended in 0.1, before it had a resolution, and a body's, before it had a thickness. */
+enum { OLD_TOOL = sizeof(contract_tool_def), OLD_BODY = sizeof(contract_body_def) };
 
 static sinew_tool_def cube_def(size_t size, uint32_t detection, float y)
 {
@@ -73,7 +73,7 @@ static void contacts_are(const sinew_world *world, sinew_body_id cloth, sinew_to
     memset(&untouched, 0xA5, sizeof untouched);
     few[1] = untouched;
     MUST(sinew_tool_get_contacts(world, cube, few, 1, &count));
-    CHECK(count == expected && memcmp(few, contacts, sizeof few[0]) == 0 && memcmp(few + 1, &untouched, sizeof untouched) == 0);
+    CHECK(count == expected && memcmp(few, contacts, offsetof(sinew_contact, force) + sizeof few->force) == 0 && memcmp(few + 1, &untouched, sizeof untouched) == 0);
     for (i = 0; i < expected && i < 1024; i++) {
         const sinew_contact *at = contacts + i;
         CHECK(memcmp(&at->body, &cloth, sizeof cloth) == 0);
@@ -109,6 +109,8 @@ static void a_cube_carries_a_cloth(size_t size, uint32_t detection)
     float force[3], torque[3], pose[3], turned[4];
     size_t count = 77;
     int frame;
+    MUST(sinew_tool_set_user_data(world, cube, &force));
+    MUST(sinew_body_set_user_data(world, cloth, &torque));
     steps(world, 0.01f, 2);
     CHECK(contact_count(world, cube) == 0);
     MUST(sinew_world_get_contact_changes(world, NULL, 0, &count));
@@ -127,8 +129,9 @@ static void a_cube_carries_a_cloth(size_t size, uint32_t detection)
         steps(world, 0.01f, 1);
         MUST(sinew_world_get_contact_changes(world, &change, 1, &count));
     }
-    CHECK(count == 1 && change.begun == 1);
+    CHECK(count == 1 && change.has_begun == 1);
     CHECK(memcmp(&change.tool, &cube, sizeof cube) == 0 && memcmp(&change.body, &cloth, sizeof cloth) == 0);
+    CHECK(change.tool_user_data == &force && change.body_user_data == &torque);
     steps(world, 0.01f, 30);
     MUST(sinew_world_get_contact_changes(world, NULL, 0, &count));
     CHECK(count == 0); /* it lies there */
@@ -143,7 +146,7 @@ static void a_cube_carries_a_cloth(size_t size, uint32_t detection)
         steps(world, 0.01f, 1);
         MUST(sinew_world_get_contact_changes(world, &change, 1, &count));
     }
-    CHECK(count == 1 && change.begun == 0 && memcmp(&change.tool, &cube, sizeof cube) == 0);
+    CHECK(count == 1 && change.has_begun == 0 && memcmp(&change.tool, &cube, sizeof cube) == 0);
     CHECK(contact_count(world, cube) == 0);
     sinew_world_destroy(world);
 }
@@ -293,8 +296,77 @@ static void two_blocks(size_t size, uint32_t meet, uint32_t detection)
     sinew_world_destroy(world);
 }
 
+/* What two bodies tell of each other: where they touch, and forces that carry the upper one. */
+static void one_block_rests_on_another(uint32_t solver)
+{
+    static const float extent[3] = {0.04f, 0.04f, 0.04f};
+    static const uint32_t cells[3] = {3, 3, 3};
+    const double weight = 64 * 1e-3 * 10;
+    static int names[2];
+    sinew_world *world = a_world(-10.0f);
+    sinew_body_id bodies[2];
+    sinew_contact contacts[256];
+    size_t count = 77, others = 0, i;
+    uint32_t k, axis;
+    for (k = 0; k < 2; k++) {
+        sinew_mesh *mesh;
+        sinew_body_def def;
+        MUST(sinew_mesh_create_block(extent, cells, &mesh));
+        MUST(sinew_body_def_init(&def, sizeof def));
+        MUST(sinew_body_def_set_mesh(&def, mesh));
+        def.node_mass = 1e-3f;
+        def.node_damping = 0.02f;
+        def.stiffness = 300;
+        def.meets_bodies = 1;
+        def.position[0] = 0.003f * (float)k;
+        def.position[1] = 0.0401f * (float)k;
+        def.solver = solver;
+        MUST(sinew_body_create(world, &def, &bodies[k]));
+        MUST(sinew_body_set_user_data(world, bodies[k], &names[k]));
+        sinew_mesh_destroy(mesh);
+    }
+    for (k = 0; k < 64; k++)
+        if (position(world, bodies[0], k, 1) < -0.019f)
+            MUST(sinew_body_pin(world, bodies[0], k));
+    MUST(sinew_body_get_contacts(world, bodies[1], NULL, 0, &count));
+    CHECK(count == 0);
+    steps(world, 0.005f, 400);
+    for (k = 0; k < 2; k++) {
+        double sum[3] = {0, 0, 0};
+        MUST(sinew_body_get_contacts(world, bodies[k], contacts, 256, &count));
+        CHECK(count >= 3 && count <= 256 && (k == 0 || count == others));
+        others = count;
+        for (i = 0; i < count && i < 256; i++) {
+            const sinew_contact *it = &contacts[i];
+            double at[3] = {0, 0, 0};
+            CHECK(memcmp(&it->body, &bodies[1 - k], sizeof it->body) == 0 && it->body_user_data == &names[1 - k]);
+            CHECK(it->normal[1] * (k == 0 ? 1.0f : -1.0f) > 0.9f); /* toward the other */
+            for (axis = 0; axis < 3; axis++) {
+                uint32_t corner;
+                for (corner = 0; corner < 3; corner++)
+                    at[axis] += it->weights[corner] * position(world, bodies[1 - k], it->nodes[corner], axis);
+                CHECK_NEAR(at[axis], it->point[axis], 1e-6);
+                sum[axis] += it->force[axis];
+            }
+            CHECK_NEAR(it->point[1], 0.02, 0.003);
+        }
+        CHECK_NEAR(sum[0], 0, 0.05 * weight);
+        CHECK_NEAR(sum[1], k == 0 ? -weight : weight, 0.05 * weight);
+        CHECK_NEAR(sum[2], 0, 0.05 * weight);
+    }
+    CHECK(sinew_body_get_contacts(world, bodies[0], contacts, 256, NULL) == SINEW_STATUS_INVALID_ARGUMENT);
+    CHECK(sinew_body_get_contacts(world, bodies[0], NULL, 1, &count) == SINEW_STATUS_INVALID_ARGUMENT);
+    MUST(sinew_body_destroy(world, bodies[0]));
+    CHECK(sinew_body_get_contacts(world, bodies[0], contacts, 256, &count) == SINEW_STATUS_STALE_ID);
+    MUST(sinew_body_get_contacts(world, bodies[1], contacts, 256, &count));
+    CHECK(count == 0);
+    sinew_world_destroy(world);
+}
+
 int main(void)
 {
+    one_block_rests_on_another(SINEW_SOLVER_VERLET);
+    one_block_rests_on_another(SINEW_SOLVER_IMPLICIT);
     a_cube_carries_a_cloth(sizeof(sinew_tool_def), SINEW_DETECTION_EXACT);
     a_cube_carries_a_cloth(sizeof(sinew_tool_def), SINEW_DETECTION_IMAGE_SPACE);
     a_cube_carries_a_cloth(sizeof(sinew_tool_def), SINEW_DETECTION_DISTANCE_FIELD);

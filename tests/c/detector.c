@@ -164,7 +164,7 @@ static void boxes_have_a_volume_in_common(void)
     CHECK_NEAR(report.normal[1], 0.0, 1e-6);
     CHECK_NEAR(report.normal[2], 0.0, 1e-6);
     CHECK_NEAR(report.depth, 0.02, PIXEL);
-    CHECK(report.pixel == PIXEL && report.closed[0] == 1 && report.closed[1] == 1);
+    CHECK(report.pixel == PIXEL && report.is_closed[0] == 1 && report.is_closed[1] == 1);
     CHECK(report.point_counts[0] == 4 && report.point_counts[1] == 0);
     CHECK(report.edge_counts[0] == 13 && report.edge_counts[1] == 1);
     CHECK(report.unlisted[0] == 0 && report.unlisted[1] == 0 && report.struct_size == sizeof report);
@@ -231,7 +231,7 @@ static void what_is_exact_is_found_in_images_within_a_pixel(void)
         CHECK_NEAR(point->normal[0], -1.0, 1e-6);
     }
     CHECK(report.volume == 0.0 && report.depth == 0.0f && report.pixel == 0.0f);
-    CHECK(report.closed[0] == 1 && report.closed[1] == 1);
+    CHECK(report.is_closed[0] == 1 && report.is_closed[1] == 1);
     sum_of_gradient(detector, 0, 0, sum);
     sinew_detector_destroy(detector);
     sinew_world_destroy(world);
@@ -296,7 +296,7 @@ static void an_open_body_gives_edges_alone(void)
     sinew_detector_report report = found(detector, world);
     const sinew_point_inside *point;
     double sum[3];
-    CHECK(report.closed[0] == 0 && report.closed[1] == 1);
+    CHECK(report.is_closed[0] == 0 && report.is_closed[1] == 1);
     CHECK(report.volume == 0.0 && report.point_counts[0] == 0 && report.point_counts[1] == 0);
     /* Two sides and the diagonal, from the corner that is inside. */
     CHECK(report.edge_counts[0] == 3 && report.edge_counts[1] == 0);
@@ -308,7 +308,7 @@ static void an_open_body_gives_edges_alone(void)
     def.detection = SINEW_DETECTION_EXACT;
     detector = made(world, &def);
     report = found(detector, world);
-    CHECK(report.closed[0] == 0 && report.closed[1] == 1);
+    CHECK(report.is_closed[0] == 0 && report.is_closed[1] == 1);
     CHECK(report.edge_counts[0] == 3 && report.edge_counts[1] == 0 && report.point_counts[1] == 0);
     point = points_of(detector, 0, 1);
     CHECK(point->node == 0);
@@ -329,18 +329,18 @@ static void nothing_is_within_what_was_cut_open(void)
         sinew_detector_report report = found(detector, world);
         uint32_t closed = 1;
         double sum[3];
-        CHECK(report.closed[0] == 1 && report.closed[1] == 1 && report.edge_counts[1] == 1);
+        CHECK(report.is_closed[0] == 1 && report.is_closed[1] == 1 && report.edge_counts[1] == 1);
         MUST(sinew_body_remove_spring(world, cube, 0, 1));
         MUST(sinew_body_is_closed(world, cube, &closed));
         CHECK(closed == 0);
         report = found(detector, world);
-        CHECK(report.closed[0] == 0 && report.closed[1] == 1);
+        CHECK(report.is_closed[0] == 0 && report.is_closed[1] == 1);
         CHECK(report.edge_counts[0] == 13 && report.edge_counts[1] == 0 && report.volume == 0.0);
         CHECK(report.point_counts[0] == (detection == SINEW_DETECTION_EXACT ? 4u : 0u));
         sum_of_gradient(detector, 1, 0, sum);
         MUST(sinew_body_remove_spring(world, wall, 2, 3));
         report = found(detector, world);
-        CHECK(report.closed[0] == 0 && report.closed[1] == 0);
+        CHECK(report.is_closed[0] == 0 && report.is_closed[1] == 0);
         CHECK(report.edge_counts[0] == 0 && report.edge_counts[1] == 0 && report.point_counts[0] == 0);
         CHECK(sinew_detector_create(world, &def, &other) == SINEW_STATUS_INVALID_ARGUMENT && other == NULL);
         sinew_detector_destroy(detector);

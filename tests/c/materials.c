@@ -89,7 +89,7 @@ static void a_lattice_shows_its_cells(void)
     view.struct_size = sizeof view;
     MUST(sinew_mesh_create_lattice(0.5f, cells, &mesh));
     MUST(sinew_mesh_get_view(mesh, &view));
-    CHECK(view.cell_count == 24 && view.node_count == 60 && view.tetrahedron_count == 0 && view.closed == 1);
+    CHECK(view.cell_count == 24 && view.node_count == 60 && view.tetrahedron_count == 0 && view.is_closed == 1);
     CHECK(view.cells[0] == 0 && view.cells[1] == 1 && view.cells[2] == 3 && view.cells[4] == 12);
     CHECK(view.surface_triangle_count == 2 * 2 * (6 + 8 + 12) && view.triangle_count == view.surface_triangle_count);
     /* What an older program knows of it. */

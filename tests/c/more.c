@@ -45,7 +45,7 @@ static void older_definitions_refuse_cells(void)
     static const uint32_t cells[3] = {2, 2, 2};
     char message[256];
     MUST(sinew_mesh_create_lattice(1, cells, &lattice));
-    MUST(sinew_body_def_init(&def, offsetof(sinew_body_def, cells)));
+    MUST(sinew_body_def_init(&def, offsetof(sinew_body_def, order)));
     positions = def.positions;
     CHECK(sinew_body_def_set_mesh(&def, lattice) == SINEW_STATUS_UNSUPPORTED);
     sinew_last_error(message, sizeof message);
@@ -363,6 +363,7 @@ static void profiles(void)
     sinew_body_def def = of_mesh(mesh);
     sinew_body_id body;
     sinew_profile profile;
+    uint32_t is_on = 7;
     char message[256];
     memset(&profile, 0x5a, sizeof profile);
     profile.struct_size = sizeof profile;
@@ -372,7 +373,13 @@ static void profiles(void)
     CHECK(strstr(message, "sinew_world_set_profiling") != NULL);
     REFUSED("enabled", sinew_world_set_profiling(world, 2));
     REFUSED("world", sinew_world_set_profiling(NULL, 1));
+    MUST(sinew_world_get_profiling(world, &is_on));
+    CHECK(is_on == 0);
     MUST(sinew_world_set_profiling(world, 1));
+    MUST(sinew_world_get_profiling(world, &is_on));
+    CHECK(is_on == 1);
+    REFUSED("out", sinew_world_get_profiling(world, NULL));
+    REFUSED("world", sinew_world_get_profiling(NULL, &is_on));
     MUST(sinew_world_get_profile(world, &profile));
     CHECK(profile.step == 0 && profile.bodies == 0);
     MUST(sinew_world_step(world, 1e-3f, NULL));
@@ -491,7 +498,7 @@ static void recordings(void)
     MUST(sinew_world_stop_recording(world, &steps));
     CHECK(steps == 10);
     MUST(sinew_replay(path, 1, &report));
-    CHECK(report.steps == 10 && report.first_difference == 0 && report.cut_short == 0);
+    CHECK(report.steps == 10 && report.first_difference == 0 && report.is_cut_short == 0);
     REFUSED("path", sinew_replay(NULL, 1, &report));
     REFUSED("out", sinew_replay(path, 1, NULL));
     REFUSED("thread_count", sinew_replay(path, 257, &report));
@@ -522,9 +529,17 @@ static void messages(void)
     heard it = {0, 0, ""};
     const float gravity[3] = {NAN, 0, 0};
     char last[512];
+    uint32_t level = 7;
+    sinew_log callback = hear;
+    void *context = &it;
     REFUSED("level", sinew_set_log_callback(4, hear, &it));
+    MUST(sinew_get_log_callback(&level, &callback, &context));
+    CHECK(level == SINEW_LOG_OFF && callback == NULL && context == NULL);
     CHECK(sinew_world_set_gravity(world, gravity) == SINEW_STATUS_INVALID_ARGUMENT && it.count == 0);
     MUST(sinew_set_log_callback(SINEW_LOG_WARNING, hear, &it));
+    MUST(sinew_get_log_callback(&level, &callback, &context));
+    MUST(sinew_get_log_callback(NULL, NULL, NULL));
+    CHECK(level == SINEW_LOG_WARNING && callback == hear && context == &it);
     MUST(sinew_world_step(world, 1e-3f, NULL));
     CHECK(it.count == 0);
     CHECK(sinew_world_set_gravity(world, gravity) == SINEW_STATUS_INVALID_ARGUMENT);
@@ -537,8 +552,80 @@ static void messages(void)
     sinew_world_destroy(world);
 }
 
+/* An acceleration of a body moves it as gravity of the same size does, with each solver and to the last bit. */
+static void accelerations(void)
+{
+    static const uint32_t solvers[] = {SINEW_SOLVER_VERLET, SINEW_SOLVER_IMPLICIT, SINEW_SOLVER_NEWTON};
+    static const float pull[3] = {0, -10, 0}, none[3] = {0, 0, 0}, bad[3] = {0, INFINITY, 0};
+    size_t i;
+    for (i = 0; i < 3; i++) {
+        sinew_world *worlds[2];
+        sinew_mesh *mesh = a_block();
+        sinew_body_def def = of_mesh(mesh);
+        sinew_body_id bodies[2];
+        float is[3] = {1, 1, 1};
+        uint32_t node, k;
+        def.solver = solvers[i];
+        for (k = 0; k < 2; k++) {
+            worlds[k] = a_world(k == 0 ? -10.0f : 0.0f);
+            MUST(sinew_body_create(worlds[k], &def, &bodies[k]));
+            MUST(sinew_body_pin(worlds[k], bodies[k], 0));
+        }
+        MUST(sinew_body_get_acceleration(worlds[1], bodies[1], is));
+        CHECK(memcmp(is, none, sizeof is) == 0);
+        MUST(sinew_body_set_acceleration(worlds[1], bodies[1], pull));
+        REFUSED("acceleration", sinew_body_set_acceleration(worlds[1], bodies[1], bad));
+        REFUSED("acceleration", sinew_body_set_acceleration(worlds[1], bodies[1], NULL));
+        REFUSED("out", sinew_body_get_acceleration(worlds[1], bodies[1], NULL));
+        MUST(sinew_body_get_acceleration(worlds[1], bodies[1], is));
+        CHECK(memcmp(is, pull, sizeof is) == 0);
+        for (k = 0; k < 2; k++)
+            steps(worlds[k], 0.01f, 10);
+        for (node = 0; node < 8; node++)
+            for (k = 0; k < 3; k++)
+                CHECK(position(worlds[0], bodies[0], node, k) == position(worlds[1], bodies[1], node, k));
+        CHECK(position(worlds[1], bodies[1], 7, 1) < position(worlds[1], bodies[1], 0, 1) || velocity(worlds[1], bodies[1], 7, 1) != 0);
+        sinew_mesh_destroy(mesh);
+        sinew_world_destroy(worlds[0]);
+        sinew_world_destroy(worlds[1]);
+    }
+}
+
+/* damping_rate slows down light and heavy nodes alike, beside the drag of each. */
+static void damping_rates(void)
+{
+    static const float positions[6] = {0, 0, 0, 1, 0, 0}, masses[2] = {0.1f, 10}, along[6] = {1, 0, 0, 1, 0, 0};
+    static const uint32_t no_springs[2] = {0, 0};
+    sinew_world *world = a_world(0);
+    sinew_body_def def;
+    sinew_body_id body;
+    float drag = 0;
+    MUST(sinew_body_def_init(&def, sizeof def));
+    CHECK(def.damping_rate == 0);
+    def.positions = positions;
+    def.node_count = 2;
+    def.masses = masses;
+    def.springs = no_springs;
+    def.node_damping = 0.1f;
+    def.damping_rate = -1;
+    REFUSED("damping_rate", sinew_body_create(world, &def, &body));
+    def.damping_rate = NAN;
+    REFUSED("damping_rate", sinew_body_create(world, &def, &body));
+    def.damping_rate = 2;
+    MUST(sinew_body_create(world, &def, &body));
+    MUST(sinew_body_get_node_damping(world, body, 0, &drag));
+    CHECK_NEAR(drag, 0.1 + 2 * 0.1, 1e-6);
+    MUST(sinew_body_set_velocities(world, body, along, 2));
+    steps(world, 0.01f, 50);
+    CHECK_NEAR(velocity(world, body, 0, 0), exp(-(2 + 0.1 / 0.1) * 0.5), 1e-5);
+    CHECK_NEAR(velocity(world, body, 1, 0), exp(-(2 + 0.1 / 10) * 0.5), 1e-5);
+    sinew_world_destroy(world);
+}
+
 int main(void)
 {
+    accelerations();
+    damping_rates();
     meshes_from_memory();
     a_filled_mesh_is_what_a_surface_becomes();
     a_definition_places_a_body();

@@ -172,12 +172,10 @@ static void body_definitions(void)
     BODY(INVALID, "accuracy", def.accuracy = 1e-7f);
     BODY(INVALID, "accuracy", def.accuracy = -0.1f);
     BODY(INVALID, "accuracy", def.accuracy = 2.0f);
-    BODY(INVALID, "reserved1", def.reserved1 = 1);
     for (i = 0; i < NOT_FINITE; i++)
         BODY(INVALID, "accuracy", def.accuracy = bad[i]);
     BODY(INVALID, "mass_scaling", def.mass_scaling = -0.001f);
     BODY(INVALID, "mass_scaling", def.mass_scaling = 1.1f);
-    BODY(INVALID, "reserved2", def.reserved2 = 1);
     for (i = 0; i < NOT_FINITE; i++)
         BODY(INVALID, "mass_scaling", def.mass_scaling = bad[i]);
 

@@ -198,11 +198,8 @@ static void an_older_program_knows_none_of_it(void)
 {
     sinew_body_def def = a_tetrahedron();
     def.bending_stiffness = -1.0f;
-    def.struct_size = offsetof(sinew_body_def, home_stiffnesses);
-    CHECK_NEAR(elastic_energy(&def, 1.5f), 0.5 * 10 * 0.25 * 9, 1e-5);
-    def = a_tetrahedron();
     def.pressure = NAN;
-    def.struct_size = offsetof(sinew_body_def, retardation_time);
+    def.struct_size = offsetof(sinew_body_def, order);
     CHECK_NEAR(elastic_energy(&def, 1.5f), 0.5 * 10 * 0.25 * 9, 1e-5);
 }
 

@@ -131,6 +131,13 @@ const SANITIZED: Build = Build {
     options: &["-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
 };
 
+const ALLOCATOR: Build = Build {
+    name: "allocator",
+    library: Library::with_allocator,
+    link: Link::Shared,
+    options: &[],
+};
+
 const CHECKED: Build = Build {
     name: "valgrind",
     library: Library::release,
@@ -216,6 +223,21 @@ fn a_first_refusal_for_want_of_memory_is_an_answer() {
         let program = compiler.build(&root().join("tests/out_of_memory.c"), &SHARED);
         run_all([Command::new(program)].into_iter());
     }
+}
+
+/// Each program works as ever, and one counts what is asked of its own allocator.
+#[test]
+#[ignore = "long"]
+fn programs_run_with_the_feature_allocator() {
+    let Some(compiler) = Compiler::installed().find(|compiler| compiler.language == "c") else {
+        return;
+    };
+    let output = succeed(&mut Command::new(
+        compiler.build(&root().join("tests/c/allocator.c"), &ALLOCATOR),
+    ));
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(printed.contains("all memory is the program's"), "{printed}");
+    every_program_runs([compiler].into_iter(), &ALLOCATOR);
 }
 
 #[test]

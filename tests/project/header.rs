@@ -308,6 +308,29 @@ fn every_function_that_takes_a_struct_is_tried_with_a_wrong_struct_size() {
 }
 
 #[test]
+fn every_function_is_in_an_example_or_in_the_guides_list() {
+    let mut texts = fs::read_to_string(root().join("docs/guide/examples.md")).expect("the list of examples");
+    let mut folders = vec![root().join("c_examples")];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("a folder of examples") {
+            let path = entry.expect("a file").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if let Ok(text) = fs::read_to_string(path) {
+                texts += &text;
+            }
+        }
+    }
+    let words: BTreeSet<&str> = texts
+        .split(|letter: char| !(letter.is_ascii_alphanumeric() || letter == '_'))
+        .collect();
+    let missing: Vec<&str> = function_names(declared())
+        .filter(|name| !words.contains(name))
+        .collect();
+    assert!(missing.is_empty(), "in no example: {missing:?}");
+}
+
+#[test]
 fn the_documents_list_every_function_beside_its_counterpart_in_rust() {
     let page = fs::read_to_string(root().join("src/capi/functions.md")).expect("src/capi/functions.md");
     let rows = page.lines().filter_map(|line| line.strip_prefix("| [`sinew_"));

@@ -95,6 +95,13 @@ pub fn succeed(command: &mut Command) -> Output {
     }
 }
 
+/// The folder that cargo builds in.
+fn target() -> &'static Path {
+    Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .parent()
+        .expect("the target folder")
+}
+
 /// The library as programs in C link it.
 pub struct Library {
     /// The folder that holds it under all its names.
@@ -110,13 +117,20 @@ impl Library {
         // Of an example, cargo takes the library that the tests have; by itself it would be built again, as what only tests depend on
         // may choose other features of what the library depends on.
         let profile: &[&str] = if cfg!(debug_assertions) { &[] } else { &["--release"] };
-        LIBRARY.get_or_init(|| Self::build("tested", &[&["--example", "cloth"], profile].concat()))
+        LIBRARY.get_or_init(|| Self::build("tested", target(), &[&["--example", "cloth"], profile].concat()))
     }
 
     /// The release build, as it is delivered. It takes minutes: for long tests.
     pub fn release() -> &'static Self {
         static LIBRARY: OnceLock<Library> = OnceLock::new();
-        LIBRARY.get_or_init(|| Self::build("release", &["--release", "--lib"]))
+        LIBRARY.get_or_init(|| Self::build("release", target(), &["--release", "--lib"]))
+    }
+
+    /// With the feature `allocator`, apart from the others. It takes minutes.
+    pub fn with_allocator() -> &'static Self {
+        static LIBRARY: OnceLock<Library> = OnceLock::new();
+        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("with_allocator");
+        LIBRARY.get_or_init(|| Self::build("allocator", &target, &["--release", "--lib", "--features", "allocator"]))
     }
 
     /// The shared library.
@@ -130,9 +144,8 @@ impl Library {
     }
 
     /// By cargo, which knows best whether there is anything to build: what is in `target/` may be of another build.
-    fn build(name: &str, options: &[&str]) -> Self {
+    fn build(name: &str, target: &Path, options: &[&str]) -> Self {
         let scratch = Path::new(env!("CARGO_TARGET_TMPDIR"));
-        let target = scratch.parent().expect("the target folder");
         let output = succeed(
             cargo()
                 .args(["build", "--message-format", "json", "--target-dir"])
@@ -164,7 +177,15 @@ impl Library {
         #[cfg(unix)]
         for (name, built) in [
             ("libsinew.so", "libsinew.so"),
-            ("libsinew.so.0.1", "libsinew.so"),
+            (
+                concat!(
+                    "libsinew.so.",
+                    env!("CARGO_PKG_VERSION_MAJOR"),
+                    ".",
+                    env!("CARGO_PKG_VERSION_MINOR")
+                ),
+                "libsinew.so",
+            ),
             ("libsinew.a", "libsinew.a"),
         ] {
             let mut files = told.split('"').filter(|word| word.ends_with(&format!("/{built}")));

@@ -66,8 +66,9 @@ fn name(of: &str) -> String {
     }
 }
 
-/// A declared type and the name behind it, in C#. `opaque` are types that are pointed to alone.
-fn typed<'a>(declared: &'a str, opaque: &BTreeMap<String, ()>) -> (String, &'a str) {
+/// A declared type and the name behind it, in C#. `opaque` are types that are addresses there: callbacks, and with one star of their own what
+/// is pointed to alone.
+fn typed<'a>(declared: &'a str, opaque: &BTreeMap<String, usize>) -> (String, &'a str) {
     let end = declared.rfind([' ', '*']).map_or(0, |place| place + 1);
     let (kind, name) = declared.split_at(end);
     let stars = kind.matches('*').count();
@@ -82,9 +83,10 @@ fn typed<'a>(declared: &'a str, opaque: &BTreeMap<String, ()>) -> (String, &'a s
         "int32_t" | "sinew_status" => ("int", stars),
         "uint64_t" => ("ulong", stars),
         "uint8_t" | "char" => ("byte", stars),
-        "sinew_run_tasks" | "sinew_task" | "sinew_draw" | "sinew_log" => ("IntPtr", stars),
-        base if opaque.contains_key(base) => ("IntPtr", stars.saturating_sub(1)),
-        base => (base, stars),
+        base => match opaque.get(base) {
+            Some(own) => ("IntPtr", stars.saturating_sub(*own)),
+            None => (base, stars),
+        },
     };
     (format!("{base}{}", "*".repeat(stars)), name)
 }
@@ -98,7 +100,9 @@ pub fn csharp(header: &str) -> String {
             .strip_prefix("typedef struct ")
             .filter(|rest| !rest.contains('{'))
         {
-            opaque.insert(rest.split(' ').next().unwrap_or_default().to_owned(), ());
+            opaque.insert(rest.split(' ').next().unwrap_or_default().to_owned(), 1);
+        } else if let Some((_, rest)) = statement.split_once("(*").filter(|_| statement.starts_with("typedef")) {
+            opaque.insert(rest.split(')').next().unwrap_or_default().to_owned(), 0);
         }
     }
     let mut text = String::from(
@@ -132,7 +136,7 @@ pub fn csharp(header: &str) -> String {
     text + "}\n"
 }
 
-fn structure(rest: &str, opaque: &BTreeMap<String, ()>) -> String {
+fn structure(rest: &str, opaque: &BTreeMap<String, usize>) -> String {
     let (kind, body) = rest.split_once(" {").expect("a struct");
     let mut text = format!("    [StructLayout(LayoutKind.Sequential)]\n    public struct {kind}\n    {{\n");
     for field in body.split('}').next().unwrap_or_default().split(';').map(str::trim) {
@@ -158,7 +162,7 @@ fn structure(rest: &str, opaque: &BTreeMap<String, ()>) -> String {
     text + "    }\n"
 }
 
-fn function(statement: &str, opaque: &BTreeMap<String, ()>) -> String {
+fn function(statement: &str, opaque: &BTreeMap<String, usize>) -> String {
     let (head, arguments) = statement.split_once('(').expect("a function");
     let (kind, function) = typed(head, opaque);
     let arguments = arguments.trim_end_matches(')').split(',').map(str::trim);
