@@ -384,16 +384,14 @@ impl MassScaling {
         }
     }
 
-    /// Makes masses for what they were made for as the last step ended: whether that differs.
-    pub fn unsettle(&mut self) -> bool {
+    /// Has masses be made for what they were made for as the last step ended.
+    pub fn unsettle(&mut self) {
         (self.relief, self.margin) = (self.settled_relief, self.settled_margin);
-        if self.changed {
-            self.slivers.retain(|sliver| sliver.settled_growth.is_some());
-            for sliver in &mut self.slivers {
-                sliver.growth = sliver.settled_growth.unwrap_or(1.0);
-            }
+        self.slivers.retain(|sliver| sliver.settled_growth.is_some());
+        for sliver in &mut self.slivers {
+            sliver.growth = sliver.settled_growth.unwrap_or(1.0);
         }
-        std::mem::take(&mut self.changed)
+        self.changed = false;
     }
 
     /// In how few substeps a step of `dt` seconds can be taken, and for what substep masses are to be made; `None`: that

@@ -60,34 +60,59 @@ impl System {
 mod tests {
     use glam::Vec3;
 
+    use crate::base::BodyId;
     use crate::def::{BodyDefinition, Material, Model};
     use crate::mesh::Mesh;
     use crate::random::Random;
+    use crate::solver::StepRequest;
     use crate::threads::Team;
     use crate::world::{World, WorldDefinition};
 
+    /// An organ of elements, each node of which is moved by some millimetres.
+    fn crumpled(poisson_ratio: f32) -> (World, BodyId) {
+        let mesh = Mesh::organ(0.15, 0.15 / 8.0).expect("a mesh");
+        let mut world = World::new(WorldDefinition::default()).expect("a world");
+        let id = world.create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            material: Some(Material {
+                model: Model::Tetrahedra,
+                poisson_ratio,
+                young_modulus: 5000.0,
+                density: 1060.0,
+                ..Material::default()
+            }),
+            ..BodyDefinition::default()
+        });
+        let mut random = Random(7);
+        let id = id.expect("a body");
+        let moved = mesh.positions.iter().map(|&place| place + 2e-3 * random.vector());
+        let moved: Vec<Vec3> = moved.collect();
+        let body = world.body_mut(id).expect("a body");
+        body.set_positions(&moved).expect("positions");
+        (world, id)
+    }
+
+    #[test]
+    fn what_is_put_back_is_as_heavy_as_before() {
+        let (mut world, id) = crumpled(0.45);
+        let system = world.body_mut(id).expect("a body").system_mut();
+        let before = system.inverse_masses.clone();
+        let request = StepRequest {
+            relieves: true,
+            ..StepRequest::alone(1e-2, 20)
+        };
+        let limit = system.relieve(&request, false, 1, &Team::alone());
+        assert!(limit.is_some() && system.inverse_masses != before, "{limit:?}");
+        system.put_back();
+        assert_eq!(system.inverse_masses, before);
+    }
+
     #[test]
     fn elements_one_by_one_give_the_bound_that_kernels_find() {
-        let mesh = Mesh::organ(0.15, 0.15 / 8.0).expect("a mesh");
         for poisson_ratio in [0.3, 0.45] {
-            let mut world = World::new(WorldDefinition::default()).expect("a world");
-            let id = world.create_body(&BodyDefinition {
-                positions: &mesh.positions,
-                tetrahedra: &mesh.tetrahedra,
-                material: Some(Material {
-                    model: Model::Tetrahedra,
-                    poisson_ratio,
-                    young_modulus: 5000.0,
-                    density: 1060.0,
-                    ..Material::default()
-                }),
-                ..BodyDefinition::default()
-            });
-            let mut random = Random(7);
-            let body = world.body_mut(id.expect("a body")).expect("a body");
-            let moved = mesh.positions.iter().map(|&place| place + 2e-3 * random.vector());
-            let moved: Vec<Vec3> = moved.collect();
-            body.set_positions(&moved).expect("positions");
+            let (mut world, id) = crumpled(poisson_ratio);
+            let body = world.body_mut(id).expect("a body");
             let limit = f64::from(body.system_mut().limit_beside_springs(&Team::alone()));
             let forces = &body.system().forces;
             let mut stiffest = 0.0_f64;

@@ -336,7 +336,10 @@ impl System {
             implicit.put_back();
         }
         self.forces.recall();
-        if self.scaling.as_mut().is_some_and(|scaling| scaling.unsettle()) {
+        if self.scaling.as_ref().is_some_and(|scaling| scaling.has_changed()) {
+            // Nodes that were listed for the step alone are as heavy as they were.
+            self.scale_masses(0.0);
+            self.scaling.iter_mut().for_each(|scaling| scaling.unsettle());
             self.scale_masses(self.carry.masses_for);
         }
         self.use_masses_for(self.carry.masses_for);
