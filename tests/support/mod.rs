@@ -126,11 +126,15 @@ impl Library {
         LIBRARY.get_or_init(|| Self::build("release", target(), &["--release", "--lib"]))
     }
 
-    /// With the feature `allocator`, apart from the others. It takes minutes.
+    /// With the feature `allocator`, apart from the others, and hardly optimised: it takes a minute.
     pub fn with_allocator() -> &'static Self {
         static LIBRARY: OnceLock<Library> = OnceLock::new();
         let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("with_allocator");
-        LIBRARY.get_or_init(|| Self::build("allocator", &target, &["--release", "--lib", "--features", "allocator"]))
+        let quick = ["lto=\"off\"", "opt-level=1", "codegen-units=16"];
+        let quick = quick.map(|setting| format!("--config=profile.release.{setting}"));
+        let mut options = vec!["--release", "--lib", "--features", "allocator"];
+        options.extend(quick.iter().map(String::as_str));
+        LIBRARY.get_or_init(|| Self::build("allocator", &target, &options))
     }
 
     /// The shared library.
