@@ -234,14 +234,8 @@ pub unsafe extern "C" fn sinew_world_get_broken_attachments(
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let out = memory::output_array("out_attachments", out_attachments, capacity)?;
-            let out_count = memory::output("out_count", out_count)?;
-            let slipped = world.slipped();
-            for (out, &id) in out.iter_mut().zip(slipped) {
-                *out = id.into();
-            }
-            *out_count = slipped.len();
-            Ok(())
+            let found = world.slipped().iter().map(|&id| id.into());
+            memory::write_found(found, ("out_attachments", out_attachments, capacity), out_count)
         })
     }
 }

@@ -158,17 +158,14 @@ pub unsafe extern "C" fn sinew_world_get_contact_changes(
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let places = memory::output_array("out_changes", out_changes, capacity)?;
             let found = world.contact_changes();
             let found = found.map(|change| sinew_contact_change::of(world, change));
-            let out_count = memory::output("out_count", out_count)?;
-            *out_count = write(found, places);
-            Ok(())
+            memory::write_found(found, ("out_changes", out_changes, capacity), out_count)
         })
     }
 }
 
-/// Writes contacts to an array of so many, and how many there are.
+/// Writes contacts, and how many there are.
 ///
 /// # Safety
 /// The pointers are NULL or have room for what they are for.
@@ -177,23 +174,7 @@ unsafe fn write_contacts(
     found: impl Iterator<Item = Contact>,
     (contacts, capacity, count): (*mut sinew_contact, usize, *mut usize),
 ) -> Result<()> {
+    let found = found.map(|contact| sinew_contact::of(world, contact));
     // SAFETY: the same contract.
-    let (places, count) = unsafe {
-        let places = memory::output_array("out_contacts", contacts, capacity)?;
-        (places, memory::output("out_count", count)?)
-    };
-    *count = write(found.map(|contact| sinew_contact::of(world, contact)), places);
-    Ok(())
-}
-
-/// Writes as many as there are places for: how many there are.
-fn write<T>(found: impl Iterator<Item = T>, places: &mut [T]) -> usize {
-    let mut count = 0;
-    for one in found {
-        if let Some(place) = places.get_mut(count) {
-            *place = one;
-        }
-        count += 1;
-    }
-    count
+    unsafe { memory::write_found(found, ("out_contacts", contacts, capacity), count) }
 }

@@ -162,6 +162,28 @@ pub(super) unsafe fn output_array<'a, T>(name: &str, pointer: *mut T, count: usi
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
 }
 
+/// Writes as many of what is found as an array of so many has places for, and to `out_count` how many there are.
+///
+/// # Safety
+/// As [`output_array`] and [`output`].
+pub(super) unsafe fn write_found<T>(
+    found: impl Iterator<Item = T>,
+    (name, pointer, capacity): (&str, *mut T, usize),
+    out_count: *mut usize,
+) -> Result<()> {
+    // SAFETY: the same contract.
+    let (places, out_count) = unsafe { (output_array(name, pointer, capacity)?, output("out_count", out_count)?) };
+    let mut count = 0;
+    for one in found {
+        if let Some(place) = places.get_mut(count) {
+            *place = one;
+        }
+        count += 1;
+    }
+    *out_count = count;
+    Ok(())
+}
+
 /// A place for results that may be left out altogether.
 ///
 /// # Safety

@@ -296,7 +296,7 @@ impl Tissue {
     pub fn show_early(&self, bodies: &mut impl Systems) {
         for link in self.links.iter().filter(|link| link.presses()) {
             let places = link.sides.map(|side| side.body);
-            let are_explicit = places.map(|place| bodies.at(place).is_none_or(System::is_explicit));
+            let are_explicit = places.map(|place| is_explicit(bodies, place));
             for index in 0..2 {
                 if are_explicit[index]
                     && !are_explicit[1 - index]
@@ -402,10 +402,14 @@ impl Tissue {
     }
 }
 
-/// Whether one of the bodies at these places takes half kicks.
+/// Whether the body at this place takes half kicks.
+fn is_explicit(bodies: &impl Systems, place: usize) -> bool {
+    bodies.at(place).is_none_or(System::is_explicit)
+}
+
+/// Whether one of the bodies at these places does.
 fn any_is_explicit(bodies: &impl Systems, places: [usize; 2]) -> bool {
-    let is_explicit = |place| bodies.at(place).is_none_or(System::is_explicit);
-    places.into_iter().any(is_explicit)
+    places.into_iter().any(|place| is_explicit(bodies, place))
 }
 
 /// Does something with each of these bodies that tools press, or may press as tissue moves it, its skin and its contacts with tools.
