@@ -86,6 +86,10 @@ pub(crate) struct Contacts {
     pub(super) found_for: f32,
     /// What the last step that became current left, in the order of tools.
     touches: Vec<Touch>,
+    /// What is pinned pressed in the step in progress, in the order of tools.
+    pub(super) pinned: Vec<Touch>,
+    /// Nodes of the surface that are free, or have such a neighbour, a bit for each, where that was asked for.
+    pub(super) yielding_nodes: Vec<u64>,
     /// By a tool's place in the world: whether it touched in the last step that became current, and in the one before.
     pub(super) touched: Vec<[bool; 2]>,
     /// The box of all velocities that contacts gave in this substep.
@@ -102,7 +106,7 @@ pub(crate) struct Contacts {
 
 saved! { Contacts {
     thickness, filter, features, candidates, constraints, nodes, undecided, presses, together, holds, loads,
-    pressed_for, found_for, touches, touched, given, committed, held, fresh,
+    pressed_for, found_for, touches, pinned, yielding_nodes, touched, given, committed, held, fresh,
 } leaves { driven: Driven::default() } }
 
 impl Contacts {
@@ -124,6 +128,8 @@ impl Contacts {
             pressed_for: 0.0,
             found_for: 0.0,
             touches: Vec::new(),
+            pinned: Vec::new(),
+            yielding_nodes: Vec::new(),
             touched: Vec::new(),
             given: Bounds::EMPTY,
             committed: true,
@@ -141,6 +147,7 @@ impl Contacts {
         self.driven.reserve_ways(tools)?;
         self.loads.try_reserve(tools.saturating_sub(self.loads.len()))?;
         self.reserve_together(self.features.count(), tools)?;
+        memory::reserve(&mut self.pinned, tools)?;
         self.touched.try_reserve(tools.saturating_sub(self.touched.len()))?;
         self.touched.resize(tools.max(self.touched.len()), [false; 2]);
         if places.has_meshes {
@@ -179,6 +186,7 @@ impl Contacts {
             .try_reserve(together.saturating_sub(self.constraints.len()))?;
         self.presses.reserve(together)?;
         self.nodes.reserve(together)?;
+        memory::reserve(&mut self.yielding_nodes, features.div_ceil(64))?;
         memory::reserve(&mut self.undecided, self.features.node_count as usize)?;
         self.touches.try_reserve(together.saturating_sub(self.touches.len()))?;
         self.together = together;
@@ -195,6 +203,7 @@ impl Contacts {
             self.candidates.invalidate();
         }
         self.committed = false;
+        self.pinned.clear();
         self.holds.begin_step();
     }
 
@@ -237,7 +246,9 @@ impl Contacts {
                 normal: contact.normal,
                 force: force(contact.given()),
             });
-            let pressing = nodes.chain(features).filter(|touch| touch.force != Vec3::ZERO);
+            let pinned = self.pinned.iter().filter(|touch| touch.slot == tool.slot).copied();
+            let pressing = nodes.chain(features).chain(pinned);
+            let pressing = pressing.filter(|touch| touch.force != Vec3::ZERO);
             let room = self.touches.capacity() - self.touches.len();
             self.touches.extend(pressing.take(room));
         }

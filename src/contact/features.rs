@@ -112,6 +112,11 @@ impl Features {
         self.node_count as usize + self.edges.len() + self.faces.len()
     }
 
+    /// The edges that there are.
+    pub fn edges(&self) -> impl Iterator<Item = [u32; 2]> {
+        self.edges.iter().copied().filter(|&edge| edge != HOLE)
+    }
+
     /// How many are nodes, edges and faces.
     pub fn counts(&self) -> [u32; 3] {
         [self.node_count, self.edges.len() as u32, self.faces.len() as u32]

@@ -28,6 +28,7 @@ mod narrow_phase;
 mod nearest_plane;
 mod node_contacts;
 mod path;
+mod pinned;
 mod press;
 mod press_nodes;
 mod report;

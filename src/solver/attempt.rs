@@ -8,7 +8,9 @@ use super::needs::{Need, first_substep, prepare, refined, substeps_needed};
 use super::step_request::{Carry, Outcome, StepRequest};
 use super::verlet::{self, StepResult, TooLong};
 use crate::base::StateHasher;
+use crate::contact::Meeting;
 use crate::def::SolverReport;
+use crate::nodes::Mobility;
 use crate::threads::Team;
 
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
@@ -75,6 +77,43 @@ impl System {
             Some(implicit) => implicit.attempt(),
             None => {}
         }
+    }
+
+    /// Has what is pinned press the tools that a step, tried in so many substeps, leads into it.
+    pub fn press_pinned(&mut self, request: &StepRequest, substeps: u32) {
+        let Some(contacts) = &mut self.contacts else {
+            return;
+        };
+        let state = self.state.substep();
+        let meeting = Meeting {
+            kernel: self.kernel,
+            tools: request.tools,
+            origin: self.origin,
+            dt: request.dt,
+            start: 0.0,
+            end: 1.0,
+            substep: request.dt,
+            drifts: false,
+            slack: 0.0,
+            neighbor_speed: None,
+            thickness: contacts.thickness,
+            fastest: 0.0,
+            mobility: Mobility {
+                inverse_masses: &self.inverse_masses,
+                damping: None,
+                substep: request.dt,
+                half: false,
+                asleep: None,
+            },
+            positions: state.positions,
+            velocities: state.velocities,
+            next_positions: state.next_positions,
+            pins: &mut self.pins,
+            bindings: self.bindings.as_ref(),
+            profile: request.profile,
+        };
+        let forces = &self.forces;
+        contacts.press_pinned(meeting, substeps, |node| forces.stiffness_at(node, 0.0));
     }
 
     /// How its solver took the last step.

@@ -143,7 +143,9 @@ impl World {
         };
         let Some(tissue) = tissue else {
             attempt_bodies(bodies, outcomes, &request, |_| true, team);
-            return reported(bodies, outcomes).map(|()| 0);
+            reported(bodies, outcomes)?;
+            press_pinned(bodies, outcomes, &request);
+            return Ok(0);
         };
         let watch = Stopwatch::start(profile);
         rouse_groups(tissue, bodies, request.tools);
@@ -168,6 +170,7 @@ impl World {
             }
         }
         reported(bodies, outcomes)?;
+        press_pinned(bodies, outcomes, &request);
         let watch = Stopwatch::start(profile);
         let crossings = tissue.find_crossings(bodies, true);
         watch.stop(profile, Stage::NarrowPhase);
@@ -304,6 +307,15 @@ fn reported(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::
         return Err(report(bodies, outcomes, 0));
     }
     Ok(())
+}
+
+/// Has what is pinned press the tools that the tried step leads into it.
+fn press_pinned(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], request: &StepRequest) {
+    for (place, body) in bodies.iter_mut() {
+        if let Some(Outcome::Done { substeps, .. }) = outcomes[place] {
+            body.system_mut().press_pinned(request, substeps);
+        }
+    }
 }
 
 /// Whether there is work for more than one thread.

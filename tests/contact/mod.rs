@@ -20,6 +20,7 @@ mod mesh_refused;
 mod mesh_sweep;
 mod momentum;
 mod node_by_node;
+mod pinned;
 mod press;
 mod query;
 mod rest;

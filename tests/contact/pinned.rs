@@ -1,0 +1,138 @@
+//! Tissue that is pinned all about a tool presses back like a spring, and stops a tool of limited force.
+
+use glam::{DVec3, Quat, Vec3};
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, BodyId, Pose, Shape, Solver, ToolDefinition, ToolId, Values, World};
+
+use crate::support::bodies::FREE;
+use crate::support::scene::SOLVERS;
+use crate::support::solid::cuboid;
+
+const DT: f32 = 1.0 / 60.0;
+
+/// Of the springs, N/m.
+const STIFFNESS: f32 = 1000.0;
+
+/// A sheet of 0.9 m at y = 0 with edges of 0.1 m, all of it pinned, its middle between nodes, and a tool of this shape 1 mm above `place`.
+fn scene(
+    solver: Solver,
+    shape: Shape,
+    (place, orientation): (Vec3, Quat),
+    force_limit: f32,
+) -> (World, BodyId, ToolId) {
+    let mut world = World::new(FREE).expect("a world");
+    let mesh = Mesh::cloth([0.9; 2], [9; 2]).expect("a cloth");
+    let body = world
+        .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            masses: Values::Uniform(1e-4),
+            stiffnesses: Values::Uniform(STIFFNESS),
+            solver,
+            ..Default::default()
+        })
+        .expect("a body");
+    for node in 0..mesh.positions.len() as u32 {
+        world.body_mut(body).expect("a body").pin(node).expect("a pin");
+    }
+    let tool = ToolDefinition {
+        pose: Pose {
+            position: place + Vec3::Y * 1e-3,
+            orientation,
+        },
+        force_limit,
+        ..ToolDefinition::new(shape)
+    };
+    let tool = world.create_tool(&tool).expect("a tool");
+    (world, body, tool)
+}
+
+/// Where the forces at pins add up.
+fn held(world: &World, body: BodyId) -> DVec3 {
+    let body = world.body(body).expect("a body");
+    let nodes = 0..body.node_count() as u32;
+    nodes.map(|node| body.pin_force(node).expect("a pin").as_dvec3()).sum()
+}
+
+#[test]
+fn a_tool_that_is_led_into_it_feels_more_the_deeper_it_is() {
+    let (positions, triangles) = cuboid(Vec3::splat(-0.03), Vec3::splat(0.03));
+    let mesh = Shape::Mesh {
+        positions: &positions,
+        triangles: &triangles,
+    };
+    let upright = (Vec3::Y * 0.03, Quat::IDENTITY);
+    let shapes = [
+        ("ball", Shape::Sphere { radius: 0.03 }, upright),
+        (
+            "lying capsule",
+            Shape::Capsule {
+                radius: 0.03,
+                half_length: 0.05,
+            },
+            (Vec3::Y * 0.03, Quat::from_rotation_z(std::f32::consts::FRAC_PI_2)),
+        ),
+        (
+            "box",
+            Shape::Box {
+                half_extents: Vec3::splat(0.03),
+            },
+            upright,
+        ),
+        ("mesh", mesh, upright),
+    ];
+    for solver in SOLVERS {
+        for (name, shape, pose) in shapes {
+            let case = format!("{name}, {solver:?}");
+            let (mut world, body, tool) = scene(solver, shape, pose, f32::INFINITY);
+            let mut last = 0.0;
+            for millimetre in 0..6 {
+                // Onto the sheet, then a millimetre deeper each time.
+                let place = pose.0 + Vec3::Y * (1e-6 - 1e-3 * millimetre as f32);
+                world.set_pose(tool, place, None).expect("a pose");
+                world.step(DT).expect("a step");
+                let force = world.wrench(tool).expect("a tool").0;
+                if millimetre == 0 {
+                    assert_eq!(force, Vec3::ZERO, "{case}: above the sheet");
+                    continue;
+                }
+                assert!(force.y > last + 0.5, "{case}, {millimetre}: {force} after {last} N");
+                // A node is held by up to eight springs, whose stiffness it has.
+                assert!(force.y < 8.0 * STIFFNESS * 1e-3 * millimetre as f32, "{case}: {force}");
+                assert!(force.x.abs().max(force.z.abs()) < 0.1 * force.y, "{case}: {force}");
+                let held = held(&world, body);
+                assert!(
+                    held.distance(force.as_dvec3()) < 1e-5 * f64::from(force.y),
+                    "{case}: pins hold {held}, the tool has {force}"
+                );
+                let contacts: Vec3 = world.contacts(tool).expect("a tool").map(|contact| contact.force).sum();
+                assert_eq!(contacts, force, "{case}");
+                last = force.y;
+            }
+        }
+    }
+}
+
+#[test]
+fn a_tool_of_limited_force_stops_at_it() {
+    let limit = 1.0;
+    for solver in SOLVERS {
+        // What is fast would be beyond the sheet within a step.
+        for speed in [0.6, 60.0_f32] {
+            let case = format!("{solver:?}, {speed} m/s");
+            let shape = Shape::Sphere { radius: 0.04 };
+            let (mut world, _, tool) = scene(solver, shape, (Vec3::Y * 0.3, Quat::IDENTITY), limit);
+            for _ in 0..40 {
+                let aim = world.pose(tool).expect("a tool").position - Vec3::Y * (speed * DT);
+                world.set_pose(tool, aim, None).expect("a pose");
+                world.step(DT).expect("a step");
+                let force = world.wrench(tool).expect("a tool").0.length();
+                assert!(force <= 1.01 * limit, "{case}: {force} N");
+            }
+            // Radius 0.04 m. The search for where it stops ends within a part of the way that it was to go.
+            let highest = 0.0401 + 5e-3 * speed * DT;
+            let left = world.pose(tool).expect("a tool").position.y;
+            assert!((0.0389..highest).contains(&left), "{case}: the ball stands at {left} m");
+        }
+    }
+}
