@@ -1,6 +1,8 @@
 //! Rest shapes that IMPLICIT and NEWTON come to under damping, and states of rest, against statics: a catenary, patches of lattice
 //! and triangles under even stress (Cauchy-Born). Chains that hang are in `implicit.rs`, `newton.rs` and `rest_state.rs`.
 
+use std::ops::Range;
+
 use crate::support::bodies::{FREE, Parts, Scene};
 use crate::support::statics::{Catenary, G, Patch, damp};
 use glam::Vec3;
@@ -58,23 +60,24 @@ fn a_chain_held_at_both_ends_hangs_as_the_discrete_catenary() {
 
 #[test]
 fn patches_stretch_as_their_lattices() {
-    patches_stretch_as_their_lattices_of(1);
+    patches_stretch_as_their_lattices_of(0..1);
 }
 
 #[test]
 #[ignore = "long"]
-fn patches_stretch_as_their_lattices_in_every_case() {
-    patches_stretch_as_their_lattices_of(3);
+fn patches_stretch_as_their_lattices_in_the_other_cases() {
+    patches_stretch_as_their_lattices_of(1..3);
 }
 
-fn patches_stretch_as_their_lattices_of(count: usize) {
+fn patches_stretch_as_their_lattices_of(cases: Range<usize>) {
     for (name, mut patch) in [
         ("lattice", Patch::lattice(1.08)),
         ("triangles along x", Patch::triangles(0, 1, 1.06)),
         ("triangles along y", Patch::triangles(1, 0, 1.06)),
     ]
     .into_iter()
-    .take(count)
+    .take(cases.end)
+    .skip(cases.start)
     {
         damp(&mut patch.parts, 10.0);
         for way in WAYS {
