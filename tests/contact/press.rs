@@ -145,7 +145,7 @@ fn a_box_on_a_block_feels_what_theory_gives_at_rest() {
 #[test]
 #[ignore = "long"]
 fn a_box_on_a_fine_block_feels_what_theory_gives_at_rest() {
-    feels_what_theory_gives_at_rest(4);
+    feels_what_theory_gives_at_rest(3);
 }
 
 /// The strain is the same everywhere, which elements of any size have exactly.

@@ -1,5 +1,7 @@
 //! Tissue against tissue, and against itself.
 
+use std::ops::Range;
+
 use crate::support::hanging::nodes_at;
 use crate::support::tissue::*;
 use glam::{DMat3, DVec3, Vec3};
@@ -180,16 +182,16 @@ fn two_blocks_that_meet_keep_their_momentum_and_part_again() {
 
 #[test]
 fn a_block_rests_on_another() {
-    a_block_rests_on_another_of(1);
+    a_block_rests_on_another_of(0..1);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_block_rests_on_another_in_every_case() {
-    a_block_rests_on_another_of(4);
+fn a_block_rests_on_another_in_the_other_cases() {
+    a_block_rests_on_another_of(1..4);
 }
 
-fn a_block_rests_on_another_of(count: usize) {
+fn a_block_rests_on_another_of(cases: Range<usize>) {
     for (solver, detection, steps) in [
         (Solver::Verlet, Detection::Exact, &[1e-3_f32, 1.0 / 60.0][..]),
         (Solver::Implicit, Detection::Exact, &[1e-3, 1.0 / 60.0]),
@@ -197,7 +199,8 @@ fn a_block_rests_on_another_of(count: usize) {
         (Solver::Implicit, Detection::ImageSpace, &[1.0 / 60.0]),
     ]
     .into_iter()
-    .take(count)
+    .take(cases.end)
+    .skip(cases.start)
     {
         for &dt in steps {
             let contact = BodyContact {
@@ -296,16 +299,16 @@ fn lay(
 
 #[test]
 fn a_sheet_falls_on_another_and_on_one_of_its_own_body() {
-    a_sheet_falls_on_another_and_on_one_of_its_own_body_of(1);
+    a_sheet_falls_on_another_and_on_one_of_its_own_body_of(0..1);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_sheet_falls_on_another_and_on_one_of_its_own_body_in_every_case() {
-    a_sheet_falls_on_another_and_on_one_of_its_own_body_of(4);
+fn a_sheet_falls_on_another_and_on_one_of_its_own_body_in_the_other_cases() {
+    a_sheet_falls_on_another_and_on_one_of_its_own_body_of(1..4);
 }
 
-fn a_sheet_falls_on_another_and_on_one_of_its_own_body_of(count: usize) {
+fn a_sheet_falls_on_another_and_on_one_of_its_own_body_of(cases: Range<usize>) {
     for (solver, as_one, detection, resolution) in [
         (Solver::Verlet, false, Detection::Exact, 0.0),
         // A pixel is as large as three triangles.
@@ -314,7 +317,8 @@ fn a_sheet_falls_on_another_and_on_one_of_its_own_body_of(count: usize) {
         (Solver::Implicit, true, Detection::Exact, 0.0),
     ]
     .into_iter()
-    .take(count)
+    .take(cases.end)
+    .skip(cases.start)
     {
         let what = format!("{solver:?}, {detection:?} at {resolution} m, one body: {as_one}");
         let contact = BodyContact {
@@ -536,8 +540,8 @@ fn blocks_that_are_thrown_at_each_other_gain_no_energy() {
 
 #[test]
 #[ignore = "long"]
-fn blocks_that_are_thrown_at_each_other_gain_no_energy_at_every_speed() {
-    blocks_that_are_thrown_at_each_other_gain_no_energy_of(&[0.3, 3.0, 10.0]);
+fn blocks_that_are_thrown_at_each_other_gain_no_energy_at_other_speeds() {
+    blocks_that_are_thrown_at_each_other_gain_no_energy_of(&[0.3, 10.0]);
 }
 
 fn blocks_that_are_thrown_at_each_other_gain_no_energy_of(speeds: &[f32]) {
@@ -558,7 +562,8 @@ fn blocks_that_are_thrown_at_each_other_gain_no_energy_of(speeds: &[f32]) {
         });
         let energy = |world: &World| ids.iter().map(|&id| total_energy(world, id)).sum::<f64>();
         let start = energy(&world);
-        for index in 0..120 {
+        // They meet within 0.07 s.
+        for index in 0..60 {
             step(&mut world, 1.0 / 60.0);
             let now = energy(&world);
             assert!(

@@ -77,27 +77,28 @@ const CUTS: [(Vec3, Vec3); 4] = [
     (vec3(0.1, 0.04, 0.0), vec3(0.17, 0.17, 0.0)),
 ];
 
+/// Each term with one solver and storage, and each of these with a term.
 #[test]
 fn cuts_in_motion_keep_what_terms_have() {
-    cuts_in_motion_keep_what_terms_have_of(3);
+    cuts_in_motion_keep_what_terms_have_of(|case| case % 4 == 0);
 }
 
 #[test]
 #[ignore = "long"]
-fn cuts_in_motion_keep_what_terms_have_in_every_case() {
-    cuts_in_motion_keep_what_terms_have_of(1);
+fn cuts_in_motion_keep_what_terms_have_in_the_other_cases() {
+    cuts_in_motion_keep_what_terms_have_of(|case| case % 4 != 0);
 }
 
-fn cuts_in_motion_keep_what_terms_have_of(every: usize) {
-    for beside in ALL {
-        for (solver, storage) in [
-            (Solver::Verlet, Storage::Packed),
-            (Solver::Verlet, Storage::FastLink),
-            (Solver::Implicit, Storage::DynamicBulk),
-            (Solver::Newton, Storage::Packed),
-        ]
-        .into_iter()
-        .step_by(every)
+fn cuts_in_motion_keep_what_terms_have_of(is_tried: fn(usize) -> bool) {
+    for (number, beside) in (0..).zip(ALL) {
+        for (_, (solver, storage)) in (number..)
+            .zip([
+                (Solver::Verlet, Storage::Packed),
+                (Solver::Verlet, Storage::FastLink),
+                (Solver::Implicit, Storage::DynamicBulk),
+                (Solver::Newton, Storage::Packed),
+            ])
+            .filter(|case| is_tried(case.0))
         {
             let what = format!("{beside:?}, {solver:?}, {storage:?}");
             let (mut world, body) = in_flight_with(20, solver, storage, 0.0, |definition| beside.with(definition));

@@ -354,8 +354,8 @@ fn whatever_is_asked_of_it_stays_finite() {
 
 #[test]
 #[ignore = "long"]
-fn whatever_is_asked_of_it_stays_finite_at_every_step() {
-    whatever_is_asked_of_it_stays_finite_of(|_| true);
+fn whatever_is_asked_of_it_stays_finite_in_long_steps() {
+    whatever_is_asked_of_it_stays_finite_of(|step| step >= 0.05);
 }
 
 /// With these steps, s; long ones take long.
@@ -386,7 +386,9 @@ fn whatever_is_asked_of_it_stays_finite_of(is_tried: fn(f32) -> bool) {
         let blade = upright(&mut world, stiffness, start);
         let mut place = start;
         let mut seed = 5_u32;
-        for step in 0..40 {
+        // A long step of what is cut has a thousand parts.
+        let steps = if dt < 0.05 { 40 } else { 16 };
+        for step in 0..steps {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let turn = if step < 10 { 0.2 } else { (seed >> 8) as f32 };
             place += stride * vec3(turn.cos(), turn.sin(), 0.1 * (3.0 * turn).sin());
@@ -419,7 +421,7 @@ fn whatever_is_asked_of_it_stays_finite_of(is_tried: fn(f32) -> bool) {
         }
         // Whatever it was given, it comes back, and gains nothing more.
         let mut before = kept(&world, body).energy.max(0.1);
-        for step in 40..80 {
+        for step in steps..2 * steps {
             world.step(dt).unwrap();
             let after = kept(&world, body).energy;
             assert!(

@@ -172,19 +172,27 @@ pub const CUTS: [[[f32; 2]; 3]; 4] = [
 
 #[test]
 fn cuts_in_motion_keep_mass_momentum_and_energy() {
-    cuts_in_motion_keep_mass_momentum_and_energy_of(&[Storage::Packed]);
+    cuts_in_motion_keep_mass_momentum_and_energy_of(is_short);
 }
 
 #[test]
 #[ignore = "long"]
-fn cuts_in_motion_keep_mass_momentum_and_energy_in_every_storage() {
-    cuts_in_motion_keep_mass_momentum_and_energy_of(&[Storage::Packed, Storage::FastLink, Storage::DynamicBulk]);
+fn cuts_in_motion_keep_mass_momentum_and_energy_in_the_other_cases() {
+    cuts_in_motion_keep_mass_momentum_and_energy_of(|case, storage| !is_short(case, storage));
 }
 
-fn cuts_in_motion_keep_mass_momentum_and_energy_of(storages: &[Storage]) {
-    for matter in MATTER {
-        for solver in SOLVERS {
-            for &storage in storages {
+/// Each matter with a solver, and each solver with a matter.
+fn is_short(case: usize, storage: Storage) -> bool {
+    case.is_multiple_of(3) && storage == Storage::Packed
+}
+
+fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_tried: fn(usize, Storage) -> bool) {
+    for (number, matter) in (0..).zip(MATTER) {
+        for (case, solver) in (number..).zip(SOLVERS) {
+            for storage in [Storage::Packed, Storage::FastLink, Storage::DynamicBulk] {
+                if !is_tried(case, storage) {
+                    continue;
+                }
                 if storage != Storage::Packed && (solver == Solver::Newton || matter == Matter::Elements) {
                     continue;
                 }

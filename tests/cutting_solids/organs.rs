@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::f32::consts::TAU;
+use std::ops::Range;
 use std::path::Path;
 
 use glam::{DVec3, Quat, Vec3, vec3};
@@ -156,17 +157,17 @@ fn a_t_and_crossings_of_organs() {
 
 #[test]
 fn organs_in_motion_keep_mass_momentum_and_volume() {
-    organs_in_motion_keep_mass_momentum_and_volume_of(1);
+    organs_in_motion_keep_mass_momentum_and_volume_of(0..1);
 }
 
 #[test]
 #[ignore = "long"]
-fn organs_in_motion_keep_mass_momentum_and_volume_in_every_case() {
-    organs_in_motion_keep_mass_momentum_and_volume_of(usize::MAX);
+fn organs_in_motion_keep_mass_momentum_and_volume_in_the_other_cases() {
+    organs_in_motion_keep_mass_momentum_and_volume_of(1..usize::MAX);
 }
 
-fn organs_in_motion_keep_mass_momentum_and_volume_of(count: usize) {
-    for (name, (rest, cells)) in organs().into_iter().take(count) {
+fn organs_in_motion_keep_mass_momentum_and_volume_of(cases: Range<usize>) {
+    for (name, (rest, cells)) in organs().into_iter().take(cases.end).skip(cases.start) {
         for (has_elements, solver) in SOLVERS.into_iter().flat_map(|solver| [(false, solver), (true, solver)]) {
             if rest.len() > 3000 && solver == Solver::Newton {
                 continue;

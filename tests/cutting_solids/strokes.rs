@@ -210,8 +210,8 @@ fn blades_that_cross_in_one_instant_leave_no_bridge() {
 
 #[test]
 #[ignore = "long"]
-fn blades_that_cross_in_one_instant_leave_no_bridge_in_every_case() {
-    blades_that_cross_in_one_instant_leave_no_bridge_of(&[20, 60, 75]);
+fn blades_that_cross_in_one_instant_leave_no_bridge_in_the_other_cases() {
+    blades_that_cross_in_one_instant_leave_no_bridge_of(&[20, 75]);
 }
 
 fn blades_that_cross_in_one_instant_leave_no_bridge_of(counts: &[usize]) {

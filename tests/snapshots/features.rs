@@ -201,9 +201,9 @@ fn whatever_a_body_has_goes_on_to_the_bit() {
 
 #[test]
 #[ignore = "long"]
-fn whatever_a_body_has_goes_on_to_the_bit_with_every_solver() {
-    let [made, cut] = go_on_to_the_bit(|_, _| true);
-    assert!(made > 120 && cut > 50, "{made} bodies, {cut} cut");
+fn whatever_a_body_has_goes_on_to_the_bit_with_the_other_solvers() {
+    let [made, cut] = go_on_to_the_bit(|feature, solver| feature % SOLVERS.len() != solver);
+    assert!(made > 80 && cut > 34, "{made} bodies, {cut} cut");
 }
 
 /// With these features and solvers; how many bodies were made, and how many of them cut.
@@ -221,8 +221,8 @@ fn go_on_to_the_bit(is_tried: fn(usize, usize) -> bool) -> [usize; 2] {
                 made += 1;
                 cut += usize::from(is_cuttable);
                 let mut twin = None;
-                for at in 0..28 {
-                    if [5, 17].contains(&at) {
+                for at in 0..22 {
+                    if [5, 14].contains(&at) {
                         let bytes = world.save().expect("bytes");
                         let threads = if at == 5 { 1 } else { 2 };
                         twin = Some(World::load(&bytes, threads, None).expect("a world"));

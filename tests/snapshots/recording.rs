@@ -52,9 +52,19 @@ fn frames(bytes: &[u8]) -> Vec<[usize; 2]> {
 
 #[test]
 fn random_calls_are_replayed_with_the_hashes_that_were_recorded() {
+    random_calls_are_replayed_times(2);
+}
+
+#[test]
+#[ignore = "long"]
+fn random_calls_are_replayed_eight_times_more_with_the_hashes_that_were_recorded() {
+    random_calls_are_replayed_times(8);
+}
+
+fn random_calls_are_replayed_times(replays: u32) {
     let mut recorded = 0;
     for seed in 10..12 {
-        let path = path(&format!("calls_{seed}"));
+        let path = path(&format!("calls_{seed}_{replays}"));
         let mut caller = Caller::new(seed);
         let mut worlds = vec![world(1)];
         for step in 0..16 {
@@ -73,7 +83,7 @@ fn random_calls_are_replayed_with_the_hashes_that_were_recorded() {
             is_cut_short: false,
         };
         // A replay takes the same states with another number of threads, however often. `fuzz/run replays` tries many more.
-        for replay in 0..10 {
+        for replay in 0..replays {
             let report = World::replay(&path, 1 + replay % 2).expect("a replay");
             assert_eq!(report, expected, "seed {seed}, replay {replay}");
         }

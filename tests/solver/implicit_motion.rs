@@ -149,10 +149,26 @@ fn nodes_reach_their_terminal_velocity_at_every_step() {
 /// g n (n + 1) h² / 2 with order 1; g t² / 2 with order 2, but for its first step.
 #[test]
 fn bodies_fall_as_the_formula_says_far_from_the_origin() {
+    bodies_fall_as_the_formula_says_of(|case| [2, 9].contains(&case));
+}
+
+#[test]
+#[ignore = "long"]
+fn bodies_fall_as_the_formula_says_in_the_other_cases() {
+    bodies_fall_as_the_formula_says_of(|case| ![2, 9].contains(&case));
+}
+
+/// Twelve cases: of each solver, of each order, three distances.
+fn bodies_fall_as_the_formula_says_of(is_tried: fn(usize) -> bool) {
     let h = 1e-4_f32;
+    let mut case = 0;
     for solver in SOLVERS {
         for order in [1, 2] {
             for offset in [0.0_f32, 10.0, 10_000.0] {
+                case += 1;
+                if !is_tried(case - 1) {
+                    continue;
+                }
                 let parts = Parts::block([1, 1, 1], 0.05, 0.01, 50.0)
                     .moved(Quat::IDENTITY, Vec3::new(-offset, offset, 0.3 * offset));
                 let mut scene = scene(&parts, under(DOWN), solver, order);

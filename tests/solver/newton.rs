@@ -178,7 +178,7 @@ fn any_number_of_threads_and_a_step_put_back_lead_to_the_same_state() {
             Storage::Packed,
         );
         scene.body_mut().pin(0).expect("a node");
-        scene.run(1.0 / 60.0, 3);
+        scene.step(1.0 / 60.0);
         // A way with more energy than a number holds: put back.
         let before = scene.positions();
         scene.body_mut().move_pin(0, Vec3::X * 1e30).expect("a pin");

@@ -1,5 +1,7 @@
 //! A large body takes several substeps in one go, tile by tile. No bit may show it.
 
+use std::ops::Range;
+
 use crate::support::bodies::{FREE, Parts, Random, Scene};
 use glam::Vec3;
 use sinew::WorldDefinition;
@@ -55,18 +57,22 @@ fn moving(parts: &Parts, definition: WorldDefinition) -> Scene {
 
 #[test]
 fn many_substeps_in_a_step_are_as_many_steps() {
-    many_substeps_in_a_step_are_as_many_steps_of(1);
+    many_substeps_in_a_step_are_as_many_steps_of(0..1);
 }
 
 #[test]
 #[ignore = "long"]
-fn many_substeps_in_a_step_are_as_many_steps_in_every_case() {
-    many_substeps_in_a_step_are_as_many_steps_of(3);
+fn many_substeps_in_a_step_are_as_many_steps_in_the_other_cases() {
+    many_substeps_in_a_step_are_as_many_steps_of(1..3);
 }
 
-fn many_substeps_in_a_step_are_as_many_steps_of(count: usize) {
+fn many_substeps_in_a_step_are_as_many_steps_of(cases: Range<usize>) {
     const H: f32 = 1.0 / 4096.0;
-    for (side, long_springs, damping) in [(200, 30, 0.0), (230, 0, 0.0), (230, 0, 1e-4)].into_iter().take(count) {
+    for (side, long_springs, damping) in [(200, 30, 0.0), (230, 0, 0.0), (230, 0, 1e-4)]
+        .into_iter()
+        .take(cases.end)
+        .skip(cases.start)
+    {
         let parts = sheet(side, long_springs, damping, &mut Random::new(81));
         let mut one_by_one = moving(&parts, world(1, 1));
         let steps = [16, 1, 2, 3, 40, 21];
