@@ -25,6 +25,10 @@
 #define sinew_rest_state_report sinew_equilibrium_report
 #define sinew_tools_get_wrench sinew_world_get_total_wrench
 #define sinew_world_get_slipped sinew_world_get_broken_attachments
+// Fields.
+#define begun has_begun
+#define closed is_closed
+#define converged has_converged
 
 // ---- Other arguments ----------------------------------------------------------------------------
 

@@ -98,6 +98,20 @@ static void equilibrium(sinew_world *world, sinew_body_id sheet)
     CHECK(report.iterations > 0);
 }
 
+static void fields(const sinew_world *world, sinew_body_id body)
+{
+    sinew_solver_report solver;
+    sinew_contact_change change;
+    sinew_mesh_view view;
+    solver.struct_size = sizeof solver;
+    MUST(sinew_body_get_solver_report(world, body, &solver));
+    change.begun = 1;
+    view.closed = 2;
+    CHECK(solver.converged == solver.has_converged);
+    CHECK(change.has_begun == 1);
+    CHECK(view.is_closed == 2);
+}
+
 static void wrenches(sinew_world *world, const sinew_tool_id *tools)
 {
     static const float point[3] = {0, 0, 0};
@@ -153,6 +167,7 @@ int main(void)
     attachments(world, sheet, other, tools[0]);
     values(world, sheet);
     equilibrium(world, sheet);
+    fields(world, sheet);
     wrenches(world, tools);
     snapshots(world);
     helpers(world, sheet, tools[0]);
