@@ -88,6 +88,8 @@ pub(crate) struct Contacts {
     touches: Vec<Touch>,
     /// What is pinned pressed in the step in progress, in the order of tools.
     pub(super) pinned: Vec<Touch>,
+    /// The same of the last step that became current.
+    pub(super) pinned_before: Vec<Touch>,
     /// Nodes of the surface that are free, or have such a neighbour, a bit for each, where that was asked for.
     pub(super) yielding_nodes: Vec<u64>,
     /// By a tool's place in the world: whether it touched in the last step that became current, and in the one before.
@@ -106,7 +108,7 @@ pub(crate) struct Contacts {
 
 saved! { Contacts {
     thickness, filter, features, candidates, constraints, nodes, undecided, presses, together, holds, loads,
-    pressed_for, found_for, touches, pinned, yielding_nodes, touched, given, committed, held, fresh,
+    pressed_for, found_for, touches, pinned, pinned_before, yielding_nodes, touched, given, committed, held, fresh,
 } leaves { driven: Driven::default() } }
 
 impl Contacts {
@@ -129,6 +131,7 @@ impl Contacts {
             found_for: 0.0,
             touches: Vec::new(),
             pinned: Vec::new(),
+            pinned_before: Vec::new(),
             yielding_nodes: Vec::new(),
             touched: Vec::new(),
             given: Bounds::EMPTY,
@@ -148,6 +151,7 @@ impl Contacts {
         self.loads.try_reserve(tools.saturating_sub(self.loads.len()))?;
         self.reserve_together(self.features.count(), tools)?;
         memory::reserve(&mut self.pinned, tools)?;
+        memory::reserve(&mut self.pinned_before, tools)?;
         self.touched.try_reserve(tools.saturating_sub(self.touched.len()))?;
         self.touched.resize(tools.max(self.touched.len()), [false; 2]);
         if places.has_meshes {
@@ -252,6 +256,8 @@ impl Contacts {
             let room = self.touches.capacity() - self.touches.len();
             self.touches.extend(pressing.take(room));
         }
+        std::mem::swap(&mut self.pinned, &mut self.pinned_before);
+        self.pinned.clear();
     }
 
     /// The step that was begun last is not taken: the body is where it was, and touches what it touched, but nothing pressed it.
@@ -311,6 +317,7 @@ impl Contacts {
         self.candidates.forget_tool(slot);
         self.holds.forget_tool(slot);
         self.touches.retain(|touch| touch.slot != slot);
+        self.pinned_before.retain(|touch| touch.slot != slot);
         if let Some(pair) = self.touched.get_mut(slot) {
             *pair = [false; 2];
         }

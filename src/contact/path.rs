@@ -17,6 +17,8 @@ pub(crate) struct ToolPath {
     form: Form,
     pub friction: f32,
     pub filter: CollisionFilter,
+    /// Whether tissue that is pinned all about presses it.
+    pub meets_pinned: bool,
     start: Pose,
     end: Pose,
     /// The whole turn of the step as axis times angle, rad.
@@ -105,6 +107,7 @@ impl ToolPath {
             form: tool.form.clone(),
             friction: tool.friction,
             filter: tool.filter,
+            meets_pinned: true,
             start,
             end,
             turn,

@@ -16,6 +16,9 @@ use super::sweep::Corners;
 use super::zone::zone_bit;
 use crate::nodes::parts;
 
+/// A normal that lies by less than this cosine along that of the last step is taken for one of the other side.
+const TURNED: f32 = 0.7;
+
 impl Contacts {
     /// Has what is pinned press each tool that is led into it, where it was deepest in the step: with the depth times the stiffness of the
     /// nodes there, N/m. `meeting` is the whole step, of so many substeps, with the nodes where it has led them.
@@ -33,7 +36,7 @@ impl Contacts {
             }
             let deepest = bits
                 .next()
-                .filter(|_| self.driven.place(place).is_none())
+                .filter(|_| tool.meets_pinned && self.driven.place(place).is_none())
                 .and_then(|bit| self.deepest(&meeting, (tool, bit), &mut yielding));
             let Some((depth, feature, geometry)) = deepest else {
                 continue;
@@ -70,6 +73,8 @@ impl Contacts {
         yielding: &mut Vec<u64>,
     ) -> Option<(f32, Feature, ContactGeometry)> {
         let mut deepest: Option<(f32, Feature, ContactGeometry)> = None;
+        let before = self.pinned_before.iter().find(|touch| touch.slot == tool.slot);
+        let radius = tool.sweep(meeting.origin).map_or(0.0, |sweep| sweep.thickness);
         // A tool that passes a thin sheet within the step must not miss it.
         let looks = self.needed_slices(meeting);
         let near = self.candidates.near.iter().zip(&self.candidates.masks);
@@ -80,10 +85,17 @@ impl Contacts {
             for look in 1..=looks {
                 let fraction = f64::from(look) / f64::from(looks);
                 let motion = tool.motion(fraction, fraction, meeting.dt, meeting.origin);
-                let Some(geometry) = meet_standing(meeting, &motion, feature) else {
+                let Some(mut geometry) = meet_standing(meeting, &motion, feature) else {
                     continue;
                 };
-                let depth = meeting.thickness - geometry.gap;
+                // One that is in by more than half goes on out by the side on which it came.
+                let along = before.map_or(1.0, |before| before.normal.dot(geometry.normal));
+                let mut depth = meeting.thickness - geometry.gap;
+                if let Some(before) = before.filter(|_| along < TURNED) {
+                    depth += (geometry.gap + radius) * (1.0 - along);
+                    geometry.arm += (before.normal - geometry.normal) * radius;
+                    geometry.normal = before.normal;
+                }
                 if depth <= deepest.map_or(0.0, |(depth, ..)| depth) {
                     continue;
                 }

@@ -149,6 +149,12 @@ impl World {
         }
     }
 
+    /// Whether a handle leads the tool at this place.
+    pub(super) fn is_in_hand(&self, place: usize) -> bool {
+        let mut leading = self.haptics.iter().filter(|link| !link.poses.is_alone());
+        leading.any(|link| self.tools.place(link.tool.0).is_ok_and(|of_hand| of_hand == place))
+    }
+
     /// Leaves each handle a model of what its tool has met in the step of `dt` seconds.
     pub(super) fn publish_to_hands(&mut self, dt: f32) {
         let mut haptics = std::mem::take(&mut self.haptics);

@@ -269,10 +269,15 @@ impl World {
     }
 
     fn plan_tools(&mut self) {
-        self.paths.clear();
+        let mut paths = std::mem::take(&mut self.paths);
+        paths.clear();
         for (place, tool) in self.tools.iter() {
-            self.paths.push(ToolPath::new(place, tool));
+            let mut path = ToolPath::new(place, tool);
+            // A hand that goes on with what it felt in the last step would tremble on what is so much stiffer than it holds the tool.
+            path.meets_pinned = tool.force_limit < f32::INFINITY || !self.is_in_hand(place);
+            paths.push(path);
         }
+        self.paths = paths;
     }
 }
 

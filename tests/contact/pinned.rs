@@ -114,6 +114,27 @@ fn a_tool_that_is_led_into_it_feels_more_the_deeper_it_is() {
 }
 
 #[test]
+fn it_pushes_back_out_by_the_side_on_which_a_tool_came() {
+    for solver in SOLVERS {
+        let shape = Shape::Sphere { radius: 0.03 };
+        let start = Vec3::Y * 0.03;
+        let (mut world, _, tool) = scene(solver, shape, (start, Quat::IDENTITY), f32::INFINITY);
+        let mut last = 0.0;
+        let depths = (0..56).chain((0..56).rev());
+        for (step, depth) in depths.enumerate() {
+            let place = start - Vec3::Y * (1e-3 * depth as f32);
+            world.set_pose(tool, place, None).expect("a pose");
+            world.step(DT).expect("a step");
+            let force = world.wrench(tool).expect("a tool").0.y;
+            let case = format!("{solver:?}, step {step}, {depth} mm deep: {force} N after {last} N");
+            assert!(force >= 0.0 && (depth == 0 || force > 0.0), "{case}");
+            assert!(if step < 56 { force >= last } else { force <= last }, "{case}");
+            last = force;
+        }
+    }
+}
+
+#[test]
 fn a_tool_of_limited_force_stops_at_it() {
     let limit = 1.0;
     for solver in SOLVERS {
@@ -130,7 +151,7 @@ fn a_tool_of_limited_force_stops_at_it() {
                 assert!(force <= 1.01 * limit, "{case}: {force} N");
             }
             // Radius 0.04 m. The search for where it stops ends within a part of the way that it was to go.
-            let highest = 0.0401 + 5e-3 * speed * DT;
+            let highest = 0.0401 + 5e-2 * speed * DT;
             let left = world.pose(tool).expect("a tool").position.y;
             assert!((0.0389..highest).contains(&left), "{case}: the ball stands at {left} m");
         }
