@@ -232,15 +232,12 @@ impl Contacts {
             }
             let force = |given: Vec3| (-given / self.pressed_for).clamp(Vec3::MIN, Vec3::MAX);
             let features = self.constraints.iter().filter(|constraint| constraint.tool == place);
-            let features = features.map(|constraint| {
-                let nodes = constraint.feature.nodes();
-                Touch {
-                    slot: tool.slot,
-                    nodes: [0, 1, 2].map(|corner| nodes[corner.min(nodes.len() - 1)]),
-                    weights: constraint.weights,
-                    normal: constraint.normal,
-                    force: force(constraint.given()),
-                }
+            let features = features.map(|constraint| Touch {
+                slot: tool.slot,
+                nodes: constraint.feature.three_nodes(),
+                weights: constraint.weights,
+                normal: constraint.normal,
+                force: force(constraint.given()),
             });
             let nodes = self.nodes.iter().filter(|contact| contact.tool == place);
             let nodes = nodes.map(|contact| Touch {

@@ -37,6 +37,12 @@ pub(super) struct Feature {
 saved! { Feature { nodes, count } }
 
 impl Feature {
+    /// Its nodes; the last is repeated.
+    pub fn three_nodes(&self) -> [u32; 3] {
+        let nodes = self.nodes();
+        [0, 1, 2].map(|corner| nodes[corner.min(nodes.len() - 1)])
+    }
+
     pub fn node(node: u32) -> Self {
         Self {
             nodes: [node, 0, 0],

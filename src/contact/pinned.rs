@@ -29,6 +29,8 @@ impl Contacts {
         }
         let mut yielding = std::mem::take(&mut self.yielding_nodes);
         yielding.clear();
+        // A tool that passes a thin sheet within the step must not miss it.
+        let looks = self.needed_slices(&meeting);
         let mut bits = (0..).map(zone_bit);
         for (place, tool) in meeting.tools.iter().enumerate() {
             if !tool.filter.meets(self.filter) {
@@ -37,7 +39,7 @@ impl Contacts {
             let deepest = bits
                 .next()
                 .filter(|_| tool.meets_pinned && self.driven.place(place).is_none())
-                .and_then(|bit| self.deepest(&meeting, (tool, bit), &mut yielding));
+                .and_then(|bit| self.deepest(&meeting, (tool, bit), looks, &mut yielding));
             let Some((depth, feature, geometry)) = deepest else {
                 continue;
             };
@@ -52,11 +54,10 @@ impl Contacts {
                     pin.force_sum += (force * share).as_dvec3() * f64::from(substeps);
                 }
             }
-            let nodes = feature.nodes();
             // There is room for one of each tool.
             self.pinned.push(Touch {
                 slot: tool.slot,
-                nodes: [0, 1, 2].map(|corner| nodes[corner.min(nodes.len() - 1)]),
+                nodes: feature.three_nodes(),
                 weights: geometry.weights,
                 normal: geometry.normal,
                 force,
@@ -65,18 +66,17 @@ impl Contacts {
         self.yielding_nodes = yielding;
     }
 
-    /// How deep a tool, whose zone has this bit, comes to lie in what is pinned, and where.
+    /// How deep a tool, whose zone has this bit, comes to lie in what is pinned, and where, as so many looks on its way tell.
     fn deepest(
         &self,
         meeting: &Meeting,
         (tool, bit): (&ToolPath, u32),
+        looks: u32,
         yielding: &mut Vec<u64>,
     ) -> Option<(f32, Feature, ContactGeometry)> {
         let mut deepest: Option<(f32, Feature, ContactGeometry)> = None;
         let before = self.pinned_before.iter().find(|touch| touch.slot == tool.slot);
         let radius = tool.sweep(meeting.origin).map_or(0.0, |sweep| sweep.thickness);
-        // A tool that passes a thin sheet within the step must not miss it.
-        let looks = self.needed_slices(meeting);
         let near = self.candidates.near.iter().zip(&self.candidates.masks);
         let near = near.filter(|&(_, mask)| mask & bit != 0);
         let features = near.filter_map(|(&index, _)| self.features.get(index));

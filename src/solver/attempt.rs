@@ -8,7 +8,7 @@ use super::needs::{Need, first_substep, prepare, refined, substeps_needed};
 use super::step_request::{Carry, Outcome, StepRequest};
 use super::verlet::{self, StepResult, TooLong};
 use crate::base::StateHasher;
-use crate::contact::Meeting;
+use crate::contact::{Meeting, ToolPath};
 use crate::def::SolverReport;
 use crate::nodes::Mobility;
 use crate::threads::Team;
@@ -79,20 +79,20 @@ impl System {
         }
     }
 
-    /// Has what is pinned press the tools that a step, tried in so many substeps, leads into it.
-    pub fn press_pinned(&mut self, request: &StepRequest, substeps: u32) {
+    /// Has what is pinned press the tools that a step, tried in so many substeps, of so many seconds, leads into it.
+    pub fn press_pinned(&mut self, tools: &[ToolPath], (substeps, dt): (u32, f32)) {
         let Some(contacts) = &mut self.contacts else {
             return;
         };
         let state = self.state.substep();
         let meeting = Meeting {
             kernel: self.kernel,
-            tools: request.tools,
+            tools,
             origin: self.origin,
-            dt: request.dt,
+            dt,
             start: 0.0,
             end: 1.0,
-            substep: request.dt,
+            substep: dt,
             drifts: false,
             slack: 0.0,
             neighbor_speed: None,
@@ -101,7 +101,7 @@ impl System {
             mobility: Mobility {
                 inverse_masses: &self.inverse_masses,
                 damping: None,
-                substep: request.dt,
+                substep: dt,
                 half: false,
                 asleep: None,
             },
@@ -110,7 +110,7 @@ impl System {
             next_positions: state.next_positions,
             pins: &mut self.pins,
             bindings: self.bindings.as_ref(),
-            profile: request.profile,
+            profile: None,
         };
         let forces = &self.forces;
         contacts.press_pinned(meeting, substeps, |node| forces.stiffness_at(node, 0.0));

@@ -73,6 +73,7 @@ impl World {
             watch.stop(self.profile.as_deref(), Stage::Plan);
             match self.attempt(dt, team) {
                 Ok(crossings) => {
+                    self.press_pinned(dt);
                     let are_within = left == 0 || self.are_within_limits(dt, left == 1);
                     if self.are_divided(rounds) && are_within {
                         break crossings;
@@ -143,9 +144,7 @@ impl World {
         };
         let Some(tissue) = tissue else {
             attempt_bodies(bodies, outcomes, &request, |_| true, team);
-            reported(bodies, outcomes)?;
-            press_pinned(bodies, outcomes, &request);
-            return Ok(0);
+            return reported(bodies, outcomes).map(|()| 0);
         };
         let watch = Stopwatch::start(profile);
         rouse_groups(tissue, bodies, request.tools);
@@ -170,11 +169,19 @@ impl World {
             }
         }
         reported(bodies, outcomes)?;
-        press_pinned(bodies, outcomes, &request);
         let watch = Stopwatch::start(profile);
         let crossings = tissue.find_crossings(bodies, true);
         watch.stop(profile, Stage::NarrowPhase);
         Ok(crossings)
+    }
+
+    /// Has what is pinned press the tools that the tried step leads into it.
+    fn press_pinned(&mut self, dt: f32) {
+        for (place, body) in self.bodies.iter_mut() {
+            if let Some(Outcome::Done { substeps, .. }) = self.outcomes[place] {
+                body.system_mut().press_pinned(&self.paths, (substeps, dt));
+            }
+        }
     }
 
     /// What the step in progress failed by: of the body that needs most substeps.
@@ -312,15 +319,6 @@ fn reported(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::
         return Err(report(bodies, outcomes, 0));
     }
     Ok(())
-}
-
-/// Has what is pinned press the tools that the tried step leads into it.
-fn press_pinned(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], request: &StepRequest) {
-    for (place, body) in bodies.iter_mut() {
-        if let Some(Outcome::Done { substeps, .. }) = outcomes[place] {
-            body.system_mut().press_pinned(request, substeps);
-        }
-    }
 }
 
 /// Whether there is work for more than one thread.
