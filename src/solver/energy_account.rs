@@ -115,6 +115,19 @@ impl EnergyAccount {
         }
     }
 
+    /// Whether the next step is the first after a change from outside, of a body by itself.
+    pub(super) fn is_new(&self) -> bool {
+        self.reference.is_none() && self.substeps == 0 && self.group == 0
+    }
+
+    /// A step begins in which gravity is this, m/s², of a body by itself that has so much kinetic and potential energy, J.
+    pub(super) fn open(&mut self, gravity: Vec3, energy: f64) {
+        self.gravity = gravity;
+        self.reference = energy.is_finite().then_some(energy);
+        self.comparisons = LEARNED - 1;
+        self.start_over();
+    }
+
     /// Takes in a step in so many substeps, of so many seconds, in which so much work was done, J.
     pub(super) fn take_step(&mut self, gravity: Vec3, substeps: u32, dt: f32, work: f64) {
         if self.gravity != gravity {

@@ -50,6 +50,20 @@ impl<'a> Account<'a> {
         }
     }
 
+    /// Has a new account begin with the energy with which the body is set in motion. What leapfrog adds to that
+    /// in fast modes is there from the first substep on.
+    pub fn open(&mut self, body: &mut System, carry: &mut Carry, part: &Part, team: &Team) {
+        let are_closed = matches!(part.before, VelocityTime::Current | VelocityTime::Closed);
+        if !(self.watches && are_closed && carry.energy.is_new()) {
+            return;
+        }
+        let gravity = self.request.gravity;
+        if let Some(energy) = TileSums::at_start(body, part, carry, gravity, team) {
+            carry.energy.open(gravity, energy);
+            self.compares |= self.substeps > 2;
+        }
+    }
+
     /// Keeps the velocities before the last kick, where forces are kept at the end of a step.
     pub fn keep_velocities(body: &mut System, last: &Part) {
         let state = body.state.substep();

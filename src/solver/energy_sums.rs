@@ -1,12 +1,12 @@
 //! The sums over nodes that the energy monitor needs.
 
-use glam::{DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 
 use super::System;
 use super::closing::Closed;
 use super::kick::Inertia;
 use super::step_request::Carry;
-use super::substep::Part;
+use super::substep::{Part, VelocityTime};
 use crate::codec::saved;
 use crate::simd::Loops;
 use crate::soa::{TILE, tile_count, tile_nodes};
@@ -134,13 +134,34 @@ impl TileSums {
         sums
     }
 
+    /// The kinetic and potential energy as a step begins, with velocities at the time of the positions, J; `None` where less than half of it is of
+    /// motion.
+    pub(super) fn at_start(body: &mut System, part: &Part, carry: &Carry, gravity: Vec3, team: &Team) -> Option<f64> {
+        if part.before == VelocityTime::Current {
+            let state = body.state.substep();
+            state.velocities.copy_from(state.first_velocities);
+        }
+        let sums = Self::of_open(body, part, team);
+        let own = sums.own(body.held_axes())[0];
+        if own == 0.0 {
+            return None;
+        }
+        let [_, elastic] = close(body, carry, team);
+        (own > elastic.abs()).then(|| sums.kinetic + elastic - sums.moment.dot(gravity.as_dvec3()))
+    }
+
+    /// The kinetic energy of its own, and that of the motion as a whole of a body that nothing holds, J.
+    fn own(&self, held: BVec3) -> [f64; 2] {
+        let common = DVec3::select(held, DVec3::ZERO, self.momentum).length_squared() / (2.0 * self.free_mass);
+        [(self.kinetic - common).max(0.0), common]
+    }
+
     /// The energies at the end of a step in substeps of `substep` seconds.
     pub(super) fn close(self, body: &mut System, carry: &Carry, substep: f64, team: &Team) -> Energies {
         let held = body.held_axes();
         let [closing, elastic] = close(body, carry, team);
-        // The motion as a whole of a body that nothing holds is left as it is.
-        let common = DVec3::select(held, DVec3::ZERO, self.momentum).length_squared() / (2.0 * self.free_mass);
-        let own = (self.kinetic - common).max(0.0);
+        // The motion as a whole is left as it is.
+        let [own, common] = self.own(held);
         let still = STILL.max(UNSEEN * f64::from(body.extent()) / substep);
         Energies {
             all: self.shadow + closing + elastic - self.moment.dot(carry.energy.gravity().as_dvec3()),

@@ -82,7 +82,13 @@ impl RigidMotion {
         let centre = moment / mass;
         let velocity = DVec3::select(held, DVec3::ZERO, momentum / mass);
         let mut spin = DVec3::ZERO;
-        if held == BVec3::FALSE {
+        // What is held along one axis turns about it.
+        let turns = match held.bitmask() {
+            0 => DVec3::ONE,
+            1 | 2 | 4 => DVec3::select(held, DVec3::ONE, DVec3::ZERO),
+            _ => DVec3::ZERO,
+        };
+        if turns != DVec3::ZERO {
             let (mut inertia, mut angular) = (DMat3::ZERO, DVec3::ZERO);
             for node in nodes() {
                 let arm = positions.get(node).as_dvec3() - centre;
@@ -93,7 +99,9 @@ impl RigidMotion {
             }
             // A row of nodes has no inertia about its axis, and does not turn about it.
             let trace = inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z;
-            spin = (inertia + DMat3::from_diagonal(DVec3::splat(1e-9 * trace))).inverse() * angular;
+            let inertia = DMat3::from_diagonal(turns) * inertia * DMat3::from_diagonal(turns);
+            let rest = DMat3::from_diagonal(DVec3::ONE - turns + 1e-9);
+            spin = (inertia + rest * trace).inverse() * (angular * turns);
         }
         let or_none = |vector: DVec3| if vector.is_finite() { vector } else { DVec3::ZERO };
         Self {
