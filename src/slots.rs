@@ -1,6 +1,6 @@
 //! Things named by ids that outlive them: an id of something destroyed is recognised, even when its place is used again.
 
-use crate::base::{Error, Result, SlotId};
+use crate::base::{Error, Result, SlotId, WorldTag};
 use crate::codec::{Reader, Saved, Writer, saved};
 
 /// Things in places that are used again.
@@ -13,11 +13,13 @@ pub(crate) struct Slots<T> {
     count: usize,
     /// What they are, for messages.
     noun: &'static str,
+    /// That of all ids here.
+    tag: WorldTag,
 }
 
 #[derive(Debug)]
 pub(crate) struct Slot<T> {
-    /// How many things have lived here.
+    /// How many things have lived here, below the tag of the world.
     generation: u32,
     content: Option<T>,
 }
@@ -32,14 +34,16 @@ impl<T: Saved> Slots<T> {
             first_free: _,
             count: _,
             noun: _,
+            tag: _,
         } = self;
         slots.save(to);
     }
 
     /// Reads all places.
-    pub fn load(noun: &'static str, from: &mut Reader) -> Result<Self> {
+    pub fn load(noun: &'static str, tag: WorldTag, from: &mut Reader) -> Result<Self> {
         let slots: Vec<Slot<T>> = Saved::load(from)?;
-        if slots.len() >= u32::MAX as usize || slots.iter().any(|slot| slot.generation == 0) {
+        let had_nothing = |slot: &Slot<T>| slot.had_nothing() || WorldTag::of(slot.generation) != Some(tag);
+        if slots.len() >= u32::MAX as usize || slots.iter().any(had_nothing) {
             return Err(from.refusal("a place that nothing ever had"));
         }
         Ok(Self {
@@ -47,16 +51,22 @@ impl<T: Saved> Slots<T> {
             count: slots.iter().filter(|slot| slot.content.is_some()).count(),
             slots,
             noun,
+            tag,
         })
     }
 }
 
 /// Whether something can be put here.
 fn is_usable<T>(slot: &Slot<T>) -> bool {
-    slot.content.is_none() && slot.generation < u32::MAX
+    slot.content.is_none() && slot.generation & WorldTag::COUNT < WorldTag::COUNT
 }
 
 impl<T> Slot<T> {
+    /// Whether no id of it was given.
+    fn had_nothing(&self) -> bool {
+        self.generation & WorldTag::COUNT == 0
+    }
+
     /// What lives here.
     pub fn content_mut(&mut self) -> Option<&mut T> {
         self.content.as_mut()
@@ -64,12 +74,13 @@ impl<T> Slot<T> {
 }
 
 impl<T> Slots<T> {
-    pub fn new(noun: &'static str) -> Self {
+    pub fn new(noun: &'static str, tag: WorldTag) -> Self {
         Self {
             slots: Vec::new(),
             first_free: 0,
             count: 0,
             noun,
+            tag,
         }
     }
 
@@ -89,7 +100,7 @@ impl<T> Slots<T> {
             None => {
                 self.slots.try_reserve(1)?;
                 self.slots.push(Slot {
-                    generation: 0,
+                    generation: self.tag.generation(),
                     content: None,
                 });
                 self.slots.len() - 1
@@ -108,7 +119,10 @@ impl<T> Slots<T> {
 
     pub fn remove(&mut self, id: SlotId) -> Result<T> {
         let index = self.index(id)?;
-        let content = self.slots[index].content.take().ok_or_else(|| stale(self.noun, id))?;
+        let content = self.slots[index]
+            .content
+            .take()
+            .ok_or_else(|| refused(self.noun, self.tag, id))?;
         self.first_free = self.first_free.min(index);
         self.count -= 1;
         Ok(content)
@@ -120,7 +134,7 @@ impl<T> Slots<T> {
         let index = id.index();
         self.slots[index].generation -= 1;
         // A place that nothing ever had is none.
-        while self.slots.last().is_some_and(|slot| slot.generation == 0) {
+        while self.slots.last().is_some_and(Slot::had_nothing) {
             self.slots.pop();
         }
         self.first_free = self.first_free.min(self.slots.len());
@@ -129,13 +143,16 @@ impl<T> Slots<T> {
 
     pub fn get(&self, id: SlotId) -> Result<&T> {
         let index = self.index(id)?;
-        self.slots[index].content.as_ref().ok_or_else(|| stale(self.noun, id))
+        self.slots[index]
+            .content
+            .as_ref()
+            .ok_or_else(|| refused(self.noun, self.tag, id))
     }
 
     pub fn get_mut(&mut self, id: SlotId) -> Result<&mut T> {
         let index = self.index(id)?;
-        let Slots { slots, noun, .. } = self;
-        slots[index].content.as_mut().ok_or_else(|| stale(noun, id))
+        let Slots { slots, noun, tag, .. } = self;
+        slots[index].content.as_mut().ok_or_else(|| refused(noun, *tag, id))
     }
 
     /// What lives at a place.
@@ -209,14 +226,34 @@ impl<T> Slots<T> {
         let index = (id.index1 as usize).wrapping_sub(1);
         match self.slots.get(index) {
             Some(slot) if slot.generation == id.generation && slot.content.is_some() => Ok(index),
-            _ => Err(stale(self.noun, id)),
+            _ => Err(refused(self.noun, self.tag, id)),
         }
     }
 }
 
-fn stale(noun: &str, id: SlotId) -> Error {
-    Error::StaleId(format!(
-        "{noun} {{{}, {}}} does not exist, or no longer",
-        id.index1, id.generation
-    ))
+/// Why nothing of this id lives in a world.
+fn refused(noun: &str, world: WorldTag, id: SlotId) -> Error {
+    match WorldTag::of(id.generation) {
+        Some(tag) if tag != world => Error::invalid(format!("{noun} is {id}: the id belongs to another world")),
+        _ => Error::StaleId(format!("{noun} {id} does not exist, or no longer")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slot_is_left_alone_before_its_count_would_reach_the_tag_of_the_next_world() {
+        let tag = WorldTag::next();
+        let mut slots = Slots::new("number", tag);
+        let mut last = SlotId::default();
+        for _ in 0..WorldTag::COUNT {
+            last = slots.insert(7).expect("a slot");
+            assert_eq!((last.index1, WorldTag::of(last.generation)), (1, Some(tag)));
+            slots.remove(last).expect("a number");
+        }
+        assert_eq!(slots.insert(8).map(|id| id.index1), Ok(2));
+        assert!(matches!(slots.get(last), Err(Error::StaleId(_))));
+    }
 }

@@ -25,7 +25,7 @@ mod tools;
 
 use glam::Vec3;
 
-use crate::base::{AttachmentId, Error, Profile, Result, StateHasher, not_negative};
+use crate::base::{AttachmentId, Error, Profile, Result, StateHasher, WorldTag, not_negative};
 use crate::body::Body;
 use crate::contact::{DynamicTool, Tool, ToolPath};
 use crate::def::finite_vector;
@@ -89,6 +89,8 @@ impl Default for WorldDefinition {
 #[derive(Debug)]
 pub struct World {
     definition: WorldDefinition,
+    /// That of its ids.
+    tag: WorldTag,
     kernel: ChosenKernel,
     threads: Threads,
     bodies: Slots<Body>,
@@ -135,6 +137,10 @@ impl World {
     /// [`Error::InvalidArgument`]: a number is out of its range. [`Error::Unsupported`]: the processor does not offer the
     /// kernel, or the system not so many threads.
     pub fn new(definition: WorldDefinition) -> Result<Self> {
+        Self::with_tag(definition, WorldTag::next())
+    }
+
+    fn with_tag(definition: WorldDefinition, tag: WorldTag) -> Result<Self> {
         finite_vector("gravity", definition.gravity)?;
         not_negative("tolerance", definition.tolerance)?;
         if definition.max_substeps == 0 {
@@ -147,16 +153,17 @@ impl World {
                 None => Threads::new(definition.thread_count)?,
             },
             definition,
-            bodies: Slots::new("body"),
-            tools: Slots::new("tool"),
+            tag,
+            bodies: Slots::new("body", tag),
+            tools: Slots::new("tool", tag),
             paths: Vec::new(),
             dynamic: Vec::new(),
             tissue: None,
             walks: Vec::new(),
             outcomes: Vec::new(),
-            attachments: Slots::new("attachment"),
+            attachments: Slots::new("attachment", tag),
             slipped: Vec::new(),
-            blades: Slots::new("blade"),
+            blades: Slots::new("blade", tag),
             holds_made: 0,
             haptics: Vec::new(),
             clock: Clock::default(),

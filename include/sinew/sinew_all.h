@@ -38,7 +38,8 @@ extern "C" {
 // lists only errors that are special. Every call may return
 //   SINEW_STATUS_INVALID_ARGUMENT for NULL where a comment does not say "nullable", NaN or infinity
 //     where a comment does not allow it, an index out of range, an unknown enum value, a negative
-//     mass or stiffness, a field `reserved` that is not 0, or an unknown struct_size;
+//     mass or stiffness, a field `reserved` that is not 0, an id of another world, or an unknown
+//     struct_size;
 //   SINEW_STATUS_STALE_ID for the id of a destroyed object;
 //   SINEW_STATUS_OUT_OF_MEMORY if it allocates;
 //   SINEW_STATUS_INTERNAL after a fault inside the library.
@@ -61,8 +62,9 @@ extern "C" {
 //
 // Ownership: the caller destroys what it creates with a _create or _load function; bodies, tools
 // and blades end with their world. A definition is read only during the call. A view is borrowed;
-// the function that writes it states its lifetime. An id is valid only in its own world; a call
-// does not detect an id of another world.
+// the function that writes it states its lifetime. An id is valid in its own world, in the world
+// that a snapshot of it loads, and in no other; the ids of 4094 worlds that a process creates one
+// after the other differ.
 
 // ---- Version ------------------------------------------------------------------------------------
 
@@ -110,25 +112,25 @@ typedef struct sinew_world sinew_world;
 /// Id of a body; all zero means none.
 typedef struct sinew_body_id {
   uint32_t index1;      ///< Slot of the body, counted from 1.
-  uint32_t generation;  ///< Number of the use of that slot.
+  uint32_t generation;  ///< Number of the use of that slot; upper 12 bits: tag of the world.
 } sinew_body_id;
 
 /// Id of a tool; all zero means none.
 typedef struct sinew_tool_id {
   uint32_t index1;      ///< Slot of the tool, counted from 1.
-  uint32_t generation;  ///< Number of the use of that slot.
+  uint32_t generation;  ///< Number of the use of that slot; upper 12 bits: tag of the world.
 } sinew_tool_id;
 
 /// Id of a blade; all zero means none.
 typedef struct sinew_blade_id {
   uint32_t index1;      ///< Slot of the blade, counted from 1.
-  uint32_t generation;  ///< Number of the use of that slot.
+  uint32_t generation;  ///< Number of the use of that slot; upper 12 bits: tag of the world.
 } sinew_blade_id;
 
 /// Id of an attachment or a suture; all zero means none.
 typedef struct sinew_attachment_id {
   uint32_t index1;      ///< Slot of the attachment, counted from 1.
-  uint32_t generation;  ///< Number of the use of that slot.
+  uint32_t generation;  ///< Number of the use of that slot; upper 12 bits: tag of the world.
 } sinew_attachment_id;
 
 // ---- Views --------------------------------------------------------------------------------------
@@ -1011,8 +1013,8 @@ typedef struct sinew_detector_report {
 } sinew_detector_report;
 
 /// Finds the overlap of the two bodies at their current positions.
-/// You may pass another world if both ids refer there to bodies with identical surfaces. An open
-/// body reports only edges (EXACT: also points). Image space does not allocate.
+/// You may pass a world loaded from a snapshot if both ids refer there to bodies with identical
+/// surfaces. An open body reports only edges (EXACT: also points). Image space does not allocate.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface;
 /// SINEW_STATUS_CAPACITY if one ray has more than `crossings`.
 sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,

@@ -1,9 +1,12 @@
 //! The ids that callers hold, each of its own type.
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 /// A place, counted from 1, and which of the things that lived there is meant; all zero: none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct SlotId {
     pub index1: u32,
+    /// How many things have lived there, below the tag of the world.
     pub generation: u32,
 }
 
@@ -11,6 +14,44 @@ impl SlotId {
     /// The place, counted from 0, of what is known to live.
     pub fn index(self) -> usize {
         self.index1 as usize - 1
+    }
+}
+
+impl std::fmt::Display for SlotId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{{{}, {}}}", self.index1, self.generation)
+    }
+}
+
+/// What tells the ids of a world from those of others: the upper bits of every generation in it.
+///
+/// A slot is used a million times, and then another. A world that is loaded keeps the tag of the one that was saved, and so its ids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct WorldTag(u32);
+
+impl WorldTag {
+    /// The bits of a generation that count what has lived in a slot.
+    pub const COUNT: u32 = (1 << 20) - 1;
+
+    /// Tags are 1 to this one: no id of small numbers has one, nor one of which all bits are set.
+    const LAST: u32 = (!Self::COUNT >> 20) - 1;
+
+    /// That of a new world, which the 4093 before it in this process do not have.
+    pub fn next() -> Self {
+        static WORLDS: AtomicU32 = AtomicU32::new(0);
+        let before = WORLDS.fetch_add(1, Ordering::Relaxed);
+        Self(before % Self::LAST + 1)
+    }
+
+    /// That of a generation, if some world gives such.
+    pub fn of(generation: u32) -> Option<Self> {
+        let tag = generation >> 20;
+        (1..=Self::LAST).contains(&tag).then_some(Self(tag))
+    }
+
+    /// The generation of a slot that nothing had yet.
+    pub fn generation(self) -> u32 {
+        self.0 << 20
     }
 }
 

@@ -11,8 +11,8 @@ pub(crate) mod symbolic_perturbation;
 
 pub use error::{Error, Result};
 pub(crate) use hash::StateHasher;
-pub(crate) use ids::SlotId;
 pub use ids::{AttachmentId, BladeId, BodyId, ToolId};
+pub(crate) use ids::{SlotId, WorldTag};
 pub(crate) use profile::{Count, Profile, Stage, Stopwatch, check_clock};
 pub(crate) use ranges::{above_zero, finite, not_negative};
 pub use step_report::{LimitKind, StepLimit, StepReport, SubstepLimit};

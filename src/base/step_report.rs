@@ -102,8 +102,7 @@ impl std::fmt::Display for StepLimit {
             is_chosen,
         } = self;
         let solver = if *is_chosen { "IMPLICIT" } else { "AUTO or IMPLICIT" };
-        let (index1, generation) = (body.0.index1, body.0.generation);
-        write!(f, "body {index1}:{generation} is limited by {}", of.kind.name())?;
+        write!(f, "body {} is limited by {}", body.0, of.kind.name())?;
         match of.nodes() {
             [] => {}
             [node] => write!(f, " of node {node}")?,

@@ -19,7 +19,7 @@ use crate::world::World;
 pub struct sinew_attachment_id {
     /// Slot of the attachment, counted from 1.
     pub index1: u32,
-    /// Number of the use of that slot.
+    /// Number of the use of that slot; upper 12 bits: tag of the world.
     pub generation: u32,
 }
 

@@ -17,7 +17,7 @@ use crate::world::BladeDefinition;
 pub struct sinew_blade_id {
     /// Slot of the blade, counted from 1.
     pub index1: u32,
-    /// Number of the use of that slot.
+    /// Number of the use of that slot; upper 12 bits: tag of the world.
     pub generation: u32,
 }
 

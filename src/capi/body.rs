@@ -24,7 +24,7 @@ pub const SINEW_AXIS_Z: u32 = 4;
 pub struct sinew_body_id {
     /// Slot of the body, counted from 1.
     pub index1: u32,
-    /// Number of the use of that slot.
+    /// Number of the use of that slot; upper 12 bits: tag of the world.
     pub generation: u32,
 }
 

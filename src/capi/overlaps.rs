@@ -60,8 +60,8 @@ impl DetectorSide {
         };
         if body.node_count() != self.surface.node_count() || body.surface() != self.surface.triangles() {
             return Err(Error::invalid(format!(
-                "world: body {number} of the detector, of index1 {index1} and generation {generation}, has another surface in this world, of \
-                 {} nodes and {} triangles: the detector was made with another world, for {} and {}",
+                "world: body {number} of the detector, of index1 {index1} and generation {generation}, has another surface now, of {} nodes \
+                 and {} triangles: the detector was made for {} and {}",
                 body.node_count(),
                 body.surface().len(),
                 self.surface.node_count(),

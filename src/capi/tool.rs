@@ -18,7 +18,7 @@ use crate::def::{CollisionFilter, Detection};
 pub struct sinew_tool_id {
     /// Slot of the tool, counted from 1.
     pub index1: u32,
-    /// Number of the use of that slot.
+    /// Number of the use of that slot; upper 12 bits: tag of the world.
     pub generation: u32,
 }
 

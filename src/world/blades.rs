@@ -152,7 +152,7 @@ impl World {
         if self.blades.count() == 0 {
             return;
         }
-        let mut blades = std::mem::replace(&mut self.blades, Slots::new("blade"));
+        let mut blades = std::mem::replace(&mut self.blades, Slots::new("blade", self.tag));
         for (_, blade) in blades.iter_mut() {
             let (count, edge_at) = blade.ways();
             self.feel(blade);

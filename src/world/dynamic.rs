@@ -147,10 +147,7 @@ impl World {
     /// Refuses a dynamic tool, for what leads one.
     pub(super) fn check_kinematic(&self, tool: ToolId) -> Result<()> {
         if self.tools.get(tool.0)?.rigid.is_some() {
-            return Err(Error::invalid(format!(
-                "tool is {} of generation {}: it is dynamic",
-                tool.0.index1, tool.0.generation
-            )));
+            return Err(Error::invalid(format!("tool is {}: it is dynamic", tool.0)));
         }
         Ok(())
     }
@@ -265,8 +262,5 @@ fn is_done(outcome: &Option<Outcome>) -> bool {
 }
 
 fn kinematic(tool: ToolId) -> Error {
-    Error::invalid(format!(
-        "tool is {} of generation {}: it is kinematic",
-        tool.0.index1, tool.0.generation
-    ))
+    Error::invalid(format!("tool is {}: it is kinematic", tool.0))
 }

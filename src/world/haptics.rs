@@ -115,10 +115,7 @@ impl World {
     pub(super) fn check_not_led(&self, tool: ToolId) -> Result<()> {
         let leads = |link: &HapticLink| link.tool == tool && !link.poses.is_alone();
         if self.haptics.iter().any(leads) {
-            return Err(Error::invalid(format!(
-                "tool is {} of generation {}: a haptic handle leads it",
-                tool.0.index1, tool.0.generation
-            )));
+            return Err(Error::invalid(format!("tool is {}: a haptic handle leads it", tool.0)));
         }
         Ok(())
     }

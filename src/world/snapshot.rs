@@ -1,7 +1,7 @@
 //! A world to bytes and back.
 
 use super::{World, WorldDefinition};
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, WorldTag, memory};
 use crate::body::Body;
 use crate::codec::{Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section};
 use crate::contact::Tool;
@@ -31,7 +31,8 @@ impl World {
     /// contacts, what is held and sewn, blades in mid stroke, what was applied for the next step, and ids, which name the same things there.
     ///
     /// What is not of the world is not in it: threads, [`BodyReader`](crate::BodyReader)s and [`Embedding`](crate::Embedding)s, which are made again.
-    /// The bytes are for this version of the library alone, and are the same for any number of threads.
+    /// The bytes are for this version of the library alone, and are the same for any number of threads. Two worlds that were made alike differ
+    /// in the tag of their ids, by which another world refuses them: their states are compared by [`World::state_hash`].
     ///
     /// # Errors
     /// [`Error::Unsupported`]: a [`HapticHandle`](crate::HapticHandle) leads a tool, or more room is kept for what may come than bytes can ask for.
@@ -50,8 +51,8 @@ impl World {
     pub fn snapshot_size(&self) -> Result<usize> {
         if let Some(tool) = self.led_by_hand() {
             return Err(Error::Unsupported(format!(
-                "a haptic handle leads tool {} of generation {}: its thread cannot be saved, destroy the handle first",
-                tool.0.index1, tool.0.generation
+                "a haptic handle leads tool {}: its thread cannot be saved, destroy the handle first",
+                tool.0
             )));
         }
         let mut count = Writer::new(None);
@@ -102,6 +103,7 @@ impl World {
     fn write(&self, to: &mut Writer) {
         let Self {
             definition,
+            tag,
             kernel,
             threads: _,
             bodies,
@@ -127,6 +129,7 @@ impl World {
         begin(to, SHAPE);
         write_section(to, *b"WRLD", |to| {
             definition.save(to);
+            tag.generation().save(to);
             kernel.kernel().save(to);
             walks.len().save(to);
             slipped.save(to);
@@ -142,6 +145,7 @@ impl World {
     }
 
     /// A world of the bytes that [`World::save`] made, with so many threads, or the caller's job system, as in [`WorldDefinition`].
+    /// Ids of the world that was saved are its own: the two do not refuse each other's.
     ///
     /// It goes on to the bit where this processor offers the kernel that the world was stepped with; else [`Kernel::Best`] is the best of
     /// this one. What was cut short, has changed or never was a world is refused as a whole.
@@ -159,14 +163,16 @@ impl World {
             tasks,
             ..Saved::load(&mut from)?
         };
+        let tag = WorldTag::of(Saved::load(&mut from)?).ok_or_else(|| from.refusal("ids of no world"))?;
         let kernel = match Kernel::load(&mut from)?.choose() {
             Err(_) if definition.kernel == Kernel::Best => Kernel::Best.choose(),
             chosen => chosen,
         }?;
-        let mut world = Self::new(WorldDefinition {
+        let of_this_kernel = WorldDefinition {
             kernel: kernel.kernel(),
             ..definition
-        })?;
+        };
+        let mut world = Self::with_tag(of_this_kernel, tag)?;
         world.definition.kernel = definition.kernel;
         let walk_count = usize::load(&mut from)?;
         world.slipped = Saved::load(&mut from)?;
@@ -178,16 +184,16 @@ impl World {
         }
         at_end(&from)?;
         let mut from = section(&mut bytes, *b"BODY", kernel)?;
-        world.bodies = Slots::load("body", &mut from)?;
+        world.bodies = Slots::load("body", tag, &mut from)?;
         at_end(&from)?;
         let mut from = section(&mut bytes, *b"TOOL", kernel)?;
-        world.tools = Slots::load("tool", &mut from)?;
+        world.tools = Slots::load("tool", tag, &mut from)?;
         at_end(&from)?;
         let mut from = section(&mut bytes, *b"ATTA", kernel)?;
-        world.attachments = Slots::load("attachment", &mut from)?;
+        world.attachments = Slots::load("attachment", tag, &mut from)?;
         at_end(&from)?;
         let mut from = section(&mut bytes, *b"BLAD", kernel)?;
-        world.blades = Slots::load("blade", &mut from)?;
+        world.blades = Slots::load("blade", tag, &mut from)?;
         at_end(&from)?;
         let mut from = section(&mut bytes, *b"TISS", kernel)?;
         world.tissue = Saved::load(&mut from)?;

@@ -13,7 +13,7 @@
 #define CAPACITY SINEW_STATUS_CAPACITY
 #define UNSUPPORTED SINEW_STATUS_UNSUPPORTED
 
-enum { BAD_IDS = 6 };
+enum { BAD_IDS = 7 };
 
 /* The world that nothing may change: a cloth in motion, a tool, and a force and a pose that wait for the next step. */
 static struct {
@@ -137,7 +137,7 @@ static inline void refused(sinew_status got, sinew_status expected, const char *
         for (i_ = 0; i_ < BAD_IDS; i_++) {                                     \
             sinew_world *const world = the.world;                              \
             const sinew_body_id body = the.bad_bodies[i_];                     \
-            REFUSED_WITH(STALE, "body", call, bad_id_names[i_]);               \
+            REFUSED_WITH(BAD_ID_STATUS(i_), "body", call, bad_id_names[i_]);   \
         }                                                                      \
     } while (0)
 
@@ -153,14 +153,15 @@ static inline void refused(sinew_status got, sinew_status expected, const char *
         for (i_ = 0; i_ < BAD_IDS; i_++) {                                     \
             sinew_world *const world = the.world;                              \
             const sinew_tool_id tool = the.bad_tools[i_];                      \
-            REFUSED_WITH(STALE, "tool", call, bad_id_names[i_]);               \
+            REFUSED_WITH(BAD_ID_STATUS(i_), "tool", call, bad_id_names[i_]);   \
         }                                                                      \
     } while (0)
 
 static const char *const bad_id_names[BAD_IDS] = {
     "id zero",       "an id whose place was given to another", "an id of something destroyed", "an index out of range",
-    "all bits set", "a generation that was not yet",
+    "all bits set", "a generation that was not yet", "an id of another world",
 };
+#define BAD_ID_STATUS(i) ((i) == BAD_IDS - 1 ? INVALID : STALE)
 
 /* The same for a call on `world` and `attachment`, of which these are the bad ones. */
 #define REFUSES_NO_ATTACHMENT(bad_attachments, good, call)                     \
@@ -174,7 +175,7 @@ static const char *const bad_id_names[BAD_IDS] = {
         for (i_ = 0; i_ < BAD_IDS; i_++) {                                     \
             sinew_world *const world = the.world;                              \
             const sinew_attachment_id attachment = (bad_attachments)[i_];      \
-            REFUSED_WITH(STALE, "attachment", call, bad_id_names[i_]);         \
+            REFUSED_WITH(BAD_ID_STATUS(i_), "attachment", call, bad_id_names[i_]); \
         }                                                                      \
     } while (0)
 
@@ -250,16 +251,17 @@ static inline sinew_tool_id a_sphere(void)
     return tool;
 }
 
-/* The six ids that name nothing, in the order of bad_id_names. */
+/* The ids that name nothing here, in the order of bad_id_names. The last is what the next world would give. */
 #define FILL_BAD_IDS(ids, replaced, destroyed, alive)                          \
     do {                                                                       \
         memset(&(ids)[0], 0, sizeof (ids)[0]);                                 \
         (ids)[1] = (replaced);                                                 \
         (ids)[2] = (destroyed);                                                \
-        (ids)[3] = (ids)[5] = (alive);                                         \
+        (ids)[3] = (ids)[5] = (ids)[6] = (alive);                              \
         (ids)[3].index1 = 1000;                                                \
         memset(&(ids)[4], 0xFF, sizeof (ids)[4]);                              \
         (ids)[5].generation++;                                                 \
+        (ids)[6].generation += 1u << 20;                                       \
     } while (0)
 
 static inline void set_up(void)

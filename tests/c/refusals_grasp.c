@@ -272,8 +272,8 @@ static void sutures(void)
     REFUSES_RESULT_SIZES(sinew_suture_report, sizeof(sinew_suture_report), suture,
                          sinew_suture_get_report(the.world, held, &out.suture));
     for (i = 0; i < BAD_IDS; i++) {
-        REFUSED(STALE, "attachment", sinew_suture_set_length(the.world, bad_attachments[i], 0));
-        REFUSED(STALE, "attachment", sinew_suture_get_report(the.world, bad_attachments[i], &out.suture));
+        REFUSED(BAD_ID_STATUS(i), "attachment", sinew_suture_set_length(the.world, bad_attachments[i], 0));
+        REFUSED(BAD_ID_STATUS(i), "attachment", sinew_suture_get_report(the.world, bad_attachments[i], &out.suture));
     }
     REFUSED(INVALID, "suture", sinew_suture_set_length(the.world, held, 0));
     REFUSED(INVALID, "suture", sinew_suture_get_report(the.world, held, &out.suture));
@@ -315,7 +315,7 @@ static void wrenches(void)
         tools[1] = the.bad_tools[i];
         /* An id that was not yet is one of a tool by now. */
         if (tools[1].index1 != other.index1 || tools[1].generation != other.generation)
-            REFUSED(STALE, "tool", sinew_world_get_total_wrench(the.world, tools, 2, point, out.force, out.torque));
+            REFUSED(BAD_ID_STATUS(i), "tool", sinew_world_get_total_wrench(the.world, tools, 2, point, out.force, out.torque));
     }
     tools[1] = the.tool;
     REFUSED(INVALID, "tools[1]", sinew_world_get_total_wrench(the.world, tools, 2, point, out.force, out.torque));

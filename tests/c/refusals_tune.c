@@ -97,7 +97,7 @@ static void pictures(void)
     REFUSED(INVALID, "path", sinew_world_save_picture_of_values(the.world, NULL, &values, 1, NULL));
     REFUSED(INVALID, "coloured", sinew_world_save_picture_of_values(the.world, NULL, NULL, 1, "must_not_be_drawn.png"));
     for (i = 0; i < BAD_IDS; i++)
-        VALUES(STALE, "body", values.body = the.bad_bodies[i]);
+        VALUES(BAD_ID_STATUS(i), "body", values.body = the.bad_bodies[i]);
     VALUES(INVALID, "values", values.values = NULL);
     VALUES(INVALID, "values", values.node_count = 8);
     VALUES(INVALID, "values[1]", values.values = spoiled(numbers, 9, 1, INFINITY));

@@ -323,6 +323,7 @@ impl Bonds {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::WorldTag;
     use crate::def::Anchor;
     use crate::def::SurfacePoint;
     use crate::slots::Slots;
@@ -342,7 +343,7 @@ mod tests {
     }
 
     fn ids(count: usize) -> Vec<SlotId> {
-        let mut slots = Slots::new("attachment");
+        let mut slots = Slots::new("attachment", WorldTag::next());
         (0..count).map(|_| slots.insert(()).expect("a place")).collect()
     }
 
