@@ -162,7 +162,7 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
                 error: report.error,
                 added_mass: report.added_mass,
                 solves: report.solves,
-                has_converged: u32::from(report.converged),
+                has_converged: u32::from(report.has_converged),
                 solver: match choice.solver {
                     Solver::Verlet | Solver::Auto => SINEW_SOLVER_VERLET,
                     Solver::Implicit => SINEW_SOLVER_IMPLICIT,

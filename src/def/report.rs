@@ -44,10 +44,10 @@ pub struct SolverReport {
     pub solves: u32,
     /// Whether every equation was solved as far as the definition asks, or as rounding allows; `false` for bodies that are moved
     /// explicitly.
-    pub converged: bool,
+    pub has_converged: bool,
 }
 
-saved! { SolverReport { iterations, error, added_mass, solves, converged } }
+saved! { SolverReport { iterations, error, added_mass, solves, has_converged } }
 
 impl SolverReport {
     /// Before anything was solved.
@@ -56,7 +56,7 @@ impl SolverReport {
         error: 0.0,
         added_mass: 0.0,
         solves: 0,
-        converged: true,
+        has_converged: true,
     };
 }
 

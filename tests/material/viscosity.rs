@@ -538,7 +538,7 @@ fn newton_finds_that_what_rests_rests() {
                 scene.step(1.0 / 60.0);
                 let report = scene.body().solver_report();
                 assert!(
-                    (report.converged || report.error < 1e-12) && report.iterations < 10_000,
+                    (report.has_converged || report.error < 1e-12) && report.iterations < 10_000,
                     "nu {nu:?}, {viscosity:?}: {report:?}"
                 );
             }

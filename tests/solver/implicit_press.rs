@@ -43,7 +43,7 @@ fn press(solver: Solver, elements: bool, shape: Shape) -> Vec<Felt> {
             Felt {
                 force: f64::from(world.wrench(tool).expect("a tool").0.y),
                 products: report.iterations,
-                converged: report.converged,
+                converged: report.has_converged,
             }
         })
         .collect()

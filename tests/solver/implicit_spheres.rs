@@ -121,7 +121,7 @@ fn course(tissue: Tissue, solver: Solver, radius: f32, frames: usize) -> Course 
         course.products.push(report.iterations);
         course.energies.push(scene.energy());
         course.deepest = course.deepest.max(scene.depth());
-        course.converged = report.converged;
+        course.converged = report.has_converged;
     }
     course
 }

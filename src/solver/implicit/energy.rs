@@ -177,7 +177,7 @@ impl Substep<'_> {
         history.remainders.clear();
         history.step = 0.0;
         history.credit = 0.0;
-        implicit.report.converged = false;
+        implicit.report.has_converged = false;
     }
 
     /// Finds out what holds the pins where nothing moves.

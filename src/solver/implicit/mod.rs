@@ -418,7 +418,7 @@ impl Implicit {
 
     /// Begins a step anew, from the current state.
     fn begin(&mut self) {
-        (self.report.error, self.report.converged) = (0.0, true);
+        (self.report.error, self.report.has_converged) = (0.0, true);
         self.memory = self.kept;
         self.spectrum.assume(self.kept.smallest);
     }

@@ -73,10 +73,12 @@ impl Substep<'_> {
     pub(super) fn take_safely(self, body: &mut System, implicit: &mut Implicit, is_last_resort: bool) -> End {
         let watch = Stopwatch::start(self.request.profile);
         let before = self.energy_before(body, implicit);
-        let SolverReport { error, converged, .. } = implicit.report;
+        let SolverReport {
+            error, has_converged, ..
+        } = implicit.report;
         let mut end = self.take(body, implicit, before);
         if matches!(end, End::Gained | End::NotFinite) && self.may_be_of_order_1(implicit) {
-            (implicit.report.error, implicit.report.converged) = (error, converged);
+            (implicit.report.error, implicit.report.has_converged) = (error, has_converged);
             end = self.of_order_1().take(body, implicit, before);
         }
         if end == End::Gained && (is_last_resort || implicit.left == 0) {
@@ -368,7 +370,7 @@ impl Substep<'_> {
         report.iterations += found.products;
         report.solves += found.iterations;
         report.error = report.error.max(found.error as f32);
-        report.converged &= found.converged;
+        report.has_converged &= found.converged;
     }
 
     /// Makes velocities and history of what was found; whether all is finite.
