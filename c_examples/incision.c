@@ -78,14 +78,16 @@ static sinew_body_id create_skin(sinew_world *world, const sinew_mesh_view *shap
 /* With so many numbers per node, of which the program sets those of nodes that are there. */
 static drawing create_drawing(const sinew_world *world, sinew_body_id body, size_t node_count, size_t per_node) {
   sinew_triangle_view triangles;
+  uint32_t max_nodes, max_triangles; /* what cuts may make of it: no list grows */
   drawing made;
   CHECK(sinew_body_get_triangles(world, body, &triangles));
+  CHECK(sinew_body_get_max_counts(world, body, &max_nodes, &max_triangles));
   made.version = 0;
   made.per_node = per_node;
   made.node_count = node_count;
-  made.carried = (float *)allocate(per_node * (node_count + SPARE), sizeof *made.carried);
+  made.carried = (float *)allocate(per_node * max_nodes, sizeof *made.carried);
   made.triangle_count = triangles.count;
-  made.triangles = (uint32_t *)allocate(3 * (triangles.count + 8 * SPARE), sizeof *made.triangles);
+  made.triangles = (uint32_t *)allocate(3 * max_triangles, sizeof *made.triangles);
   memcpy(made.triangles, triangles.data, 3 * triangles.count * sizeof *made.triangles);
   return made;
 }

@@ -421,6 +421,39 @@ public:
     check(sinew_body_add_spring(world(), id, a, b, stiffness, rest_length));
   }
   void remove_spring(std::uint32_t a, std::uint32_t b) { check(sinew_body_remove_spring(world(), id, a, b)); }
+  // Springs between pairs of two nodes each. Of two arrays of numbers one may be left out: it is not written, or stays.
+  void spring_pairs(span<std::uint32_t> into) const { // 2 for each spring of the storage report
+    check(sinew_body_get_spring_pairs(world(), id, into.data(), halves(nodes(into.data(), into.size()))));
+  }
+  void springs(nodes pairs, span<float> stiffnesses, span<float> rest_lengths = {}) const {
+    const auto count = halves(pairs, stiffnesses.size(), rest_lengths.size());
+    check(sinew_body_get_springs(world(), id, pairs.data(), count, stiffnesses.data(), rest_lengths.data()));
+  }
+  void set_springs(nodes pairs, floats stiffnesses, floats rest_lengths = {}) {
+    const auto count = halves(pairs, stiffnesses.size(), rest_lengths.size());
+    check(sinew_body_set_springs(world(), id, pairs.data(), stiffnesses.data(), rest_lengths.data(), count));
+  }
+  void tear_limits(nodes pairs, span<float> strains, span<float> forces = {}) const {
+    const auto count = halves(pairs, strains.size(), forces.size());
+    check(sinew_body_get_tear_limits(world(), id, pairs.data(), count, strains.data(), forces.data()));
+  }
+  void set_tear_limits(nodes pairs, floats strains, floats forces = {}) {
+    const auto count = halves(pairs, strains.size(), forces.size());
+    check(sinew_body_set_tear_limits(world(), id, pairs.data(), strains.data(), forces.data(), count));
+  }
+  // Against these lengths, or where they are left out against those of the springs.
+  void spring_strains(nodes pairs, span<float> into, floats rest_lengths = {}) const {
+    const auto count = halves(pairs, into.size(), rest_lengths.size());
+    check(sinew_body_get_spring_strains(world(), id, pairs.data(), rest_lengths.data(), count, into.data()));
+  }
+  void triangle_strains(floats rest_positions, nodes corners, span<sinew_strain> into) const {
+    expect(corners.size() == 3 * into.size(), "corners: 3 nodes for each strain");
+    check(sinew_body_get_triangle_strains(world(), id, rest_positions.data(), thirds(rest_positions), corners.data(), into.size(), into.data()));
+  }
+  void tetrahedron_strains(floats rest_positions, nodes corners, span<sinew_strain> into) const {
+    expect(corners.size() == 4 * into.size(), "corners: 4 nodes for each strain");
+    check(sinew_body_get_tetrahedron_strains(world(), id, rest_positions.data(), thirds(rest_positions), corners.data(), into.size(), into.data()));
+  }
   void scale_region(nodes of, float stiffness_factor, float length_factor) {
     check(sinew_body_scale_region(world(), id, of.data(), of.size(), stiffness_factor, length_factor));
   }
@@ -438,6 +471,10 @@ public:
   std::uint32_t pieces(span<std::uint32_t> piece_of_node) const { // how many there are
     std::uint32_t count = 0;
     return check(sinew_body_get_pieces(world(), id, piece_of_node.data(), piece_of_node.size(), &count)), count;
+  }
+  std::array<std::uint32_t, 2> max_counts() const { // nodes and triangles after all cuts and tears
+    std::array<std::uint32_t, 2> out{};
+    return check(sinew_body_get_max_counts(world(), id, &out[0], &out[1])), out;
   }
   float node_mass(std::uint32_t node) const {
     float out = 0;
@@ -495,6 +532,13 @@ private:
   std::size_t thirds(floats given) const {
     expect(given.size() % 3 == 0, "3 floats for each node");
     return given.size() / 3;
+  }
+  // How many pairs there are, with as many numbers or none in each array.
+  std::size_t halves(nodes pairs, std::size_t first = 0, std::size_t second = 0) const {
+    const std::size_t count = pairs.size() / 2;
+    expect(pairs.size() % 2 == 0, "pairs: 2 nodes each");
+    expect((first == 0 || first == count) && (second == 0 || second == count), "a number for each pair");
+    return count;
   }
   template <class Out, class Get> Out viewed(Get get) const {
     Out out{};
@@ -719,6 +763,10 @@ public:
     std::size_t count = 0;
     return check(sinew_world_get_contact_changes(get(), into.data(), into.size(), &count)), count;
   }
+  std::size_t contact_changes(span<sinew_body_contact_change> into) const { // of bodies with each other and blades
+    std::size_t count = 0;
+    return check(sinew_world_get_body_contact_changes(get(), into.data(), into.size(), &count)), count;
+  }
   std::size_t broken_attachments(span<sinew_attachment_id> into) const {
     std::size_t count = 0;
     return check(sinew_world_get_broken_attachments(get(), into.data(), into.size(), &count)), count;
@@ -773,6 +821,15 @@ inline allocator get_allocator() { // nullptr: the system's
 inline sinew_replay_report replay(const char *path, std::uint32_t thread_count = 1) {
   auto out = sized<sinew_replay_report>();
   return check(sinew_replay(path, thread_count, &out)), out;
+}
+
+inline std::uint32_t version() { return sinew_version(); } // of the library; SINEW_VERSION is that of the header
+inline const char *status_name(sinew_status status) { return sinew_status_name(status); }
+
+// At each node the mean over the elements that have it, of so many corners each.
+inline void average_to_nodes(span<const std::uint32_t> elements, std::uint32_t corners, span<const float> values, span<float> into) {
+  expect(elements.size() == corners * values.size(), "values: one for each element");
+  check(sinew_util_average_to_nodes(elements.data(), corners, values.data(), values.size(), into.data(), into.size()));
 }
 
 inline sinew_material_preset material_preset(std::uint32_t preset) {

@@ -39,7 +39,9 @@ mod world;
 
 pub use base::{AttachmentId, BladeId, BodyId, Error, LimitKind, Result, StepLimit, StepReport, SubstepLimit, ToolId};
 pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, TopologyChanges};
-pub use contact::{Contact, ContactChange, MassProperties, Pose, Shape, ToolDefinition};
+pub use contact::{
+    BladeContactChange, BodyContactChange, Contact, ContactChange, MassProperties, Pose, Shape, ToolDefinition,
+};
 pub use debug_draw::{DebugCanvas, DebugDrawDefinition, Rgba};
 pub use def::{
     Anchor, BodyContact, BodyDefinition, BodySettings, ChoiceReason, CollisionFilter, Detection, ElementLaw,

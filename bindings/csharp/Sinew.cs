@@ -708,6 +708,9 @@ public static unsafe class Sinew
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_get_pieces(IntPtr world, sinew_body_id body, uint* out_pieces, UIntPtr node_count, uint* out_piece_count);
 
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_max_counts(IntPtr world, sinew_body_id body, uint* out_max_nodes, uint* out_max_triangles);
+
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_blade_def
     {
@@ -996,6 +999,20 @@ public static unsafe class Sinew
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_world_get_contact_changes(IntPtr world, sinew_contact_change* out_changes, UIntPtr capacity, UIntPtr* out_count);
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_body_contact_change
+    {
+        public sinew_body_id body;
+        public sinew_body_id other;
+        public sinew_blade_id blade;
+        public void* body_user_data;
+        public void* other_user_data;
+        public uint has_begun;
+    }
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_get_body_contact_changes(IntPtr world, sinew_body_contact_change* out_changes, UIntPtr capacity, UIntPtr* out_count);
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_ray_hit

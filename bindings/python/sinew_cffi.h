@@ -539,6 +539,8 @@ sinew_status sinew_body_get_topology_changes(const sinew_world *world, sinew_bod
     uint64_t since_version, sinew_topology_changes *out);
 sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body,
     uint32_t *out_pieces, size_t node_count, uint32_t *out_piece_count);
+sinew_status sinew_body_get_max_counts(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_max_nodes, uint32_t *out_max_triangles);
 typedef struct sinew_blade_def {
   size_t struct_size;
   float edge[6];
@@ -731,6 +733,16 @@ typedef struct sinew_contact_change {
 } sinew_contact_change;
 sinew_status sinew_world_get_contact_changes(const sinew_world *world,
     sinew_contact_change *out_changes, size_t capacity, size_t *out_count);
+typedef struct sinew_body_contact_change {
+  sinew_body_id body;
+  sinew_body_id other;
+  sinew_blade_id blade;
+  void *body_user_data;
+  void *other_user_data;
+  uint32_t has_begun;
+} sinew_body_contact_change;
+sinew_status sinew_world_get_body_contact_changes(const sinew_world *world,
+    sinew_body_contact_change *out_changes, size_t capacity, size_t *out_count);
 typedef struct sinew_ray_hit {
   size_t struct_size;
   sinew_body_id body;

@@ -6,7 +6,7 @@
  *
  * Output:
  *   cut 58 mm in 60 steps
- *   largest force 0.5 N; pressed the sheet: yes
+ *   largest force 0.5 N; pressed the sheet: yes, and still does: yes
  *   it ended at z = 9 mm; there after its end: no
  *   work / (toughness * length) = 1.0
  */
@@ -44,7 +44,7 @@ int main(void) {
   CHECK(sinew_blade_create(world, &blade_def, &blade));
 
   double work = 0, length = 0, largest = 0;
-  int pressed = 0;
+  int pressed = 0, touches = 0;
   float position[3] = {0.001f, 0.0f, -0.051f};
   for (int i = 0; i < 60; i++) {
     position[2] += 0.001f; /* 1 mm per step of 10 ms */
@@ -56,6 +56,10 @@ int main(void) {
     size_t bodies;
     CHECK(sinew_blade_get_contacts(world, blade, NULL, 0, &bodies)); /* which bodies it presses, where and with what force */
     pressed += bodies > 0;
+    sinew_body_contact_change change; /* of the one body there is */
+    size_t changes;
+    CHECK(sinew_world_get_body_contact_changes(world, &change, 1, &changes));
+    if (changes > 0) touches = change.has_begun == 1;
     CHECK(report.status); /* a cut that fails does not fail the step */
     work += report.work;
     length += report.length;
@@ -63,7 +67,7 @@ int main(void) {
   }
   /* The blade travels 60 mm: 1 mm outside of the sheet, and its cut lags behind by the deformation. */
   printf("cut %.0f mm in 60 steps\n", 1e3 * length);
-  printf("largest force %.1f N; pressed the sheet: %s\n", largest, pressed > 50 ? "yes" : "no");
+  printf("largest force %.1f N; pressed the sheet: %s, and still does: %s\n", largest, pressed > 50 ? "yes" : "no", touches ? "yes" : "no");
   float reached[3];
   CHECK(sinew_blade_get_pose(world, blade, reached, NULL));
   CHECK(sinew_blade_destroy(world, blade)); /* what it has cut stays cut */

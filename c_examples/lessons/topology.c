@@ -1,6 +1,6 @@
 /* Keep GPU buffers in step with a body that is cut.
  *
- * Allocate vertex and index buffers once, with room for spare_nodes. After each cut,
+ * Allocate vertex and index buffers once: sinew_body_get_max_counts returns what cuts can come to. After each cut,
  * sinew_body_get_topology_changes lists the new nodes with the nodes they came from, and the triangles that changed.
  * The arrays stand for buffers: replace the assignments by glBufferSubData or your engine's update.
  *
@@ -9,8 +9,6 @@
  *   after two cuts the buffers equal the body: yes
  */
 #include "../example.h"
-
-#define SPARE 1000
 
 typedef struct buffers {
   uint32_t *indices;  /* 3 per triangle */
@@ -46,12 +44,14 @@ int main(void) {
   sinew_body_def def = body_from_mesh(mesh);
   def.stiffness = 50.0f;
   def.node_mass = 1e-4f;
-  def.spare_nodes = SPARE;
+  def.spare_nodes = 1000;
   sinew_body_id sheet;
   CHECK(sinew_body_create(world, &def, &sheet));
   buffers gpu = {NULL, NULL, def.triangle_count, def.node_count, 0};
-  gpu.indices = (uint32_t *)allocate(3 * (def.triangle_count + 4 * SPARE), sizeof(uint32_t));
-  gpu.coordinates = (float *)allocate(2 * (def.node_count + SPARE), sizeof(float));
+  uint32_t max_nodes, max_triangles;
+  CHECK(sinew_body_get_max_counts(world, sheet, &max_nodes, &max_triangles));
+  gpu.indices = (uint32_t *)allocate(3 * (size_t)max_triangles, sizeof(uint32_t));
+  gpu.coordinates = (float *)allocate(2 * (size_t)max_nodes, sizeof(float));
   memcpy(gpu.indices, def.triangles, 3 * def.triangle_count * sizeof(uint32_t));
   for (size_t i = 0; i < 2 * def.node_count; i++) /* u from x, v from z */
     gpu.coordinates[i] = def.positions[3 * (i / 2) + 2 * (i % 2)] / 0.1f + 0.5f;

@@ -89,8 +89,7 @@ sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_
 sinew_status sinew_attachment_release(sinew_world *world, sinew_attachment_id attachment);
 
 /// Writes the force [N] of an attachment on its body, averaged over the last step.
-/// `out_force` receives 3 floats in world axes. After sinew_body_solve_equilibrium it is the force
-/// of the tool in equilibrium.
+/// `out_force` receives 3 floats in world axes; after sinew_body_solve_equilibrium those at rest.
 sinew_status sinew_attachment_get_force(const sinew_world *world, sinew_attachment_id attachment,
     float *out_force);
 

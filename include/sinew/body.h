@@ -98,8 +98,7 @@ typedef struct sinew_body_def {
   float accuracy;
   /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1;
   /// default 0.001. A step that would be refused may add more. Mass is added only if it saves 1/4
-  /// of the substeps, never with fixed substeps or a tolerance. It adds inertia but no weight. See
-  /// sinew_solver_report.
+  /// of the substeps, never with fixed substeps or a tolerance. It adds inertia but no weight.
   float mass_scaling;
   /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells. Corner bits: x 1, y 2,
   /// z 4. Springs are the edges and face diagonals.
@@ -145,8 +144,7 @@ typedef struct sinew_body_def {
   /// relaxation_time)). Bodies start relaxed; sinew_body_set_positions relaxes them.
   float relaxation_time;
   /// Strain at which springs and elements yield; 0: never. Strain beyond it is permanent. It needs
-  /// SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow the yielding of
-  /// tetrahedra.
+  /// SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow that of tetrahedra.
   float yield_strain;
   /// With yield_strain: maximum plastic strain, above 0 and below 1; default 0.5. Elastic beyond.
   float largest_set;
@@ -193,8 +191,7 @@ typedef struct sinew_body_def {
   float smallest_piece;            ///< Minimum fragment size at rest: [m^2], or [m^3] for solids.
   /// [m/s] Speed below which a node counts as at rest; 0 (default): never sleeps. Parts slower for
   /// sleep_time, which no force would make faster, are not stepped until something affects them.
-  /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake. See
-  /// sinew_body_get_awake_share.
+  /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
   /// Law of TETRAHEDRA, a sinew_element_law value; not 0: no viscosity or yield.

@@ -19,8 +19,7 @@ typedef struct sinew_cut_report {
   uint32_t springs_removed;  ///< Number of springs removed, or replaced by springs of copies.
   uint32_t pieces_parted;    ///< Increase of the number of connected surface components.
   double length;  ///< [m] Length of the cut in the rest shape; for a solid on its surface.
-  /// [m^2] Area of one side of the opened faces of a solid at rest; a cell where the cut ends stays
-  /// whole.
+  /// [m^2] Area of one side of a solid's opened faces at rest; a cell where it ends stays whole.
   double area;
 } sinew_cut_report;
 
@@ -72,6 +71,12 @@ sinew_status sinew_body_get_topology_changes(const sinew_world *world, sinew_bod
 /// numbers; both outputs are nullable.
 sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body,
     uint32_t *out_pieces, size_t node_count, uint32_t *out_piece_count);
+
+/// Writes how many nodes and surface triangles a body has at most after all cuts and tears.
+/// `spare_nodes` more than at creation, and 2 triangles for each of those, 6 in a solid. A cut that
+/// needs more returns SINEW_STATUS_CAPACITY. Both outputs are nullable.
+sinew_status sinew_body_get_max_counts(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_max_nodes, uint32_t *out_max_triangles);
 
 // ---- Blades -------------------------------------------------------------------------------------
 

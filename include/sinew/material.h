@@ -82,8 +82,7 @@ sinew_status sinew_body_scale_region(sinew_world *world, sinew_body_id body, con
 
 /// Sets the overpressure [Pa] of the cavities at rest volume from the next step on.
 /// Open cavities stay without pressure.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body was created with neither pressure nor
-/// enclosed_stiffness.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if created with neither pressure nor enclosed_stiffness.
 sinew_status sinew_body_set_pressure(sinew_world *world, sinew_body_id body, float pressure);
 
 /// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
@@ -127,8 +126,7 @@ typedef struct sinew_equilibrium_report {
 
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
 /// It may take seconds, ignores tools and ends views. Velocities become 0, pending forces stay.
-/// `def` (defaults) and `out_report` are nullable. The rigid position of unpinned parts is
-/// unspecified.
+/// `def` (defaults) and `out_report` are nullable. Where unpinned parts end is unspecified.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part;
 /// SINEW_STATUS_UNSTABLE if not found.
 sinew_status sinew_body_solve_equilibrium(sinew_world *world, sinew_body_id body,

@@ -114,11 +114,25 @@ typedef struct sinew_contact_change {
   uint32_t has_begun;    ///< 1: the contact began; 0: it ended.
 } sinew_contact_change;
 
-/// Writes the contacts that began or ended in the last step.
-/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist. Destroying
-/// a tool or body reports no end.
+/// Writes contacts of tools with bodies that began or ended in the last step, not by destruction.
+/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist.
 sinew_status sinew_world_get_contact_changes(const sinew_world *world,
     sinew_contact_change *out_changes, size_t capacity, size_t *out_count);
+
+/// Contact of a body with another or with a blade that began or ended in the last step.
+typedef struct sinew_body_contact_change {
+  sinew_body_id body;     ///< Body of the contact.
+  sinew_body_id other;    ///< Other body; all zero for a blade.
+  sinew_blade_id blade;   ///< Blade; all zero for a body.
+  void *body_user_data;   ///< Pointer of sinew_body_set_user_data.
+  void *other_user_data;  ///< That of the other body; NULL for a blade.
+  uint32_t has_begun;     ///< 1: the contact began; 0: it ended.
+} sinew_body_contact_change;
+
+/// Writes contacts of bodies with bodies or blades that began or ended in the last step.
+/// Outputs are those of sinew_world_get_contact_changes. Bodies that sleep stay in contact.
+sinew_status sinew_world_get_body_contact_changes(const sinew_world *world,
+    sinew_body_contact_change *out_changes, size_t capacity, size_t *out_count);
 
 /// First body or tool that a ray hits.
 typedef struct sinew_ray_hit {

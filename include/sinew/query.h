@@ -69,8 +69,7 @@ typedef struct sinew_detector_def {
 sinew_status sinew_detector_def_init(sinew_detector_def *def, size_t struct_size);
 
 /// Detector of the overlap of two bodies; it applies no forces and may outlive its world.
-/// Any number of threads may use a `const sinew_detector *` at the same time; a `sinew_detector *`
-/// needs exclusive access.
+/// Any number of threads may use it where it is const, else one alone.
 typedef struct sinew_detector sinew_detector;
 
 /// Creates a detector for two bodies and allocates its memory, without a first search.

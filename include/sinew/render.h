@@ -43,8 +43,7 @@ sinew_status sinew_embedding_create(const sinew_world *world, sinew_body_id body
 void sinew_embedding_destroy(sinew_embedding *embedding);
 
 /// Moves the vertices of an embedding to the body's current positions.
-/// After a cut or tear it allocates; vertices then follow their side, and triangles across the cut
-/// are dropped.
+/// After a cut or tear it allocates; vertices follow their side, and triangles across are dropped.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the nodes are not those it is bound to;
 /// SINEW_STATUS_UNSUPPORTED for a cut body, if it is bound to triangles or some of the tetrahedra.
 sinew_status sinew_embedding_update(sinew_embedding *embedding, const sinew_world *world);
@@ -71,8 +70,7 @@ sinew_status sinew_embedding_get_normals(sinew_embedding *embedding, sinew_vec3_
 
 /// Creates a body of tetrahedra that fills a closed surface, and binds the surface to it.
 /// positions and triangles of `def` are the surface, outward; vertices may repeat. `spacing` [m] is
-/// the mean edge length; features thinner than half of it are lost. `out_embedding` is nullable;
-/// the caller destroys it.
+/// the mean edge length; features thinner than half of it are lost. `out_embedding` is nullable.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` too fine or
 /// too coarse, or `def` lists elements, springs or values.
 sinew_status sinew_body_create_from_surface(sinew_world *world, const sinew_body_def *def,

@@ -37,15 +37,13 @@ extern "C" {
 // SINEW_STATUS_OK. A failed call changes nothing; sinew_last_error returns the reason. A comment
 // lists only errors that are special. Every call may return
 //   SINEW_STATUS_INVALID_ARGUMENT for NULL where a comment does not say "nullable", NaN or infinity
-//     where a comment does not allow it, an index out of range, an unknown enum value, a negative
-//     mass or stiffness, a field `reserved` that is not 0, an id of another world, or an unknown
-//     struct_size;
+//     where a comment does not allow it, an index out of range, an unknown enum value, negative
+//     mass or stiffness, a non-zero `reserved`, another world's id, or an unknown struct_size;
 //   SINEW_STATUS_STALE_ID for the id of a destroyed object;
 //   SINEW_STATUS_OUT_OF_MEMORY if it allocates;
 //   SINEW_STATUS_INTERNAL after a fault inside the library.
 //
-// NULL: a pointer accepts NULL only if its comment says "nullable". An array may also be NULL if
-// its count is 0.
+// NULL: a pointer accepts NULL only if its comment says "nullable", an array also if count is 0.
 //
 // struct_size: call the _init function of a definition (a _def struct). In a struct that the
 // library fills, set struct_size to sizeof the struct before the call. A struct_size that no header
@@ -62,9 +60,8 @@ extern "C" {
 //
 // Ownership: the caller destroys what it creates with a _create or _load function; bodies, tools
 // and blades end with their world. A definition is read only during the call. A view is borrowed;
-// the function that writes it states its lifetime. An id is valid in its own world, in the world
-// that a snapshot of it loads, and in no other; the ids of 4094 worlds that a process creates one
-// after the other differ.
+// the function that writes it states its lifetime. An id is valid only in its own world and in
+// worlds loaded from its snapshots.
 
 // ---- Version ------------------------------------------------------------------------------------
 
@@ -168,7 +165,7 @@ typedef enum sinew_detection {
 // sinew/world.h: a world and its steps.
 //
 // A world holds bodies, tools and blades, which sinew_world_step advances together. Call it once
-// per frame of your main loop.
+// per frame.
 
 /// One task of a step; call it with the task_data and the indices that sinew_run_tasks received.
 typedef void (*sinew_task)(void *task_data, uint32_t index);
@@ -233,12 +230,10 @@ typedef struct sinew_step_report {
   float stable_substep;
   /// Number of bodies that became non-finite and were rolled back; the others were stepped.
   uint32_t bodies_restored;
-  /// [m] Position error of this step; 0 without a tolerance, infinity if the step was refused
-  /// before it could be estimated.
+  /// [m] Position error of this step; 0 without a tolerance, infinity if refused too early.
   float error_estimate;
   /// Number of interpenetrating surface edges that contact could not separate. Edges inside their
-  /// own body count if that collides with itself. Later steps push edges of another body out of a
-  /// closed one.
+  /// own body count if that collides with itself. Later steps push others out of a closed body.
   uint32_t crossings;
   uint32_t limit;            ///< Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
   sinew_body_id limit_body;  ///< UNSTABLE: body with the shortest substep.
@@ -276,14 +271,12 @@ sinew_status sinew_world_get_state_hash(const sinew_world *world, uint64_t *out)
 
 // sinew/mesh.h: meshes from files and basic shapes.
 //
-// A mesh provides the arrays for a body or a tool. Destroy each mesh with sinew_mesh_destroy. For a
-// body pass positions with tetrahedra, cells or triangles; for a mesh tool pass positions and
-// surface.
+// A mesh has the arrays of a body or tool. Destroy each mesh with sinew_mesh_destroy. For a body
+// pass positions with tetrahedra, cells or triangles; for a mesh tool positions and surface.
 
 // ---- Creation -----------------------------------------------------------------------------------
 
 /// Immutable mesh of nodes, triangles, tetrahedra and cells, readable by any number of threads.
-/// The caller owns it.
 typedef struct sinew_mesh sinew_mesh;
 
 /// File format of a mesh.
@@ -327,8 +320,7 @@ sinew_status sinew_mesh_create(const float *positions, size_t node_count, const 
 
 /// Creates a mesh of tetrahedra that fills the closed surface of a mesh.
 /// `spacing` [m] is the mean edge length. The result is that of sinew_body_create_from_surface.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` too fine
-/// or too coarse.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` unfit.
 sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, sinew_mesh **out);
 
 /// Destroys a mesh and ends its views; NULL has no effect.
@@ -460,8 +452,7 @@ typedef struct sinew_body_def {
   float accuracy;
   /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1;
   /// default 0.001. A step that would be refused may add more. Mass is added only if it saves 1/4
-  /// of the substeps, never with fixed substeps or a tolerance. It adds inertia but no weight. See
-  /// sinew_solver_report.
+  /// of the substeps, never with fixed substeps or a tolerance. It adds inertia but no weight.
   float mass_scaling;
   /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells. Corner bits: x 1, y 2,
   /// z 4. Springs are the edges and face diagonals.
@@ -507,8 +498,7 @@ typedef struct sinew_body_def {
   /// relaxation_time)). Bodies start relaxed; sinew_body_set_positions relaxes them.
   float relaxation_time;
   /// Strain at which springs and elements yield; 0: never. Strain beyond it is permanent. It needs
-  /// SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow the yielding of
-  /// tetrahedra.
+  /// SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow that of tetrahedra.
   float yield_strain;
   /// With yield_strain: maximum plastic strain, above 0 and below 1; default 0.5. Elastic beyond.
   float largest_set;
@@ -555,8 +545,7 @@ typedef struct sinew_body_def {
   float smallest_piece;            ///< Minimum fragment size at rest: [m^2], or [m^3] for solids.
   /// [m/s] Speed below which a node counts as at rest; 0 (default): never sleeps. Parts slower for
   /// sleep_time, which no force would make faster, are not stepped until something affects them.
-  /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake. See
-  /// sinew_body_get_awake_share.
+  /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
   /// Law of TETRAHEDRA, a sinew_element_law value; not 0: no viscosity or yield.
@@ -869,8 +858,7 @@ sinew_status sinew_body_scale_region(sinew_world *world, sinew_body_id body, con
 
 /// Sets the overpressure [Pa] of the cavities at rest volume from the next step on.
 /// Open cavities stay without pressure.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body was created with neither pressure nor
-/// enclosed_stiffness.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if created with neither pressure nor enclosed_stiffness.
 sinew_status sinew_body_set_pressure(sinew_world *world, sinew_body_id body, float pressure);
 
 /// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
@@ -914,8 +902,7 @@ typedef struct sinew_equilibrium_report {
 
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
 /// It may take seconds, ignores tools and ends views. Velocities become 0, pending forces stay.
-/// `def` (defaults) and `out_report` are nullable. The rigid position of unpinned parts is
-/// unspecified.
+/// `def` (defaults) and `out_report` are nullable. Where unpinned parts end is unspecified.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part;
 /// SINEW_STATUS_UNSTABLE if not found.
 sinew_status sinew_body_solve_equilibrium(sinew_world *world, sinew_body_id body,
@@ -985,8 +972,7 @@ typedef struct sinew_detector_def {
 sinew_status sinew_detector_def_init(sinew_detector_def *def, size_t struct_size);
 
 /// Detector of the overlap of two bodies; it applies no forces and may outlive its world.
-/// Any number of threads may use a `const sinew_detector *` at the same time; a `sinew_detector *`
-/// needs exclusive access.
+/// Any number of threads may use it where it is const, else one alone.
 typedef struct sinew_detector sinew_detector;
 
 /// Creates a detector for two bodies and allocates its memory, without a first search.
@@ -1140,8 +1126,7 @@ sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_
 sinew_status sinew_attachment_release(sinew_world *world, sinew_attachment_id attachment);
 
 /// Writes the force [N] of an attachment on its body, averaged over the last step.
-/// `out_force` receives 3 floats in world axes. After sinew_body_solve_equilibrium it is the force
-/// of the tool in equilibrium.
+/// `out_force` receives 3 floats in world axes; after sinew_body_solve_equilibrium those at rest.
 sinew_status sinew_attachment_get_force(const sinew_world *world, sinew_attachment_id attachment,
     float *out_force);
 
@@ -1164,8 +1149,7 @@ typedef struct sinew_cut_report {
   uint32_t springs_removed;  ///< Number of springs removed, or replaced by springs of copies.
   uint32_t pieces_parted;    ///< Increase of the number of connected surface components.
   double length;  ///< [m] Length of the cut in the rest shape; for a solid on its surface.
-  /// [m^2] Area of one side of the opened faces of a solid at rest; a cell where the cut ends stays
-  /// whole.
+  /// [m^2] Area of one side of a solid's opened faces at rest; a cell where it ends stays whole.
   double area;
 } sinew_cut_report;
 
@@ -1217,6 +1201,12 @@ sinew_status sinew_body_get_topology_changes(const sinew_world *world, sinew_bod
 /// numbers; both outputs are nullable.
 sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body,
     uint32_t *out_pieces, size_t node_count, uint32_t *out_piece_count);
+
+/// Writes how many nodes and surface triangles a body has at most after all cuts and tears.
+/// `spare_nodes` more than at creation, and 2 triangles for each of those, 6 in a solid. A cut that
+/// needs more returns SINEW_STATUS_CAPACITY. Both outputs are nullable.
+sinew_status sinew_body_get_max_counts(const sinew_world *world, sinew_body_id body,
+    uint32_t *out_max_nodes, uint32_t *out_max_triangles);
 
 // ---- Blades -------------------------------------------------------------------------------------
 
@@ -1483,8 +1473,7 @@ sinew_status sinew_embedding_create(const sinew_world *world, sinew_body_id body
 void sinew_embedding_destroy(sinew_embedding *embedding);
 
 /// Moves the vertices of an embedding to the body's current positions.
-/// After a cut or tear it allocates; vertices then follow their side, and triangles across the cut
-/// are dropped.
+/// After a cut or tear it allocates; vertices follow their side, and triangles across are dropped.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the nodes are not those it is bound to;
 /// SINEW_STATUS_UNSUPPORTED for a cut body, if it is bound to triangles or some of the tetrahedra.
 sinew_status sinew_embedding_update(sinew_embedding *embedding, const sinew_world *world);
@@ -1511,8 +1500,7 @@ sinew_status sinew_embedding_get_normals(sinew_embedding *embedding, sinew_vec3_
 
 /// Creates a body of tetrahedra that fills a closed surface, and binds the surface to it.
 /// positions and triangles of `def` are the surface, outward; vertices may repeat. `spacing` [m] is
-/// the mean edge length; features thinner than half of it are lost. `out_embedding` is nullable;
-/// the caller destroys it.
+/// the mean edge length; features thinner than half of it are lost. `out_embedding` is nullable.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` too fine or
 /// too coarse, or `def` lists elements, springs or values.
 sinew_status sinew_body_create_from_surface(sinew_world *world, const sinew_body_def *def,
@@ -1657,11 +1645,25 @@ typedef struct sinew_contact_change {
   uint32_t has_begun;    ///< 1: the contact began; 0: it ended.
 } sinew_contact_change;
 
-/// Writes the contacts that began or ended in the last step.
-/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist. Destroying
-/// a tool or body reports no end.
+/// Writes contacts of tools with bodies that began or ended in the last step, not by destruction.
+/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist.
 sinew_status sinew_world_get_contact_changes(const sinew_world *world,
     sinew_contact_change *out_changes, size_t capacity, size_t *out_count);
+
+/// Contact of a body with another or with a blade that began or ended in the last step.
+typedef struct sinew_body_contact_change {
+  sinew_body_id body;     ///< Body of the contact.
+  sinew_body_id other;    ///< Other body; all zero for a blade.
+  sinew_blade_id blade;   ///< Blade; all zero for a body.
+  void *body_user_data;   ///< Pointer of sinew_body_set_user_data.
+  void *other_user_data;  ///< That of the other body; NULL for a blade.
+  uint32_t has_begun;     ///< 1: the contact began; 0: it ended.
+} sinew_body_contact_change;
+
+/// Writes contacts of bodies with bodies or blades that began or ended in the last step.
+/// Outputs are those of sinew_world_get_contact_changes. Bodies that sleep stay in contact.
+sinew_status sinew_world_get_body_contact_changes(const sinew_world *world,
+    sinew_body_contact_change *out_changes, size_t capacity, size_t *out_count);
 
 /// First body or tool that a ray hits.
 typedef struct sinew_ray_hit {
@@ -1762,8 +1764,7 @@ sinew_status sinew_tool_get_user_data(const sinew_world *world, sinew_tool_id to
 // sinew/snapshot.h: a world as bytes.
 
 /// Writes the number of bytes that sinew_world_save_snapshot needs now.
-/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or memory cannot address the
-/// size.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or the size is too large.
 sinew_status sinew_world_get_snapshot_size(const sinew_world *world, size_t *out);
 
 /// Saves a world as bytes, from which sinew_world_load_snapshot continues bitwise identically.

@@ -9,8 +9,7 @@
 SINEW_BEGIN
 
 /// Writes the number of bytes that sinew_world_save_snapshot needs now.
-/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or memory cannot address the
-/// size.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or the size is too large.
 sinew_status sinew_world_get_snapshot_size(const sinew_world *world, size_t *out);
 
 /// Saves a world as bytes, from which sinew_world_load_snapshot continues bitwise identically.

@@ -72,6 +72,31 @@ impl Body {
         self.cuttable.as_ref().map(|cuttable| &cuttable.material)
     }
 
+    /// How many nodes it may have after cuts and tears: those that it was made with, and [`BodyDefinition::spare_nodes`].
+    ///
+    /// [`BodyDefinition::spare_nodes`]: crate::BodyDefinition::spare_nodes
+    pub fn max_nodes(&self) -> usize {
+        self.system.node_room.max(self.node_count())
+    }
+
+    /// How many triangles its surface may have after cuts and tears: those that it was made with, and for each of
+    /// [`BodyDefinition::spare_nodes`] two, of a solid six. What would take more is [`Error::Capacity`].
+    ///
+    /// [`BodyDefinition::spare_nodes`]: crate::BodyDefinition::spare_nodes
+    pub fn max_triangles(&self) -> usize {
+        let of_cuts = self.cuttable.as_ref().map_or(0, |cuttable| cuttable.max_triangles);
+        self.surface().len().max(of_cuts as usize)
+    }
+
+    /// What a cut or tear may make of it.
+    pub(super) fn limits(&self, cuttable: &Cuttable) -> Limits {
+        Limits {
+            nodes: self.system.node_room as u32,
+            triangles: cuttable.max_triangles,
+            ..Limits::NONE
+        }
+    }
+
     /// Which version its topology has: 0 when it was made.
     pub fn topology_version(&self) -> u64 {
         self.cuttable.as_ref().map_or(0, |cuttable| cuttable.log.version())
@@ -85,10 +110,7 @@ impl Body {
         }
         let mut near = Vec::new();
         self.items_near(cuttable, &sweep, &mut near)?;
-        let limits = Limits {
-            nodes: self.system.node_room as u32,
-            ..Limits::NONE
-        };
+        let limits = self.limits(cuttable);
         let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
         let mut changes = cuttable.material.cut(&sweep, self.positions(), &near, limits)?;
         let shared = self.share_by_stiffness(&cuttable.material, &mut changes);

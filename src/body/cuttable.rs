@@ -23,11 +23,13 @@ pub(super) struct Cuttable {
     pub stroke: Stroke,
     /// Mass by material in the mean, kg/m² or kg/m³, of nodes that have mass.
     pub density: f64,
+    /// How many triangles there may be after all cuts.
+    pub max_triangles: u32,
     /// Whether every spring lies along an edge of a cell.
     pub springs_are_edges: bool,
 }
 
-saved! { Cuttable { material, search, log, stroke, density, springs_are_edges } }
+saved! { Cuttable { material, search, log, stroke, density, max_triangles, springs_are_edges } }
 
 impl Cuttable {
     /// With springs and the triangles that are drawn in the caller's numbers; `None`: the body is not to be cut.
@@ -85,6 +87,7 @@ impl Cuttable {
             edge.sort_unstable();
         }
         edges.sort_unstable();
+        let added = spare.saturating_mul(material.triangles_per_node());
         let is_edge = |spring: &Spring| {
             let mut nodes = spring.nodes;
             nodes.sort_unstable();
@@ -92,6 +95,7 @@ impl Cuttable {
         };
         Ok(Some(memory::boxed(Self {
             search,
+            max_triangles: material.triangle_count().saturating_add(added),
             material,
             density: if size > 0.0 { mass / size } else { 0.0 },
             log: ChangeLog::default(),

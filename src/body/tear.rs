@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::cuttable::Cuttable;
 use super::{Body, CutReport};
 use crate::base::{Error, Result, memory};
-use crate::cutting::{CutSurface, Limits, VertexLoad};
+use crate::cutting::{CutSurface, VertexLoad};
 use crate::def::{TearReport, Values, Withheld, check_values};
 use crate::solver::System;
 use crate::springs::{Link, pull};
@@ -208,10 +208,7 @@ impl Body {
             .flat_map(|&triangle| surface.nodes_under(triangle));
         nodes.extend(under.map(|node| self.system.order.own(node)));
         let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
-        let limits = Limits {
-            nodes: self.system.node_room as u32,
-            ..Limits::NONE
-        };
+        let limits = self.limits(cuttable);
         let changes = cuttable
             .material
             .cut(&tear.sweep, self.positions(), &tear.triangles, limits)?;

@@ -4,7 +4,7 @@ use super::cuttable::Cuttable;
 use super::tear::Torn;
 use super::{Body, CutReport};
 use crate::base::{Result, memory};
-use crate::cutting::{CutMaterial, Divided, Limits, VertexLoad};
+use crate::cutting::{CutMaterial, Divided, VertexLoad};
 use crate::def::Withheld;
 use crate::tissue::Skin;
 
@@ -58,10 +58,7 @@ impl Body {
         load: &VertexLoad,
         skin: Option<&mut Skin>,
     ) -> Result<Torn> {
-        let limits = Limits {
-            nodes: self.system.node_room as u32,
-            ..Limits::NONE
-        };
+        let limits = self.limits(cuttable);
         let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
         let CutMaterial::Solid(solid) = &mut cuttable.material else {
             return Ok(Torn::Not(Withheld::NoWay));

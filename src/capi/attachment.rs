@@ -204,8 +204,7 @@ pub unsafe extern "C" fn sinew_attachment_release(
 
 /// Writes the force [N] of an attachment on its body, averaged over the last step.
 ///
-/// `out_force` receives 3 floats in world axes. After sinew_body_solve_equilibrium it is the force of the tool in
-/// equilibrium.
+/// `out_force` receives 3 floats in world axes; after sinew_body_solve_equilibrium those at rest.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_get_force(
     world: *const sinew_world,

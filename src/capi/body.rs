@@ -370,7 +370,7 @@ pub unsafe extern "C" fn sinew_body_add_spring(
 ///
 /// Open cavities stay without pressure.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body was created with neither pressure nor enclosed_stiffness.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if created with neither pressure nor enclosed_stiffness.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_set_pressure(
     world: *mut sinew_world,

@@ -8,9 +8,9 @@ use super::guard::{sinew_world, with_world};
 use super::memory;
 use super::status::sinew_status;
 use super::tool::sinew_tool_id;
-use crate::base::{BodyId, Result};
+use crate::base::{BladeId, BodyId, Result};
 use crate::body::Body;
-use crate::contact::{Contact, ContactChange};
+use crate::contact::{BladeContactChange, BodyContactChange, Contact, ContactChange};
 use crate::world::World;
 
 /// Contact of a tool, blade or body with a body at the end of the last step.
@@ -49,6 +49,24 @@ pub struct sinew_contact_change {
     pub has_begun: u32,
 }
 
+/// Contact of a body with another or with a blade that began or ended in the last step.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_body_contact_change {
+    /// Body of the contact.
+    pub body: sinew_body_id,
+    /// Other body; all zero for a blade.
+    pub other: sinew_body_id,
+    /// Blade; all zero for a body.
+    pub blade: sinew_blade_id,
+    /// Pointer of sinew_body_set_user_data.
+    pub body_user_data: *mut c_void,
+    /// That of the other body; NULL for a blade.
+    pub other_user_data: *mut c_void,
+    /// 1: the contact began; 0: it ended.
+    pub has_begun: u32,
+}
+
 fn body_user_data(world: &World, body: BodyId) -> *mut c_void {
     world.body(body).map_or(0, Body::user_data) as *mut c_void
 }
@@ -74,7 +92,32 @@ impl sinew_contact_change {
             body: change.body.into(),
             tool_user_data: world.tool_user_data(change.tool).unwrap_or(0) as *mut c_void,
             body_user_data: body_user_data(world, change.body),
-            has_begun: change.begun.into(),
+            has_begun: change.has_begun.into(),
+        }
+    }
+}
+
+impl sinew_body_contact_change {
+    fn of_bodies(world: &World, change: BodyContactChange) -> Self {
+        let [body, other] = change.bodies;
+        Self {
+            body: body.into(),
+            other: other.into(),
+            blade: BladeId::default().into(),
+            body_user_data: body_user_data(world, body),
+            other_user_data: body_user_data(world, other),
+            has_begun: change.has_begun.into(),
+        }
+    }
+
+    fn of_blade(world: &World, change: BladeContactChange) -> Self {
+        Self {
+            body: change.body.into(),
+            other: BodyId::default().into(),
+            blade: change.blade.into(),
+            body_user_data: body_user_data(world, change.body),
+            other_user_data: std::ptr::null_mut(),
+            has_begun: change.has_begun.into(),
         }
     }
 }
@@ -144,10 +187,9 @@ pub unsafe extern "C" fn sinew_body_get_contacts(
     }
 }
 
-/// Writes the contacts that began or ended in the last step.
+/// Writes contacts of tools with bodies that began or ended in the last step, not by destruction.
 ///
-/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist. Destroying a tool or body
-/// reports no end.
+/// `out_changes` receives at most `capacity` entries, `out_count` the number that exist.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_contact_changes(
     world: *const sinew_world,
@@ -160,6 +202,29 @@ pub unsafe extern "C" fn sinew_world_get_contact_changes(
         with_world(world, |world| {
             let found = world.contact_changes();
             let found = found.map(|change| sinew_contact_change::of(world, change));
+            memory::write_found(found, ("out_changes", out_changes, capacity), out_count)
+        })
+    }
+}
+
+/// Writes contacts of bodies with bodies or blades that began or ended in the last step.
+///
+/// Outputs are those of sinew_world_get_contact_changes. Bodies that sleep stay in contact.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_get_body_contact_changes(
+    world: *const sinew_world,
+    out_changes: *mut sinew_body_contact_change,
+    capacity: usize,
+    out_count: *mut usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let of_bodies = world.body_contact_changes();
+            let of_bodies = of_bodies.map(|change| sinew_body_contact_change::of_bodies(world, change));
+            let of_blades = world.blade_contact_changes();
+            let of_blades = of_blades.map(|change| sinew_body_contact_change::of_blade(world, change));
+            let found = of_bodies.chain(of_blades);
             memory::write_found(found, ("out_changes", out_changes, capacity), out_count)
         })
     }

@@ -26,7 +26,7 @@ pub struct sinew_cut_report {
     pub pieces_parted: u32,
     /// [m] Length of the cut in the rest shape; for a solid on its surface.
     pub length: f64,
-    /// [m^2] Area of one side of the opened faces of a solid at rest; a cell where the cut ends stays whole.
+    /// [m^2] Area of one side of a solid's opened faces at rest; a cell where it ends stays whole.
     pub area: f64,
 }
 
@@ -228,6 +228,33 @@ pub unsafe extern "C" fn sinew_body_get_pieces(
             }
             if let Some(out_piece_count) = out_piece_count {
                 out_piece_count[0] = found.count;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Writes how many nodes and surface triangles a body has at most after all cuts and tears.
+///
+/// `spare_nodes` more than at creation, and 2 triangles for each of those, 6 in a solid. A cut that needs more returns
+/// SINEW_STATUS_CAPACITY. Both outputs are nullable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_max_counts(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out_max_nodes: *mut u32,
+    out_max_triangles: *mut u32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            let out_max_nodes = memory::optional_output_array("out_max_nodes", out_max_nodes, 1)?;
+            let out_max_triangles = memory::optional_output_array("out_max_triangles", out_max_triangles, 1)?;
+            if let Some(out) = out_max_nodes {
+                out[0] = body.max_nodes() as u32;
+            }
+            if let Some(out) = out_max_triangles {
+                out[0] = body.max_triangles() as u32;
             }
             Ok(())
         })

@@ -122,7 +122,7 @@ pub struct sinew_body_def {
     /// VERLET: largest fraction of the body's mass added to nodes that shorten the substep, 0 to 1; default 0.001.
     ///
     /// A step that would be refused may add more. Mass is added only if it saves 1/4 of the substeps, never with fixed
-    /// substeps or a tolerance. It adds inertia but no weight. See sinew_solver_report.
+    /// substeps or a tolerance. It adds inertia but no weight.
     pub mass_scaling: f32,
     /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells.
     ///
@@ -189,7 +189,7 @@ pub struct sinew_body_def {
     pub relaxation_time: f32,
     /// Strain at which springs and elements yield; 0: never. Strain beyond it is permanent.
     ///
-    /// It needs SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow the yielding of tetrahedra.
+    /// It needs SINEW_SPRING_LAW_LINEAR; later springs do not yield. Long steps slow that of tetrahedra.
     pub yield_strain: f32,
     /// With yield_strain: maximum plastic strain, above 0 and below 1; default 0.5. Elastic beyond.
     pub largest_set: f32,
@@ -252,8 +252,7 @@ pub struct sinew_body_def {
     /// [m/s] Speed below which a node counts as at rest; 0 (default): never sleeps.
     ///
     /// Parts slower for sleep_time, which no force would make faster, are not stepped until something affects them.
-    /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake. See
-    /// sinew_body_get_awake_share.
+    /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake.
     pub sleep_speed: f32,
     /// [s] Time at rest before sleep, above 0; default 0.5.
     pub sleep_time: f32,

@@ -135,8 +135,7 @@ unsafe impl Versioned for sinew_detector_report {}
 
 /// Detector of the overlap of two bodies; it applies no forces and may outlive its world.
 ///
-/// Any number of threads may use a `const sinew_detector *` at the same time; a `sinew_detector *` needs exclusive
-/// access.
+/// Any number of threads may use it where it is const, else one alone.
 pub struct sinew_detector {
     sides: [DetectorSide; 2],
     method: Method,

@@ -118,7 +118,7 @@ pub unsafe extern "C" fn sinew_embedding_destroy(embedding: *mut sinew_embedding
 
 /// Moves the vertices of an embedding to the body's current positions.
 ///
-/// After a cut or tear it allocates; vertices then follow their side, and triangles across the cut are dropped.
+/// After a cut or tear it allocates; vertices follow their side, and triangles across are dropped.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the nodes are not those it is bound to; SINEW_STATUS_UNSUPPORTED for a cut
 /// body, if it is bound to triangles or some of the tetrahedra.
@@ -214,7 +214,7 @@ pub unsafe extern "C" fn sinew_embedding_get_normals(
 /// Creates a body of tetrahedra that fills a closed surface, and binds the surface to it.
 ///
 /// positions and triangles of `def` are the surface, outward; vertices may repeat. `spacing` [m] is the mean edge
-/// length; features thinner than half of it are lost. `out_embedding` is nullable; the caller destroys it.
+/// length; features thinner than half of it are lost. `out_embedding` is nullable.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` too fine or too coarse, or `def`
 /// lists elements, springs or values.

@@ -11,8 +11,6 @@ use crate::base::{Error, Result};
 use crate::mesh::{self, LoadedMesh, Mesh, MeshFormat, is_closed};
 
 /// Immutable mesh of nodes, triangles, tetrahedra and cells, readable by any number of threads.
-///
-/// The caller owns it.
 pub struct sinew_mesh {
     loaded: LoadedMesh,
     surface: Vec<[u32; 3]>,

@@ -67,7 +67,7 @@ pub unsafe extern "C" fn sinew_equilibrium_def_init(
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
 ///
 /// It may take seconds, ignores tools and ends views. Velocities become 0, pending forces stay. `def` (defaults) and
-/// `out_report` are nullable. The rigid position of unpinned parts is unspecified.
+/// `out_report` are nullable. Where unpinned parts end is unspecified.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part; SINEW_STATUS_UNSTABLE if not found.
 #[unsafe(no_mangle)]

@@ -8,7 +8,7 @@ use crate::world::World;
 
 /// Writes the number of bytes that sinew_world_save_snapshot needs now.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or memory cannot address the size.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or the size is too large.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_snapshot_size(world: *const sinew_world, out: *mut usize) -> sinew_status {
     // SAFETY: the same contract.

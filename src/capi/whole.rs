@@ -46,7 +46,7 @@ pub unsafe extern "C" fn sinew_mesh_create(
 ///
 /// `spacing` [m] is the mean edge length. The result is that of sinew_body_create_from_surface.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` too fine or too coarse.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` unfit.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_create_filled(
     surface: *const sinew_mesh,

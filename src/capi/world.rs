@@ -88,13 +88,12 @@ pub struct sinew_step_report {
     pub stable_substep: f32,
     /// Number of bodies that became non-finite and were rolled back; the others were stepped.
     pub bodies_restored: u32,
-    /// [m] Position error of this step; 0 without a tolerance, infinity if the step was refused before it could be
-    /// estimated.
+    /// [m] Position error of this step; 0 without a tolerance, infinity if refused too early.
     pub error_estimate: f32,
     /// Number of interpenetrating surface edges that contact could not separate.
     ///
-    /// Edges inside their own body count if that collides with itself. Later steps push edges of another body out of a
-    /// closed one.
+    /// Edges inside their own body count if that collides with itself. Later steps push others out of a
+    /// closed body.
     pub crossings: u32,
     /// Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
     pub limit: u32,

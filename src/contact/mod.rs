@@ -50,7 +50,7 @@ pub(crate) use holds::Holds;
 pub(crate) use limit::TRIES;
 pub(crate) use meeting::Meeting;
 pub(crate) use path::{Frame, ToolPath};
-pub use report::{Contact, ContactChange};
+pub use report::{BladeContactChange, BodyContactChange, Contact, ContactChange};
 pub use rigid::MassProperties;
 pub(crate) use rigid::Rigid;
 pub(crate) use surface::SurfaceChange;

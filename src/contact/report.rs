@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::base::{BodyId, ToolId};
+use crate::base::{BladeId, BodyId, ToolId};
 use crate::codec::saved;
 
 /// Where a tool pressed a body when the last step ended.
@@ -30,7 +30,27 @@ pub struct ContactChange {
     /// The body.
     pub body: BodyId,
     /// Whether they touch now.
-    pub begun: bool,
+    pub has_begun: bool,
+}
+
+/// Two bodies that began or ceased to touch in the last step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyContactChange {
+    /// The bodies.
+    pub bodies: [BodyId; 2],
+    /// Whether they touch now.
+    pub has_begun: bool,
+}
+
+/// A blade and a body of which contact began or ceased in the last step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BladeContactChange {
+    /// The blade.
+    pub blade: BladeId,
+    /// The body.
+    pub body: BodyId,
+    /// Whether it presses the blade now.
+    pub has_begun: bool,
 }
 
 /// A contact as a body keeps it.

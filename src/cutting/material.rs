@@ -91,6 +91,16 @@ impl CutMaterial {
         }
     }
 
+    /// How many triangles may come for each node that comes. Of a surface those that a split adds, two, with a vertex that has a node of its
+    /// own. Where a solid opens along n nodes inside, n copies come and 4 n triangles, and more at the line where it ends.
+    pub fn triangles_per_node(&self) -> u32 {
+        match self {
+            Self::Springs(_) => 0,
+            Self::Surface(_) => 2,
+            Self::Solid(_) => 6,
+        }
+    }
+
     /// Of the triangles of solids, whether a cut has bared them.
     pub fn bared(&self) -> impl Iterator<Item = bool> {
         let solid = match self {

@@ -43,6 +43,7 @@ impl CoupledGroup<'_> {
     pub fn attempt(&mut self, bodies: &mut impl Systems, outcomes: &mut [Option<Outcome>]) {
         self.tissue.pushes.begin();
         self.tissue.touches.begin();
+        self.tissue.touching.begin();
         for island in 0..self.tissue.islands.count() {
             if self.tissue.is_asleep(island, bodies) {
                 for &place in self.tissue.islands.members(island) {

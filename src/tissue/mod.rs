@@ -23,6 +23,7 @@ mod plan;
 mod search;
 mod skin;
 mod touches;
+mod touching;
 mod warm_start;
 mod wound;
 
@@ -37,6 +38,7 @@ pub(crate) use self::lockstep::{CoupledBody, CoupledGroup};
 use self::pairs::Pairs;
 pub(crate) use self::skin::Skin;
 use self::touches::Touches;
+use self::touching::TouchingPairs;
 use self::warm_start::{Pushes, give_again};
 
 use crate::base::{Count, Result, Stage, Stopwatch, memory};
@@ -85,6 +87,8 @@ pub(crate) struct Tissue {
     pub pushes: Pushes,
     /// Where bodies press each other.
     pub touches: Touches,
+    /// Which bodies do.
+    pub touching: TouchingPairs,
     /// What bodies are near each other with.
     pairs: Pairs,
     /// Bodies that fell asleep together.
@@ -93,7 +97,7 @@ pub(crate) struct Tissue {
     pub bonds: Bonds,
 }
 
-saved! { Tissue { islands, skins, clearances, entangled, links, duration, known, pushes, touches, pairs, groups, bonds } }
+saved! { Tissue { islands, skins, clearances, entangled, links, duration, known, pushes, touches, touching, pairs, groups, bonds } }
 
 impl Tissue {
     /// Makes room for a body at this place in the world, which meets tissue.
@@ -109,6 +113,7 @@ impl Tissue {
         self.known.try_reserve(room.saturating_sub(self.known.len()))?;
         self.pushes.reserve(room)?;
         self.touches.reserve(room)?;
+        self.touching.reserve(room)?;
         let features = |skin: &Skin| skin.nodes.capacity() + skin.edges.capacity();
         let known = self.skins.iter().flatten().map(features).sum::<usize>();
         self.pairs.reserve(known + features(&skin), self.islands.room())?;
@@ -166,6 +171,7 @@ impl Tissue {
             }
         }
         self.groups.leave(place);
+        self.touching.leave(place);
         self.shed(place);
     }
 
@@ -205,8 +211,10 @@ impl Tissue {
             let are_attached = members.iter().any(|&place| self.bonds.concern(place as usize));
             self.pushes.begin_island(members, !are_attached);
             self.pairs.forget();
+            self.touching.begin_island(members);
         } else {
             self.pushes.keep(&self.links);
+            self.touching.note(&self.links);
         }
         // What closes a step is half a kick, of VERLET alone.
         if !moment.drifts {
@@ -289,6 +297,7 @@ impl Tissue {
     /// The bodies of an island have ended their step, of which this was the last moment.
     pub fn end_island(&mut self) {
         self.pushes.keep(&self.links);
+        self.touching.note(&self.links);
         self.pushes.end_island();
     }
 

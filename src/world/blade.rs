@@ -123,9 +123,11 @@ pub(super) struct Proxy {
     /// What it did to the blade in the last step, N, and where, m.
     pub felt: DVec3,
     pub felt_at: DVec3,
+    /// Whether it did anything to it then, and in the step before.
+    pub touched: [bool; 2],
 }
 
-saved! { Proxy { body, stroke, last, uncut, behind, holds, size, force, forward, was_outside, felt, felt_at } }
+saved! { Proxy { body, stroke, last, uncut, behind, holds, size, force, forward, was_outside, felt, felt_at, touched } }
 
 /// A thread between tissue and the true edge.
 #[derive(Clone, Copy, Debug)]

@@ -188,6 +188,7 @@ impl World {
                 torque -= (0.5 * (from + to) - middle).cross(on_tissue);
                 work += on_tissue.dot(to - from);
             }
+            proxy.touched = [proxy.felt != DVec3::ZERO, proxy.touched[0]];
             force += proxy.felt;
         }
         // Finite, whatever the step's length.

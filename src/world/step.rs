@@ -83,6 +83,7 @@ impl World {
                 }
                 Err(report) => {
                     self.put_back();
+                    self.keep_touching();
                     let limit = self.limit(dt);
                     return Err(Error::Unstable {
                         report: StepReport { limit, ..report },
@@ -215,6 +216,16 @@ impl World {
             .for_each(|(_, body)| body.system_mut().put_back());
     }
 
+    /// No step was taken: bodies and blades touch what they touched.
+    fn keep_touching(&mut self) {
+        if let Some(tissue) = &mut self.tissue {
+            tissue.touching.stay();
+        }
+        for proxy in self.blades.iter_mut().flat_map(|(_, blade)| &mut blade.proxies) {
+            proxy.touched = [proxy.touched[0]; 2];
+        }
+    }
+
     /// Makes the step that was tried the current state.
     fn commit(&mut self, dt: f32, team: &Team) {
         self.clock.tick(dt);
@@ -250,6 +261,8 @@ impl World {
             tissue.bonds.commit(outcomes, dt);
             tissue.pushes.commit();
             tissue.touches.commit();
+            let is_asleep = |place: usize| matches!(outcomes.get(place), Some(Some(Outcome::Asleep)));
+            tissue.touching.commit(is_asleep);
             let took = |place: usize| matches!(outcomes.get(place), Some(Some(Outcome::Done { .. })));
             rest_islands(tissue, bodies, took);
         }

@@ -6,7 +6,10 @@ use super::World;
 #[cfg(doc)]
 use crate::base::Error;
 use crate::base::{BladeId, BodyId, Result, ToolId};
-use crate::contact::{Contact, ContactChange, Contacts, Pose, Tool, ToolDefinition, ToolPath, ToolPlaces};
+use crate::contact::{
+    BladeContactChange, BodyContactChange, Contact, ContactChange, Contacts, Pose, Tool, ToolDefinition, ToolPath,
+    ToolPlaces,
+};
 use crate::def::CollisionFilter;
 
 impl World {
@@ -237,8 +240,36 @@ impl World {
                 (now != before).then_some(ContactChange {
                     tool: ToolId(tool),
                     body: BodyId(body),
-                    begun: now,
+                    has_begun: now,
                 })
+            })
+        })
+    }
+
+    /// The bodies that began or ceased to touch each other in the last step. Bodies that sleep go on touching; with one that was destroyed nothing
+    /// ceases.
+    pub fn body_contact_changes(&self) -> impl Iterator<Item = BodyContactChange> {
+        let pairs = self.tissue.iter().flat_map(|tissue| tissue.touching.changes());
+        pairs.filter_map(|pair| {
+            let [one, other] = pair.bodies.map(|place| self.bodies.id_at(place).map(BodyId));
+            Some(BodyContactChange {
+                bodies: [one?, other?],
+                has_begun: pair.touched[0],
+            })
+        })
+    }
+
+    /// The blades and bodies of which contact began or ceased in the last step: with a blade or body that was destroyed nothing ceases.
+    pub fn blade_contact_changes(&self) -> impl Iterator<Item = BladeContactChange> {
+        self.blades.iter_ids().flat_map(|(blade, content)| {
+            let changed = content
+                .proxies
+                .iter()
+                .filter(|proxy| proxy.touched[0] != proxy.touched[1]);
+            changed.map(move |proxy| BladeContactChange {
+                blade: BladeId(blade),
+                body: proxy.body,
+                has_begun: proxy.touched[0],
             })
         })
     }

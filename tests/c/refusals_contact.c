@@ -169,10 +169,14 @@ static void rigid_bodies(void)
 
 static void results(void)
 {
+    sinew_body_contact_change pairs[1];
     REFUSES_NO_TOOL(sinew_tool_get_contacts(world, tool, out.contacts, 2, &out.count));
     REFUSED(INVALID, "out_contacts", sinew_tool_get_contacts(the.world, the.tool, NULL, 2, &out.count));
     REFUSED(INVALID, "out_contacts", sinew_tool_get_contacts(the.world, the.tool, out.contacts, SIZE_MAX, &out.count));
     REFUSED(INVALID, "out_count", sinew_tool_get_contacts(the.world, the.tool, out.contacts, 2, NULL));
+    REFUSED(INVALID, "world", sinew_world_get_body_contact_changes(NULL, pairs, 1, &out.count));
+    REFUSED(INVALID, "out_changes", sinew_world_get_body_contact_changes(the.world, NULL, 1, &out.count));
+    REFUSED(INVALID, "out_count", sinew_world_get_body_contact_changes(the.world, pairs, 1, NULL));
     REFUSED(INVALID, "world", sinew_world_get_contact_changes(NULL, out.changes, 2, &out.count));
     REFUSED(INVALID, "out_changes", sinew_world_get_contact_changes(the.world, NULL, 2, &out.count));
     REFUSED(INVALID, "out_changes", sinew_world_get_contact_changes(the.world, out.changes, SIZE_MAX, &out.count));

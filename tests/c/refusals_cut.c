@@ -27,6 +27,7 @@ static void reports(void)
     REFUSED(INVALID, "out", sinew_body_get_triangles(the.world, the.body, NULL));
     REFUSES_NO_BODY(sinew_body_get_pieces(world, body, pieces, 9, &count));
     REFUSED(INVALID, "out_pieces", sinew_body_get_pieces(the.world, the.body, pieces, 8, &count));
+    REFUSES_NO_BODY(sinew_body_get_max_counts(world, body, &pieces[0], &pieces[1]));
     REFUSES_NO_BODY(sinew_body_get_node_mass(world, body, 0, &out.force[0]));
     REFUSED(INVALID, "node", sinew_body_get_node_mass(the.world, the.body, 9, &out.force[0]));
     REFUSED(INVALID, "out", sinew_body_get_node_mass(the.world, the.body, 0, NULL));

@@ -90,7 +90,12 @@ fn what_meets_nothing_any_more_lets_go_and_comes_back() {
                 }
             };
             let pressed = |world: &World| world.wrench(tool).expect("the tool").0.y;
-            let changes = |world: &World| world.contact_changes().map(|change| change.begun).collect::<Vec<_>>();
+            let changes = |world: &World| {
+                world
+                    .contact_changes()
+                    .map(|change| change.has_begun)
+                    .collect::<Vec<_>>()
+            };
             press(&mut world, tool, 0, 30);
             assert!(pressed(&world) > 1e-3);
             ask(&mut world, NOTHING);

@@ -163,7 +163,7 @@ fn a_body_that_is_put_back_touches_nothing_anew() {
     pin_all(&mut world, cloth, &rim(5));
     world.set_pose(ball, Vec3::Y * 0.009, None).expect("a pose");
     let told = |world: &World| {
-        let changes: Vec<bool> = world.contact_changes().map(|change| change.begun).collect();
+        let changes: Vec<bool> = world.contact_changes().map(|change| change.has_begun).collect();
         (changes, world.contacts(ball).expect("a tool").count())
     };
     let step = |world: &mut World, breaks: bool| {

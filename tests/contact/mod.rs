@@ -7,6 +7,7 @@ mod detection_exact;
 mod doors;
 mod dynamic;
 mod entangled;
+mod events;
 mod flush;
 mod friction;
 mod grasp;

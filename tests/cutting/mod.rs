@@ -3,6 +3,7 @@
 
 mod sheet;
 
+mod bounds;
 mod curved;
 mod enclosed;
 mod motion;

@@ -69,6 +69,8 @@ impl Drawn {
             let place = (0..3).map(|k| f64::from(new.weights[k]) * self.rest[new.sources[k] as usize]);
             self.rest.push(place.sum());
         }
+        assert!(body.node_count() <= body.max_nodes(), "{what}");
+        assert!(body.surface().len() <= body.max_triangles(), "{what}");
         self.triangles.resize(body.surface().len(), [u32::MAX; 3]);
         for &triangle in changes.triangles {
             self.triangles[triangle as usize] = body.surface()[triangle as usize];

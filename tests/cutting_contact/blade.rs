@@ -557,3 +557,33 @@ fn what_is_no_blade_is_refused() {
         assert!(matches!(refused, Err(Error::InvalidArgument(why)) if why.starts_with("toughness")));
     }
 }
+
+#[test]
+fn contact_with_a_blade_begins_and_ends() {
+    for solver in [Solver::Verlet, Solver::Implicit] {
+        let sheet = Sheet { solver, ..Sheet::HELD };
+        let (mut world, body) = sheet.world();
+        let at = vec3(-0.01, 0.048, 0.0);
+        let blade = upright(&mut world, 200.0, at);
+        let (mut touches, mut seen) = (false, 0);
+        for step in 1..=200 {
+            let place = at + vec3(0.125 * step as f32 / 200.0, 0.0, 0.0);
+            world.set_blade_pose(blade, place, None).unwrap();
+            world.step(5e-3).unwrap();
+            for change in world.blade_contact_changes() {
+                assert_eq!((change.blade, change.body), (blade, body));
+                assert_ne!(change.has_begun, touches, "{solver:?}, step {step}");
+                touches = change.has_begun;
+                seen += 1;
+            }
+            let presses = world.blade_contacts(blade).unwrap().count() > 0;
+            assert_eq!(presses, touches, "{solver:?}, step {step}");
+            if step == 100 {
+                assert!(touches, "it stands in the sheet");
+                let loaded = World::load(&world.save().unwrap(), 1, None).unwrap();
+                assert!(loaded.blade_contact_changes().eq(world.blade_contact_changes()));
+            }
+        }
+        assert!(!touches && seen >= 2, "{solver:?}: {seen} events");
+    }
+}

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <new>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -132,6 +133,56 @@ static void spans() {
   EXPECT(refused([&] { sinew::world::load_snapshot(bytes); }, "checksum") == SINEW_STATUS_INVALID_ARGUMENT);
 }
 
+// Arrays of one length, of which some may be left out.
+static void springs() {
+  sinew::world world;
+  EXPECT(sinew::version() == SINEW_VERSION);
+  EXPECT(std::string(sinew::status_name(SINEW_STATUS_OK)) == "SINEW_STATUS_OK");
+  const auto mesh = sinew::mesh::cloth({0.1f, 0.1f}, {2, 2});
+  const auto view = mesh.view();
+  sinew::body_def def;
+  mesh.set(def);
+  def.node_mass = 1e-3f, def.stiffness = 20, def.spare_nodes = 50, def.most_tears = 1, def.tear_strain = 0.5f;
+  auto body = world.create_body(def);
+  const auto bounds = body.max_counts();
+  EXPECT(bounds[0] == 9 + 50 && bounds[1] == 8 + 100);
+  std::vector<std::uint32_t> pairs(2 * body.storage_report().spring_count);
+  body.spring_pairs(pairs);
+  const std::size_t count = pairs.size() / 2;
+  EXPECT(count == 16);
+  std::vector<float> stiffnesses(count), lengths(count), strains(count), forces(count, 1);
+  body.springs(pairs, stiffnesses, lengths);
+  EXPECT(stiffnesses[3] == 20 && lengths[3] > 0.04f);
+  for (auto &length : lengths) length *= 0.5f;
+  body.set_springs(pairs, {}, lengths);
+  body.spring_strains(pairs, strains);
+  EXPECT(std::fabs(strains[5] - 1) < 1e-5f);
+  body.spring_strains(pairs, strains, std::vector<float>(count, 0.2f));
+  EXPECT(strains[5] < 0);
+  body.set_tear_limits(pairs, {}, forces);
+  body.tear_limits(pairs, strains, lengths);
+  EXPECT(strains[0] == 0.5f && lengths[0] == 1);
+  EXPECT(refused([&] { body.springs(pairs, sinew::span<float>(lengths.data(), 1)); }, "each pair") == SINEW_STATUS_INVALID_ARGUMENT);
+  std::vector<float> rest(view.positions, view.positions + 27);
+  for (auto &coordinate : rest) coordinate *= 0.5f;
+  const sinew::span<const std::uint32_t> triangles(view.triangles, 24);
+  std::array<sinew_strain, 8> of_triangles{};
+  body.triangle_strains(rest, triangles, of_triangles);
+  EXPECT(std::fabs(of_triangles[7].largest - 1) < 1e-5f);
+  std::array<float, 8> largest{};
+  for (std::size_t i = 0; i < 8; i++) largest[i] = of_triangles[i].largest;
+  std::array<float, 9> means{};
+  sinew::average_to_nodes(triangles, 3, largest, means);
+  EXPECT(std::fabs(means[4] - 1) < 1e-5f);
+
+  const auto block = sinew::mesh::block({0.1f, 0.1f, 0.1f}, {1, 1, 1});
+  const auto shape = block.view();
+  auto filled = world.create_body(solid(shape));
+  std::vector<sinew_strain> of_tetrahedra(shape.tetrahedron_count);
+  filled.tetrahedron_strains({shape.positions, 3 * shape.node_count}, {shape.tetrahedra, 4 * shape.tetrahedron_count}, of_tetrahedra);
+  EXPECT(std::fabs(of_tetrahedra[0].growth) < 1e-5f);
+}
+
 // Each node has an attachment of its own, and none is written beyond those.
 static void attachments() {
   sinew::world world;
@@ -180,6 +231,7 @@ int main() {
   EXPECT(allocations == before);
   owners();
   spans();
+  springs();
   attachments();
   std::puts("ok");
 }

@@ -170,6 +170,25 @@ fn every_constant_carries_the_prefix() {
     }
 }
 
+#[test]
+fn constants_are_in_enums_but_for_versions_flags_and_values_for_none() {
+    let mut count = 0;
+    for (name, value) in defines(committed()) {
+        count += 1;
+        let may_stand_alone = match name {
+            // For the preprocessor.
+            "SINEW_VERSION" | "SINEW_VERSION_MAJOR" | "SINEW_VERSION_MINOR" | "SINEW_VERSION_PATCH" => true,
+            // Flags are joined by |, which makes an int of enumerators.
+            "SINEW_AXIS_X" | "SINEW_AXIS_Y" | "SINEW_AXIS_Z" => true,
+            // Values for none are no int, which enumerators are before C23.
+            "SINEW_NO_NODE" | "SINEW_NO_TRIANGLE" => value == "UINT32_MAX",
+            _ => false,
+        };
+        assert!(may_stand_alone, "{name} is {value}: it belongs in an enum");
+    }
+    assert!(count >= 9, "{count} constants are found");
+}
+
 /// The name of the function that each declaration begins with in its line.
 pub fn function_names(header: &str) -> impl Iterator<Item = &str> {
     header
