@@ -281,8 +281,11 @@ public:
   }
   void apply(const sinew::wrench &of) { check(sinew_tool_apply_wrench(world(), id, of.force.data(), of.torque.data())); }
   void teleport(vec3 position) { check(sinew_tool_teleport(world(), id, position.data(), nullptr)); }
-  void teleport(const sinew::pose &to) {
-    check(sinew_tool_teleport(world(), id, to.position.data(), to.orientation.data()));
+  void teleport(vec3 position, quat orientation) {
+    check(sinew_tool_teleport(world(), id, position.data(), orientation.data()));
+  }
+  template <class Pose, class = std::enable_if_t<std::is_same_v<Pose, sinew::pose>>> void teleport(const Pose &to) { // no braces
+    teleport(to.position, to.orientation);
   }
   sinew::wrench wrench() const {
     sinew::wrench out{};
@@ -307,6 +310,7 @@ public:
     std::size_t count = 0;
     return check(sinew_blade_get_contacts(world(), id, into.data(), into.size(), &count)), count;
   }
+  void set_position(vec3 position) { check(sinew_blade_set_pose(world(), id, position.data(), nullptr)); }
   void set_pose(vec3 position, quat orientation) {
     check(sinew_blade_set_pose(world(), id, position.data(), orientation.data()));
   }

@@ -212,6 +212,26 @@ static void attachments() {
   EXPECT(refused([&] { first.attach(nodes, second, {}, out); }, "others") == SINEW_STATUS_INVALID_ARGUMENT);
 }
 
+static void poses() {
+  sinew::world world;
+  sinew::tool_def ball;
+  ball.radius = 0.01f;
+  auto tool = world.create_tool(ball);
+  tool.set_position({0, 1, 0});
+  tool.teleport({0, 2, 0}); // a position in braces is no pose
+  EXPECT(tool.pose().position[1] == 2);
+  tool.teleport({0, 3, 0}, {0, 0, 0, 1});
+  EXPECT(tool.pose().position[1] == 3);
+  tool.teleport(sinew::pose{{0, 4, 0}, {0, 0, 0, 1}});
+  EXPECT(tool.pose().position[1] == 4);
+  sinew::blade_def edge;
+  edge.edge[0] = 1;
+  auto blade = world.create_blade(edge);
+  blade.set_position({0, 1, 0});
+  world.step(0.01f);
+  EXPECT(blade.pose().position[1] == 1);
+}
+
 static void no_allocation_of_its_own() {
   sinew::world world;
   const auto mesh = sinew::mesh::cloth({0.1f, 0.1f}, {4, 4});
@@ -233,5 +253,6 @@ int main() {
   spans();
   springs();
   attachments();
+  poses();
   std::puts("ok");
 }
