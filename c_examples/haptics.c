@@ -21,6 +21,7 @@
 #define CALM 8.0         /* N s/m: and its damper */
 #define DEPTH 0.008      /* m: how far the path leads into the organ, */
 #define ALONG 0.01       /* m: and along it */
+#define LIMIT 3.3        /* N: what a common desktop device can exert */
 
 /* What a tick was like. */
 typedef struct record {
@@ -185,6 +186,7 @@ static bench create_bench(const sinew_mesh_view *shape, float radius, size_t tic
   tool.position[1] += 0.3f * radius;
   CHECK(sinew_tool_create(it.world, &tool, &it.tool));
   CHECK(sinew_haptic_def_init(&coupling, sizeof coupling));
+  coupling.force_limit = (float)LIMIT;
   coupling.tool = it.tool;
   CHECK(sinew_haptic_create(it.world, &coupling, &it.haptic));
   CHECK(sinew_reader_create(it.world, it.organ, &it.reader));
