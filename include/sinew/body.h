@@ -136,7 +136,7 @@ typedef struct sinew_body_def {
   const float *fibre_directions;
   const float *fibre_stiffnesses;  ///< [Pa] tetrahedron_count floats; nullable: fibre_stiffness.
   /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6. It acts in
-  /// parallel with the stiffness. Later springs have none. From about 0.01 s on use IMPLICIT:
+  /// parallel with the stiffness. Later springs have none. From about 0.001 s on use IMPLICIT:
   /// VERLET needs short substeps.
   float retardation_time;
   /// [s] Relaxation time of the Maxwell branch, 1e-9 to 1e6; 0: a Kelvin-Voigt solid. After a
@@ -191,7 +191,7 @@ typedef struct sinew_body_def {
   float smallest_piece;            ///< Minimum fragment size at rest: [m^2], or [m^3] for solids.
   /// [m/s] Speed below which a node counts as at rest; 0 (default): never sleeps. Parts slower for
   /// sleep_time, which no force would make faster, are not stepped until something affects them.
-  /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake.
+  /// Only VERLET bodies without cuts sleep in parts. Touching bodies sleep together.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
   /// Law of TETRAHEDRA, a sinew_element_law value; not 0: no viscosity or yield.

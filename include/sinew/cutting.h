@@ -41,7 +41,7 @@ typedef struct sinew_new_node {
 /// Cut-boundary edge; each cut edge has one on either side.
 typedef struct sinew_rim_edge {
   uint32_t nodes[2];  ///< End nodes in the order of the triangle.
-  uint32_t triangle;  ///< Surface triangle that has this edge.
+  uint32_t triangle;  ///< Triangle that has this edge; in a solid of the cut face.
 } sinew_rim_edge;
 
 /// Changes of the topology of a body since a version.

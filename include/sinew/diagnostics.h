@@ -33,7 +33,7 @@ typedef struct sinew_solver_report {
   uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved.
   uint32_t has_converged;  ///< IMPLICIT, NEWTON: 1 if each solve reached its tolerance or rounding.
   uint32_t solver;         ///< Solver in use, a sinew_solver value; never AUTO.
-  uint32_t auto_substeps;  ///< Substeps of VERLET on creation; above 150 AUTO takes IMPLICIT.
+  uint32_t auto_substeps;  ///< AUTO: substeps of VERLET on creation; IMPLICIT above 150; else 0.
   float auto_step;  ///< [s] AUTO: step length of the choice, the mean so far or 1/60 s; else 0.
 } sinew_solver_report;
 

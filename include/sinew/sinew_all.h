@@ -490,7 +490,7 @@ typedef struct sinew_body_def {
   const float *fibre_directions;
   const float *fibre_stiffnesses;  ///< [Pa] tetrahedron_count floats; nullable: fibre_stiffness.
   /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6. It acts in
-  /// parallel with the stiffness. Later springs have none. From about 0.01 s on use IMPLICIT:
+  /// parallel with the stiffness. Later springs have none. From about 0.001 s on use IMPLICIT:
   /// VERLET needs short substeps.
   float retardation_time;
   /// [s] Relaxation time of the Maxwell branch, 1e-9 to 1e6; 0: a Kelvin-Voigt solid. After a
@@ -545,7 +545,7 @@ typedef struct sinew_body_def {
   float smallest_piece;            ///< Minimum fragment size at rest: [m^2], or [m^3] for solids.
   /// [m/s] Speed below which a node counts as at rest; 0 (default): never sleeps. Parts slower for
   /// sleep_time, which no force would make faster, are not stepped until something affects them.
-  /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake.
+  /// Only VERLET bodies without cuts sleep in parts. Touching bodies sleep together.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
   /// Law of TETRAHEDRA, a sinew_element_law value; not 0: no viscosity or yield.
@@ -1171,7 +1171,7 @@ typedef struct sinew_new_node {
 /// Cut-boundary edge; each cut edge has one on either side.
 typedef struct sinew_rim_edge {
   uint32_t nodes[2];  ///< End nodes in the order of the triangle.
-  uint32_t triangle;  ///< Surface triangle that has this edge.
+  uint32_t triangle;  ///< Triangle that has this edge; in a solid of the cut face.
 } sinew_rim_edge;
 
 /// Changes of the topology of a body since a version.
@@ -1808,7 +1808,7 @@ typedef struct sinew_solver_report {
   uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved.
   uint32_t has_converged;  ///< IMPLICIT, NEWTON: 1 if each solve reached its tolerance or rounding.
   uint32_t solver;         ///< Solver in use, a sinew_solver value; never AUTO.
-  uint32_t auto_substeps;  ///< Substeps of VERLET on creation; above 150 AUTO takes IMPLICIT.
+  uint32_t auto_substeps;  ///< AUTO: substeps of VERLET on creation; IMPLICIT above 150; else 0.
   float auto_step;  ///< [s] AUTO: step length of the choice, the mean so far or 1/60 s; else 0.
 } sinew_solver_report;
 

@@ -48,7 +48,7 @@ pub struct sinew_new_node {
 pub struct sinew_rim_edge {
     /// End nodes in the order of the triangle.
     pub nodes: [u32; 2],
-    /// Surface triangle that has this edge.
+    /// Triangle that has this edge; in a solid of the cut face.
     pub triangle: u32,
 }
 

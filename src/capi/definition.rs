@@ -179,7 +179,7 @@ pub struct sinew_body_def {
     pub fibre_stiffnesses: *const f32,
     /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6.
     ///
-    /// It acts in parallel with the stiffness. Later springs have none. From about 0.01 s on use IMPLICIT: VERLET needs
+    /// It acts in parallel with the stiffness. Later springs have none. From about 0.001 s on use IMPLICIT: VERLET needs
     /// short substeps.
     pub retardation_time: f32,
     /// [s] Relaxation time of the Maxwell branch, 1e-9 to 1e6; 0: a Kelvin-Voigt solid.
@@ -252,7 +252,7 @@ pub struct sinew_body_def {
     /// [m/s] Speed below which a node counts as at rest; 0 (default): never sleeps.
     ///
     /// Parts slower for sleep_time, which no force would make faster, are not stepped until something affects them.
-    /// Only VERLET bodies without cuts sleep in parts. Bodies that touch other tissue stay awake.
+    /// Only VERLET bodies without cuts sleep in parts. Touching bodies sleep together.
     pub sleep_speed: f32,
     /// [s] Time at rest before sleep, above 0; default 0.5.
     pub sleep_time: f32,

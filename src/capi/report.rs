@@ -60,7 +60,7 @@ pub struct sinew_solver_report {
     pub has_converged: u32,
     /// Solver in use, a sinew_solver value; never AUTO.
     pub solver: u32,
-    /// Substeps of VERLET on creation; above 150 AUTO takes IMPLICIT.
+    /// AUTO: substeps of VERLET on creation; IMPLICIT above 150; else 0.
     pub auto_substeps: u32,
     /// [s] AUTO: step length of the choice, the mean so far or 1/60 s; else 0.
     pub auto_step: f32,

@@ -14,7 +14,7 @@ use crate::soa::Rates;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Viscosity {
     /// The dashpot's viscosity over the stiffness, s, at least 0, at most 1e6; 0: there is none. VERLET takes substeps as short as a dashpot
-    /// alone asks for, `2 / w² retardation_time` with w the highest frequency: from some hundredths of a second on IMPLICIT is the solver for
+    /// alone asks for, `2 / w² retardation_time` with w the highest frequency: from about a millisecond on IMPLICIT is the solver for
     /// it.
     pub retardation_time: f32,
     /// Of the dashpot and the spring in its row, s, from 1e-9 to 1e6, or 0: there is no such spring, and the dashpot acts alone (Kelvin and
