@@ -35,6 +35,12 @@ impl Contacts {
         self.loads.is_empty() || self.candidates.near().is_empty()
     }
 
+    /// Whether the list was made for something much faster than these tools are now: what is in it is not near them.
+    pub(super) fn are_listed_too_far(&self, tools: &[ToolPath]) -> bool {
+        let way = met(tools, self.filter).map(|tool| tool.speed(1.0)).fold(0.0, f32::max);
+        self.candidates.excess > 2.0 * way
+    }
+
     /// How many slices a substep needs. Only tools whose way comes near the body count: what is far changes nothing.
     pub(super) fn needed_slices(&self, meeting: &Meeting) -> u32 {
         let mut slices = 1.0_f32;
@@ -89,10 +95,9 @@ impl Contacts {
         // Good for the rest of the step, where that is no more than a part of the body.
         let size = (bounds.max - bounds.min).length();
         let left = ((1.0 - meeting.start) / (meeting.end - meeting.start).max(1e-9)) as f32;
-        let slack = (left.max(8.0) * travel)
-            .min(0.05 * size)
-            .max(8.0 * travel)
-            .max(0.02 * size);
+        let usual = 0.05 * size;
+        let slack = (left.max(8.0) * travel).min(usual).max(8.0 * travel).max(0.02 * size);
+        self.candidates.excess = (travel - usual / 8.0).max(0.0);
         self.candidates.gather(
             &self.features,
             (meeting.positions, meeting.bindings),

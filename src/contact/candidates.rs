@@ -34,6 +34,8 @@ pub(super) struct Candidates {
     slack: f32,
     /// What is no further from a zone was gathered, m.
     reach: f32,
+    /// How far things may go in a substep beyond what a usual list is good for, m.
+    pub excess: f32,
     /// How far nodes might move since the list was made, m, and where they were then; below 0: it is not known.
     whole_slack: f32,
     firsts: Vectors,
@@ -55,7 +57,7 @@ pub(super) struct Candidates {
 }
 
 saved! { Candidates {
-    near, masks, zones, slack, reach, whole_slack, firsts, corners, shared, longest, surface, planes, met, marks,
+    near, masks, zones, slack, reach, excess, whole_slack, firsts, corners, shared, longest, surface, planes, met, marks,
 } }
 
 /// A corner of what is near, over a slice.
@@ -80,6 +82,7 @@ impl Candidates {
             zones: Vec::new(),
             slack: -1.0,
             reach: 0.0,
+            excess: 0.0,
             whole_slack: -1.0,
             firsts: Vectors::zeros(features.node_count as usize)?,
             longest: 0.0,

@@ -203,7 +203,8 @@ impl Contacts {
         self.loads.clear();
         self.loads.resize(tools.len(), ToolLoad::default());
         // A step that is begun again goes back to where its nodes were.
-        if !self.committed || !self.candidates.covers(tools, self.filter, origin) {
+        let is_covered = self.candidates.covers(tools, self.filter, origin) && !self.are_listed_too_far(tools);
+        if !(self.committed && is_covered) {
             self.candidates.invalidate();
         }
         self.committed = false;

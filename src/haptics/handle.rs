@@ -250,6 +250,8 @@ impl HapticHandle {
     /// What the device is given: what the model says, no more changed than may be, and within all limits.
     fn feel(&mut self, motion: &DeviceMotion, said: &Vector6) {
         let wanted = six::sum(&six::scaled(said, self.gain), &self.rest);
+        // Dampers do not hold back a tool that leaves: what presses it does not pull.
+        let wanted = self.models.read(|model| model.possible(&wanted));
         let change = six::limited(&six::difference(&wanted, &self.felt), self.allowed(motion));
         self.felt = six::sum(&self.felt, &change);
         let wanted = six::limited(&self.felt, self.coupling.limits);

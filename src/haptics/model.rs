@@ -96,7 +96,12 @@ impl WrenchModel {
         let pull = six::sum(&six::each(spring, device), &self.wrench);
         let proxy = six::product(&self.answer, &pull);
         let wrench = six::difference(&self.wrench, &six::product(&self.stiffness, &proxy));
-        self.cone.map_or(wrench, |cone| cone.nearest(&wrench))
+        self.possible(&wrench)
+    }
+
+    /// The nearest wrench that the tissue can press with.
+    pub fn possible(&self, wrench: &Vector6) -> Vector6 {
+        self.cone.map_or(*wrench, |cone| cone.nearest(wrench))
     }
 
     /// What tissue and springs that press with this wrench give back as they let go, J.

@@ -26,6 +26,12 @@ const TOO_MUCH: f64 = 5e-3;
 /// fast as before would gain energy again.
 const SLOWER: f64 = 0.5;
 
+/// The same of the kinetic energy of the last second: a blow that set a body in motion, once it is over.
+const STILLER: f64 = 1.0 / 16.0;
+
+/// The time in which that loses half its weight, s: longer than tissue takes from one swing to the next.
+const SWING: f64 = 1.0;
+
 /// How many times shorter substeps may be than stability asks for.
 const FINEST: u32 = 8;
 
@@ -43,8 +49,9 @@ pub(crate) struct EnergyAccount {
     time: f64,
     /// How often the energy was compared since a change from outside.
     comparisons: u32,
-    /// The most kinetic energy of late, J.
+    /// The most kinetic energy of late, and of the last second, J.
     kinetic: f64,
+    recent: f64,
     /// How much was taken off of late, as a part of that.
     removed: f64,
     /// How many times shorter substeps are than stability asks for.
@@ -63,6 +70,7 @@ saved!(EnergyAccount {
     time,
     comparisons,
     kinetic,
+    recent,
     removed,
     refinement,
     refined_at,
@@ -78,6 +86,7 @@ impl EnergyAccount {
         time: 0.0,
         comparisons: 0,
         kinetic: 0.0,
+        recent: 0.0,
         removed: 0.0,
         refinement: 1,
         refined_at: 0.0,
@@ -185,6 +194,7 @@ impl EnergyAccount {
         }
         let fading = 1.0 / (1.0 + self.time / MEMORY);
         self.kinetic = kinetic.max(self.kinetic * fading);
+        self.recent = kinetic.max(self.recent / (1.0 + self.time / SWING));
         self.removed *= fading;
         // Lost energy may come back, up to the kinetic energy of late: a body that has come to rest stays so.
         let allowed = self.reference.map_or(energy, |reference| reference + self.work);
@@ -205,7 +215,9 @@ impl EnergyAccount {
         }
         if self.removed > TOO_MUCH && self.refinement < FINEST {
             self.refinement *= 2;
-        } else if self.kinetic < SLOWER * self.refined_at && self.refinement > 1 {
+        } else if self.refinement > 1
+            && (self.kinetic < SLOWER * self.refined_at || self.recent < STILLER * self.refined_at)
+        {
             self.refinement /= 2;
         } else {
             return;
@@ -220,6 +232,7 @@ impl EnergyAccount {
             self.work,
             self.time,
             self.kinetic,
+            self.recent,
             self.removed,
             self.refined_at,
         ];

@@ -54,7 +54,8 @@ impl<'a> Account<'a> {
     /// in fast modes is there from the first substep on.
     pub fn open(&mut self, body: &mut System, carry: &mut Carry, part: &Part, team: &Team) {
         let are_closed = matches!(part.before, VelocityTime::Current | VelocityTime::Closed);
-        if !(self.watches && are_closed && carry.energy.is_new()) {
+        // What is taken off a body that a tool holds would be missing in what that feels.
+        if !(self.watches && are_closed && carry.energy.is_new()) || body.is_grasped() {
             return;
         }
         let gravity = self.request.gravity;

@@ -5,8 +5,8 @@
 
 use super::Tissue;
 use crate::solver::{
-    Account, Carry, Energies, EnergyAccount, Outcome, Part, Span, Step, StepRequest, StepResult, System, Systems,
-    TileSums, TooLong, begin, begin_parts, check, check_beside_springs, end_part, finish, needed, next_part,
+    Account, Carry, Energies, EnergyAccount, Outcome, Part, RESERVE, Span, Step, StepRequest, StepResult, System,
+    Systems, TileSums, TooLong, begin, begin_parts, check, check_beside_springs, end_part, finish, needed, next_part,
     parts_near, pass, relieve_squeezed, slow_down, substeps_needed,
 };
 use crate::threads::Team;
@@ -28,6 +28,8 @@ pub(crate) struct CoupledBody {
     sums: Option<TileSums>,
     /// What can be taken off its motion, J.
     own: f64,
+    /// In how many substeps it would go by itself.
+    wanted: u32,
 }
 
 /// The bodies that go together, in islands, as `tissue` tells; `walks` has a place for each body.
@@ -70,10 +72,10 @@ impl CoupledGroup<'_> {
         let mut stable_substep = f32::INFINITY;
         let mut is_taken = false;
         let is_beyond = if request.substeps == 0 && needed > request.max_substeps {
-            stable_substep = request.dt / needed as f32;
+            stable_substep = stable_for(request, needed);
             true
         } else if substeps > request.most_parts() {
-            stable_substep = request.dt / substeps as f32;
+            stable_substep = stable_for(request, substeps);
             true
         } else {
             false
@@ -89,7 +91,7 @@ impl CoupledGroup<'_> {
                     let mut wanted = substeps_needed(request, stable_substep).min(f64::from(u32::MAX)) as u32;
                     if let Some(relieved) = self.relieve(island, bodies, found.stable_substep) {
                         wanted = relieved;
-                        stable_substep = request.dt / relieved as f32;
+                        stable_substep = stable_for(request, relieved);
                     }
                     substeps = wanted.max(substeps.saturating_add(substeps / 4 + 1));
                     if request.substeps == 0 && substeps > request.max_substeps {
@@ -103,6 +105,9 @@ impl CoupledGroup<'_> {
             self.settle_energy(island, bodies, substeps);
         }
         let mut is_whole = is_taken;
+        let members = self.tissue.islands.members(island).iter();
+        let wanted = members.filter_map(|&place| Some(self.walks[place as usize].as_ref()?.wanted));
+        let most_wanted = wanted.max();
         for &place in self.tissue.islands.members(island) {
             let place = place as usize;
             let (Some(walk), Some(body)) = (self.walks[place].take(), bodies.at(place)) else {
@@ -115,8 +120,10 @@ impl CoupledGroup<'_> {
                 };
                 finish(body, substeps, taken, 0.0)
             } else {
+                // What limits all is told of the body that asked for most.
+                let limits = Some(walk.wanted) == most_wanted;
                 Outcome::Unstable {
-                    stable_substep,
+                    stable_substep: if limits { stable_substep } else { f32::INFINITY },
                     error: 0.0,
                 }
             });
@@ -354,9 +361,15 @@ impl CoupledBody {
             part: Part::opening(0.0),
             sums: None,
             own: 0.0,
+            wanted: substeps,
         };
         (walk, substeps)
     }
+}
+
+/// The longest stable substep of what needs so many, s.
+fn stable_for(request: &StepRequest, substeps: u32) -> f32 {
+    request.dt / (RESERVE * substeps as f32)
 }
 
 /// Whether a step of these bodies ends with a comparison of what energy they have together.

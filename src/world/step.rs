@@ -205,7 +205,8 @@ impl World {
             body: BodyId(id),
             of,
             is_chosen: body.solver_choice().reason != ChoiceReason::Given,
-            needed: (dt / (RESERVE * stable_substep)).ceil() as u32,
+            // Less what rounding makes of a whole number.
+            needed: (dt / (RESERVE * stable_substep) * (1.0 - 1e-6)).ceil() as u32,
         })
     }
 

@@ -128,3 +128,20 @@ fn limits_are_kept() {
     }
     assert!(before.length() > 0.199, "{before}");
 }
+
+/// The damper between device and tool does not hold back a tool that leaves: tissue presses, it does not pull.
+#[test]
+fn tissue_does_not_pull_at_a_tool_that_leaves() {
+    for speed in [0.05, 0.2] {
+        let mut bench = Bench::new(Solver::Verlet, 16);
+        let depth = |t: f64| TOP - 0.008 * (t / 0.4).min(1.0);
+        let pressed = bench.follow(0.8, |t| dvec3(0.0, depth(t), 0.0));
+        let most = pressed.last().unwrap().tick.force.y;
+        assert!(most > 0.1, "{most} N");
+        // As a hand sets off, not with a jerk.
+        let way = |t: f64| speed * if t < 0.05 { 10.0 * t * t } else { t - 0.025 };
+        let lifted = bench.follow(0.3, |t| dvec3(0.0, TOP - 0.008 + way(t), 0.0));
+        let least = lifted.iter().map(|record| record.tick.force.y).fold(0.0, f32::min);
+        assert!(least > -0.01 * most, "{speed} m/s: {least} N of {most} N");
+    }
+}

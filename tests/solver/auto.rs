@@ -1,8 +1,10 @@
 //! The solver that is chosen, and what a step that is refused says of its body.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, ChoiceReason, Error, LimitKind, Solver, StepLimit, Values, World, WorldDefinition};
+use sinew::{
+    Anchor, BodyDefinition, ChoiceReason, Error, LimitKind, Solver, StepLimit, Values, World, WorldDefinition,
+};
 
 use crate::support::bodies::{FREE, Parts, Scene};
 use crate::support::organ::of_elements;
@@ -127,7 +129,7 @@ fn an_unstable_step_names_the_spring_and_what_helps() {
     nodes.sort_unstable();
     assert_eq!((limit.of.kind, nodes), (LimitKind::Spring, vec![6, 7]));
     for word in [
-        "body 1:1",
+        "body {1, ",
         "springs of nodes",
         "AUTO",
         "IMPLICIT",
@@ -139,6 +141,34 @@ fn an_unstable_step_names_the_spring_and_what_helps() {
     // As many substeps as it names are enough.
     scene.world.set_substeps(0, limit.needed + 1).expect("substeps");
     assert!(scene.world.step(1.0 / 60.0).expect("a step").limit.is_none());
+}
+
+/// Bodies that are attached to each other take as many substeps as the stiffest asks for: that one is named, and how many.
+#[test]
+fn an_unstable_step_names_the_stiffest_of_the_bodies_that_are_attached() {
+    let few = WorldDefinition {
+        max_substeps: 5,
+        ..FREE
+    };
+    let soft = Parts::chain(4, Vec3::X * 0.1, 0.01, 10.0);
+    let stiff = Parts::chain(4, Vec3::X * 0.1, 0.01, 1e5).moved(Quat::IDENTITY, Vec3::Y * 0.01);
+    fn unscaled(definition: BodyDefinition) -> BodyDefinition {
+        BodyDefinition {
+            mass_scaling: 0.0,
+            ..definition
+        }
+    }
+    let mut scene = Scene::with(&soft, few, unscaled);
+    let other = scene.world.create_body(&unscaled(stiff.definition())).expect("a body");
+    let (alone, _) = refused(&mut scene.world);
+    let ends = [Anchor::Node(0)];
+    let attached = scene.world.attach_to_body(scene.id, &ends, other, &ends, 0.0);
+    attached.expect("an attachment");
+    let (limit, _) = refused(&mut scene.world);
+    assert_eq!((alone.body, limit.body), (other, other));
+    assert_eq!(limit.needed, alone.needed);
+    scene.world.set_substeps(0, limit.needed).expect("substeps");
+    scene.world.step(1.0 / 60.0).expect("a step");
 }
 
 #[test]

@@ -8,6 +8,9 @@ use sinew::{
     WorldDefinition,
 };
 
+use crate::support::bodies::FREE;
+use crate::support::organ::of_elements;
+
 const THICKNESS: f32 = 0.06;
 /// The most parts of a step to a tolerance.
 const CUT: u32 = 64;
@@ -284,5 +287,35 @@ fn both_ends_of_a_capsule_in_one_face_do_what_is_needed() {
                 .iter()
                 .all(|place| place.is_finite())
         );
+    }
+}
+
+/// A tool that moved far in one step, away from tissue, is not near it in the steps after.
+#[test]
+fn a_tool_that_has_jumped_away_costs_nothing_afterwards() {
+    for solver in [Solver::Implicit, Solver::Newton] {
+        let mut world = World::new(FREE).expect("a world");
+        let mesh = Mesh::block([0.1, 0.03, 0.06], [5, 2, 3]).expect("a block");
+        world
+            .create_body(&BodyDefinition {
+                solver,
+                ..of_elements(&mesh, [59_400.0, 0.3, 1060.0])
+            })
+            .expect("a body");
+        let tool = world.create_tool(&ToolDefinition {
+            pose: Pose {
+                position: Vec3::Y * 0.3,
+                ..Pose::IDENTITY
+            },
+            ..ToolDefinition::new(Shape::Sphere { radius: 0.012 })
+        });
+        let tool = tool.expect("a tool");
+        world.step(1.0 / 60.0).expect("a step");
+        world.set_pose(tool, Vec3::Y * 0.6, None).expect("a pose");
+        world.step(1.0 / 60.0).expect("a step");
+        let taken: Vec<u32> = (0..4)
+            .map(|_| world.step(1.0 / 60.0).expect("a step").substeps)
+            .collect();
+        assert_eq!(taken[2..], [1, 1], "{solver:?}: {taken:?}");
     }
 }
