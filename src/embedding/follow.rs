@@ -46,17 +46,22 @@ impl Follower {
         })
     }
 
-    /// Binds each vertex to the copy of its cell that has the material where it is, and keeps the triangles whose corners hang together; whether
-    /// the binding is one to such cells. Nothing is changed where it is not, the
-    /// body has fewer nodes than vertices are bound to, or memory is short.
-    pub fn follow(&self, material: &CutMaterial, binding: &mut Binding, triangles: &mut Vec<[u32; 3]>) -> Result<bool> {
+    /// Binds each vertex to the copy of its cell that has the material where it is, and keeps the triangles whose corners hang together, by the piece of
+    /// the body that each of its nodes is of; whether the binding is one to such cells. Nothing is changed where it is not, the body has fewer
+    /// nodes than vertices are bound to, or memory is short.
+    pub fn follow(
+        &self,
+        (material, pieces): (&CutMaterial, &[u32]),
+        binding: &mut Binding,
+        triangles: &mut Vec<[u32; 3]>,
+    ) -> Result<bool> {
         match (self, material, binding) {
             (Self::Surface(homes), CutMaterial::Surface(surface), Binding::Triangles(bound)) => {
                 let weights = |vertex: usize| {
                     let [b, c] = bound[vertex].weights.map(f64::from);
                     [1.0 - b - c, b, c]
                 };
-                let nodes = homes.follow(surface, |vertex| bound[vertex].nodes, weights, triangles)?;
+                let nodes = homes.follow((surface, pieces), |vertex| bound[vertex].nodes, weights, triangles)?;
                 for (vertex, nodes) in bound.iter_mut().zip(nodes) {
                     vertex.nodes = nodes;
                 }
@@ -66,7 +71,7 @@ impl Follower {
                     let [b, c, d] = bound[vertex].weights.map(f64::from);
                     [1.0 - b - c - d, b, c, d]
                 };
-                let nodes = homes.follow(solid, |vertex| bound[vertex].nodes, weights, triangles)?;
+                let nodes = homes.follow((solid, pieces), |vertex| bound[vertex].nodes, weights, triangles)?;
                 for (vertex, nodes) in bound.iter_mut().zip(nodes) {
                     vertex.nodes = nodes;
                 }
@@ -113,7 +118,7 @@ impl<const N: usize> Homes<N> {
     /// whose corners hang together then.
     fn follow(
         &self,
-        body: &impl Divided<N>,
+        (body, pieces_of_nodes): (&impl Divided<N>, &[u32]),
         now: impl Fn(usize) -> [u32; N],
         weights: impl Fn(usize) -> [f64; N],
         triangles: &mut Vec<[u32; 3]>,
@@ -144,18 +149,20 @@ impl<const N: usize> Homes<N> {
             };
             chosen.push(of_home.min_by(fits).map_or(some, |piece| piece.nodes));
         }
-        *triangles = self.whole(&chosen)?;
+        *triangles = self.whole(&chosen, pieces_of_nodes)?;
         Ok(chosen)
     }
 
     /// The triangles whose corners hang together where their vertices go with cells of these nodes.
-    fn whole(&self, nodes: &[[u32; N]]) -> Result<Vec<[u32; 3]>> {
-        // Two vertices still have in common what their cells had: copies on different sides of a cut have less.
+    fn whole(&self, nodes: &[[u32; N]], pieces: &[u32]) -> Result<Vec<[u32; 3]>> {
+        // Two vertices still have in common what their cells had: copies on different sides of a cut have less. Where that was nothing they are
+        // still of one piece.
         let common = |a: [u32; N], b: [u32; N]| a.iter().filter(|node| b.contains(node)).count();
         let hang = |u: u32, v: u32| {
             let [u, v] = [u, v].map(|vertex| vertex as usize);
             let [first, last] = [u, v].map(|vertex| self.cells[self.of_vertices[vertex] as usize]);
-            common(nodes[u], nodes[v]) >= common(first, last)
+            let [piece, other] = [u, v].map(|vertex| pieces[nodes[vertex][0] as usize]);
+            piece == other && common(nodes[u], nodes[v]) >= common(first, last)
         };
         let mut whole = memory::reserved(self.triangles.len())?;
         let hangs = |&&[a, b, c]: &&[u32; 3]| hang(a, b) && hang(b, c) && hang(c, a);

@@ -119,7 +119,8 @@ impl Embedding {
         if body.topology_version() != self.topology {
             let is_followed = match (&self.follower, body.material()) {
                 (Some(follower), Some(material)) => {
-                    follower.follow(material, &mut self.binding, &mut self.triangles)?
+                    let pieces = body.pieces()?.of_nodes;
+                    follower.follow((material, &pieces), &mut self.binding, &mut self.triangles)?
                 }
                 _ => false,
             };

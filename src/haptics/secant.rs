@@ -14,6 +14,9 @@ const STIFFEST: f64 = 3.0;
 /// What is felt in so many seconds is taken together, so that short steps do not teach what nodes do between them, s.
 const WINDOW: f64 = 0.01;
 
+/// The time in which the stiffness of what a tool holds loses half of what it was at most, s.
+const FORGOTTEN: f64 = 1.0;
+
 /// Where a tool was, and what it felt there, in the mean of some steps.
 #[derive(Clone, Copy, Debug)]
 struct WrenchSample {
@@ -29,6 +32,8 @@ pub(crate) struct Secant {
     /// What has been felt since then, the mean of so many seconds.
     next: Option<(WrenchSample, f64)>,
     stiffness: Matrix6,
+    /// The largest along a way of late, N/m.
+    largest: f64,
 }
 
 impl Secant {
@@ -37,6 +42,7 @@ impl Secant {
             last: None,
             next: None,
             stiffness: six::NOTHING,
+            largest: 0.0,
         }
     }
 
@@ -46,14 +52,15 @@ impl Secant {
     }
 
     /// Learns from what a tool felt here in a step of `dt` seconds, with turns at the lever, m, beside a coupling of this stiffness, N/m; where it
-    /// touches nothing what was learnt is forgotten.
+    /// touches nothing what was learnt is forgotten. What it holds swings on: it seems soft as it comes back, and a tool that gave way to that
+    /// would feed it. So it is no softer than it was of late.
     pub fn learn(
         &mut self,
         (position, orientation): (DVec3, DQuat),
         wrench: &Vector6,
         dt: f64,
         lever: f64,
-        coupling: f64,
+        (coupling, holds): (f64, bool),
     ) {
         let sample = WrenchSample {
             position,
@@ -101,7 +108,11 @@ impl Secant {
                 self.stiffness[i][j] += change / square;
             }
         }
-        self.stiffness = six::clamped(&self.stiffness, [0.0, STIFFEST * coupling]);
+        let stiffest = STIFFEST * coupling;
+        let along = (six::dot(&resisted, &way) / square).abs();
+        self.largest = along.max(self.largest / (1.0 + lasts / FORGOTTEN)).min(stiffest);
+        let softest = if holds { self.largest } else { 0.0 };
+        self.stiffness = six::clamped(&self.stiffness, [softest, stiffest]);
         self.last = Some(mean);
     }
 }
@@ -143,7 +154,7 @@ mod tests {
                 motion[axis] = 0.25e-3 * f64::from(round % 2 + 1);
                 let wrench = six::difference(&base, &six::product(&truth, &motion));
                 let turned = rotation::turned(DQuat::IDENTITY, six::about(&motion) / lever);
-                secant.learn((six::along(&motion), turned), &wrench, 0.016, lever, 1000.0);
+                secant.learn((six::along(&motion), turned), &wrench, 0.016, lever, (1000.0, false));
             }
         }
         for (learnt, row) in secant.stiffness().iter().zip(&truth) {

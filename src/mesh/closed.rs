@@ -374,7 +374,7 @@ fn pierces(nodes: &[u32; 3], corners: [Vec3; 3], others: &[u32; 3], triangle: [V
 }
 
 /// The first of those joined to `index`, with the way to it made shorter.
-fn root(parts: &mut [u32], mut index: u32) -> u32 {
+pub(super) fn root(parts: &mut [u32], mut index: u32) -> u32 {
     while parts[index as usize] != index {
         parts[index as usize] = parts[parts[index as usize] as usize];
         index = parts[index as usize];

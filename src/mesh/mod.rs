@@ -6,6 +6,7 @@
 mod closed;
 mod file;
 mod filled;
+mod hinges;
 mod organ;
 mod shapes;
 mod stuffing;

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::base::memory;
 
 /// The corners of a tetrahedron's faces; outward if its volume is positive.
-const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+pub(super) const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
 
 /// The corners of a cell's faces in turn, outward, from one with an even number of bits on; numbered by bits, x 1, y 2, z 4.
 const CELL_FACES: [[usize; 4]; 6] = [

@@ -1,6 +1,6 @@
 //! What a change between steps makes invalid. Callers name the change, and the table here says what it concerns.
 
-use super::{Stability, System};
+use super::{EnergyAccount, Stability, System};
 
 /// A change of a body between steps.
 #[derive(Clone, Copy, Debug)]
@@ -89,6 +89,10 @@ impl System {
     pub fn changed(&mut self, changed: Changed) {
         for &known in changed.concerns() {
             self.forget(known);
+        }
+        if matches!(changed, Changed::Positions) {
+            // Another motion begins, which may need no shorter substeps.
+            self.carry.energy = EnergyAccount::UNKNOWN;
         }
     }
 

@@ -134,6 +134,7 @@ impl EnergyAccount {
         self.gravity = gravity;
         self.reference = energy.is_finite().then_some(energy);
         self.comparisons = LEARNED - 1;
+        (self.kinetic, self.recent) = (0.0, 0.0);
         self.start_over();
     }
 

@@ -52,7 +52,7 @@ impl<'a> Account<'a> {
 
     /// Has a new account begin with the energy with which the body is set in motion. What leapfrog adds to that
     /// in fast modes is there from the first substep on.
-    pub fn open(&mut self, body: &mut System, carry: &mut Carry, part: &Part, team: &Team) {
+    pub fn open(&self, body: &mut System, carry: &mut Carry, part: &Part, team: &Team) {
         let are_closed = matches!(part.before, VelocityTime::Current | VelocityTime::Closed);
         // What is taken off a body that a tool holds would be missing in what that feels.
         if !(self.watches && are_closed && carry.energy.is_new()) || body.is_grasped() {
@@ -61,7 +61,6 @@ impl<'a> Account<'a> {
         let gravity = self.request.gravity;
         if let Some(energy) = TileSums::at_start(body, part, carry, gravity, team) {
             carry.energy.open(gravity, energy);
-            self.compares |= self.substeps > 2;
         }
     }
 

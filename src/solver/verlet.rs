@@ -130,7 +130,7 @@ impl<'a> Step<'a> {
         let may_stay_open = may_stay_open(body) && !body.pins.are_led();
         let mut part = self.opening(body, &mut carry);
         let request = &request.weighed(body);
-        let mut account = Account::new(body, &carry, request, substeps);
+        let account = Account::new(body, &carry, request, substeps);
         account.open(body, &mut carry, &part, team);
         if let Some(damping) = &mut body.damping {
             damping.prepare(substep);

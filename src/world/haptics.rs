@@ -18,6 +18,9 @@ const UNFELT: f64 = 1e-3;
 /// What was touched is touched again, in so far.
 const SURE_TO_MEET: f64 = 0.95;
 
+/// Of what the model did not foretell of what a tool holds so much is taken over at a time: tissue that swings with it answers late.
+const MOST_HELD: f64 = 0.5;
+
 /// The lever of a plane, m.
 const LEVER_OF_PLANE: f64 = 0.1;
 
@@ -53,12 +56,12 @@ pub(super) struct HapticLink {
 impl HapticLink {
     /// Takes over what a tool felt in the middle of its way, N, of nodes whose mass, by the square of the step, is so many N/m. What that is more than the
     /// coupling is felt as a jolt when the tool changes its speed, and a proxy without mass would rebound from it: of what the model did not foretell
-    /// only so much is taken over at a time that it does not.
-    fn take_over(&mut self, middle: (DVec3, DQuat), wrench: &Vector6, inertia: f64) -> Vector6 {
+    /// only so much is taken over at a time that it does not, and `most` of all.
+    fn take_over(&mut self, middle: (DVec3, DQuat), wrench: &Vector6, (inertia, most): (f64, f64)) -> Vector6 {
         let turned = rotation::turn_between(self.middle.1, middle.1) * self.coupling.lever;
         let way = joined(middle.0 - self.middle.0, turned);
         let foretold = difference(&self.felt, &product(self.secant.stiffness(), &way));
-        let part = (1.5 / (1.0 + 4.0 * inertia / self.coupling.stiffness[0])).min(1.0);
+        let part = (1.5 / (1.0 + 4.0 * inertia / self.coupling.stiffness[0])).min(most);
         let new = difference(wrench, &foretold);
         self.felt = sum(&foretold, &scaled(&new, part));
         self.middle = middle;
@@ -176,8 +179,11 @@ impl World {
         let middle = (0.5 * (start + end), rotation::turned(exact(before), 0.5 * turn));
         // What bounces is met again.
         link.mass = self.mass_under(place).max(SURE_TO_MEET * link.mass);
-        let felt = link.take_over(middle, &wrench, link.mass / (dt * dt));
-        link.secant.learn(middle, &wrench, dt, lever, coupling.stiffness[0]);
+        let holds = self.is_holding(place);
+        let most = if holds { MOST_HELD } else { 1.0 };
+        let felt = link.take_over(middle, &wrench, (link.mass / (dt * dt), most));
+        link.secant
+            .learn(middle, &wrench, dt, lever, (coupling.stiffness[0], holds));
         link.version += 1;
         let (version, work) = (link.version, link.work);
         let (sent_at, sent_work) = link.poses.read(|sent| (sent.time, sent.work));
@@ -194,7 +200,7 @@ impl World {
             self.gather_contacts(place, model);
             model.work = work;
             (model.sent_at, model.sent_work) = (sent_at, sent_work);
-            model.cone = cone_of(model, end, lever).filter(|_| !self.is_holding(place));
+            model.cone = cone_of(model, end, lever).filter(|_| !holds);
         });
     }
 

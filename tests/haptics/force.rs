@@ -4,7 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use super::bench::*;
 use glam::{DVec3, Vec3, dvec3};
-use sinew::Solver;
+use sinew::mesh::Mesh;
+use sinew::{
+    BodyDefinition, HapticDefinition, Material, Model, Pose, Shape, Solver, ToolDefinition, World, WorldDefinition,
+};
 
 const TOP: f64 = RADIUS as f64;
 const START: f64 = (RADIUS + CLEAR) as f64;
@@ -143,5 +146,67 @@ fn tissue_does_not_pull_at_a_tool_that_leaves() {
         let lifted = bench.follow(0.3, |t| dvec3(0.0, TOP - 0.008 + way(t), 0.0));
         let least = lifted.iter().map(|record| record.tick.force.y).fold(0.0, f32::min);
         assert!(least > -0.01 * most, "{speed} m/s: {least} N of {most} N");
+    }
+}
+
+/// A device that stands still, on a tool that holds tissue about as stiff as its coupling: the tissue comes to rest.
+#[test]
+fn what_a_tool_holds_comes_to_rest_with_the_device() {
+    for (young_modulus, stiffness) in [(5_400.0, 200.0), (20_000.0, 1000.0), (20_000.0, 500.0)] {
+        let mut world = World::new(WorldDefinition {
+            gravity: Vec3::ZERO,
+            ..WorldDefinition::default()
+        })
+        .unwrap();
+        let mesh = Mesh::block([0.06, 0.03, 0.06], [8, 4, 8]).unwrap();
+        let definition = BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            material: Some(Material {
+                model: Model::Springs,
+                young_modulus,
+                density: 1060.0,
+                ..Material::default()
+            }),
+            damping_rate: 5.0,
+            ..BodyDefinition::default()
+        };
+        let body = world.create_body(&definition).unwrap();
+        let mut pose = Pose {
+            position: Vec3::Y * 0.0205,
+            ..Pose::IDENTITY
+        };
+        let tool = world.create_tool(&ToolDefinition {
+            pose,
+            ..ToolDefinition::new(Shape::Sphere { radius: 0.005 })
+        });
+        let tool = tool.unwrap();
+        for (node, place) in (0..).zip(&mesh.positions) {
+            if place.y < -0.0149 {
+                world.body_mut(body).unwrap().pin(node).unwrap();
+            } else if place.y > 0.0149 && place.x.abs() < 0.008 && place.z.abs() < 0.008 {
+                world.attach_node(body, node, tool, 0.0).unwrap();
+            }
+        }
+        let mut haptic = HapticDefinition::new(tool);
+        haptic.stiffness = stiffness;
+        let mut handle = world.create_haptic(&haptic).unwrap();
+        let mut range = [f32::INFINITY, f32::NEG_INFINITY];
+        for step in 0..240 {
+            // Lifted by 5 mm in a second, then held for three.
+            for _ in 0..16 {
+                pose.position.y = (pose.position.y + 5e-6).min(0.0255);
+                let tick = handle.tick(pose, None, None, 1.0 / 960.0).unwrap();
+                if step > 180 {
+                    range = [range[0].min(tick.force.y), range[1].max(tick.force.y)];
+                }
+            }
+            world.step(1.0 / 60.0).unwrap();
+        }
+        let [least, most] = range;
+        let case = format!("{young_modulus} Pa, {stiffness} N/m: {range:?} N");
+        assert!(most < -0.1 && most - least < -1e-3 * most, "{case}");
+        let kinetic = world.body(body).unwrap().energy(Vec3::ZERO).kinetic;
+        assert!(kinetic < 1e-7, "{case}, {kinetic:e} J");
     }
 }

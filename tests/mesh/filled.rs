@@ -2,6 +2,9 @@
 
 use glam::{DVec3, Vec3, vec3};
 use sinew::mesh::{Mesh, boundary, is_closed};
+use sinew::{BodyDefinition, Values, World, WorldDefinition};
+
+use crate::support::solid::ball;
 
 /// The surface of a mesh of tetrahedra, its nodes alone.
 fn surface_of(mesh: &Mesh) -> Mesh {
@@ -137,4 +140,38 @@ fn corners_may_be_repeated_as_in_stl_files() {
     let volumes = [one.volume().expect("a volume"), other.volume().expect("a volume")];
     assert!((volumes[0] / volumes[1] - 1.0).abs() < 1e-6, "{volumes:?}");
     assert_eq!(one.tetrahedra.len(), other.tetrahedra.len());
+}
+
+/// Where two balls that cross are as thin as the spacing, and in an organ: nothing hangs on by an edge or a corner alone, so each can be cut.
+#[test]
+fn what_is_filled_can_be_cut_at_each_spacing() {
+    let organ = Mesh::organ(0.12, 0.006).expect("an organ");
+    let mut balls = ball(0.03, 3);
+    for offset in [vec3(0.0585, 0.0, 0.0), vec3(0.03, 0.0497, 0.003)] {
+        let first = balls.positions.len() as u32;
+        let other = ball(0.03, 3);
+        balls
+            .positions
+            .extend(other.positions.iter().map(|place| *place + offset));
+        let triangles = other.triangles.iter().map(|triangle| triangle.map(|node| node + first));
+        balls.triangles.extend(triangles);
+    }
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    for surface in [surface_of(&organ), balls] {
+        for step in 0..24 {
+            let spacing = 0.007 + 3e-4 * step as f32;
+            let filled = Mesh::filled(&surface, spacing).expect("tetrahedra");
+            check(&filled);
+            let body = world.create_body(&BodyDefinition {
+                positions: &filled.positions,
+                tetrahedra: &filled.tetrahedra,
+                masses: Values::Uniform(1e-3),
+                stiffnesses: Values::Uniform(20.0),
+                spare_nodes: 10,
+                ..BodyDefinition::default()
+            });
+            let body = body.unwrap_or_else(|error| panic!("{spacing} m: {error}"));
+            world.destroy_body(body).expect("a body");
+        }
+    }
 }

@@ -85,19 +85,19 @@ impl Watched {
             solver: setup.solver,
             ..*definition
         };
-        let create = |thread_count| {
-            let world = WorldDefinition {
-                gravity,
-                thread_count,
-                ..FREE
-            };
-            match Scene::with_dust(&definition, world) {
-                Err(Error::Unsupported(why)) if setup.solver != Solver::Verlet => Err(Stop::Unsupported(why)),
-                Err(error) => fault(format!("creation: {error}")),
-                Ok(scene) => Ok(scene),
-            }
+        let world = WorldDefinition { gravity, ..FREE };
+        let first = match Scene::with_dust(&definition, world) {
+            Err(Error::Unsupported(why)) if setup.solver != Solver::Verlet => return Err(Stop::Unsupported(why)),
+            Err(error) => return fault(format!("creation: {error}")),
+            Ok(scene) => scene,
         };
-        let scenes = vec![create(1)?, create(2)?];
+        // The same ids are good for both worlds.
+        let bytes = first.world.save().expect("a snapshot");
+        let second = Scene {
+            world: World::load(&bytes, 2, None).expect("a world"),
+            ..first
+        };
+        let scenes = vec![first, second];
         let fine = WorldDefinition {
             gravity,
             substeps: 1,

@@ -444,6 +444,45 @@ fn to_be_cut(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
     (drawn, body, embedding)
 }
 
+/// A surface of triangles that are longer than the body's: one that reaches from piece to piece goes, though its corners never had a node in common.
+#[test]
+fn no_large_triangle_reaches_across_a_cut() {
+    let mut world = World::new(WorldDefinition {
+        gravity: Vec3::ZERO,
+        ..WorldDefinition::default()
+    })
+    .unwrap();
+    let mut kept = Vec::new();
+    for cells in [1, 3, 8] {
+        let drawn = Mesh::block([0.1; 3], [cells; 3]).unwrap();
+        let definition = BodyDefinition {
+            positions: &drawn.positions,
+            triangles: &drawn.triangles,
+            masses: Values::Uniform(1e-3),
+            stiffnesses: Values::Uniform(20.0),
+            spare_nodes: 4000,
+            ..BodyDefinition::default()
+        };
+        let (body, mut embedding) = world.create_body_from_surface(&definition, 0.02).unwrap();
+        let at = |y: f32, z: f32| vec3(0.0123, y, z);
+        let across = Sweep {
+            start: [at(0.1, -0.1), at(0.1, 0.1)],
+            end: [at(-0.1, -0.1), at(-0.1, 0.1)],
+        };
+        world.cut(body, &across).unwrap();
+        assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 2);
+        embedding.update(&world).unwrap();
+        let is_beyond = |&vertex: &u32| drawn.positions[vertex as usize].x > 0.0123;
+        for triangle in embedding.triangles() {
+            let beyond = triangle.iter().filter(|vertex| is_beyond(vertex)).count();
+            assert!(beyond == 0 || beyond == 3, "{cells} cells: {triangle:?}");
+        }
+        kept.push(embedding.triangles().len() as f32 / drawn.triangles.len() as f32);
+    }
+    // The ends stay, of a cube alone no more.
+    assert!(kept[0] >= 4.0 / 12.0 && kept[2] > 0.8, "{kept:?}");
+}
+
 /// An edge that goes down along x = 0, turned about z by this much, as far as `depth`.
 fn sweep(turn: f32, depth: f32) -> Sweep {
     let at = |y: f32, z: f32| Quat::from_rotation_z(turn) * vec3(0.0003, y, z);
