@@ -30,11 +30,13 @@ impl std::fmt::Display for SlotId {
 pub(crate) struct WorldTag(u32);
 
 impl WorldTag {
-    /// The bits of a generation that count what has lived in a slot.
-    pub const COUNT: u32 = (1 << 20) - 1;
+    /// So many bits of a generation count what has lived in a slot.
+    const BITS: u32 = 20;
+
+    pub const COUNT: u32 = (1 << Self::BITS) - 1;
 
     /// Tags are 1 to this one: no id of small numbers has one, nor one of which all bits are set.
-    const LAST: u32 = (!Self::COUNT >> 20) - 1;
+    const LAST: u32 = (!Self::COUNT >> Self::BITS) - 1;
 
     /// That of a new world, which the 4093 before it in this process do not have.
     pub fn next() -> Self {
@@ -45,13 +47,13 @@ impl WorldTag {
 
     /// That of a generation, if some world gives such.
     pub fn of(generation: u32) -> Option<Self> {
-        let tag = generation >> 20;
+        let tag = generation >> Self::BITS;
         (1..=Self::LAST).contains(&tag).then_some(Self(tag))
     }
 
     /// The generation of a slot that nothing had yet.
     pub fn generation(self) -> u32 {
-        self.0 << 20
+        self.0 << Self::BITS
     }
 }
 

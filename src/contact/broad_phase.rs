@@ -37,8 +37,8 @@ impl Contacts {
 
     /// Whether the list was made for something much faster than these tools are now: what is in it is not near them.
     pub(super) fn are_listed_too_far(&self, tools: &[ToolPath]) -> bool {
-        let way = met(tools, self.filter).map(|tool| tool.speed(1.0)).fold(0.0, f32::max);
-        self.candidates.excess > 2.0 * way
+        // Speed over one second is the way of the step.
+        self.candidates.excess > 2.0 * self.tool_speed(tools, 1.0)
     }
 
     /// How many slices a substep needs. Only tools whose way comes near the body count: what is far changes nothing.

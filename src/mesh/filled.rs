@@ -18,8 +18,7 @@ impl Mesh {
     /// Of the surface only its `positions` and `triangles` are used, outward by the right-hand rule; vertices nearer than 1e-6 of the
     /// diagonal of the box around it are one, as in [`tidy`]. It may have several parts and holes, and may cross itself: inside is what it
     /// winds about. What is thinner than about half of the spacing is lost, and with it may be what hangs on that; so is what would
-    /// hang on by an edge or a corner alone. Nodes lie on a lattice
-    /// along the axes but near the surface (isosurface stuffing, Labelle and Shewchuk 2007), so that no dihedral angle is very small: from
+    /// hang on by an edge or a corner alone. Nodes lie on a lattice along the axes but near the surface (isosurface stuffing, Labelle and Shewchuk 2007), so that no dihedral angle is very small: from
     /// some 10 degrees where the surface is smooth beside the spacing, less at its edges and corners.
     ///
     /// # Errors
