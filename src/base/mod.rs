@@ -1,5 +1,6 @@
-//! What every other module stands on: errors, ids, memory that may run out, a hash of state, exact signs, times of stages.
+//! What every other module stands on: errors, ids, memory that may run out, a hash of state, exact signs, disjoint sets, times of stages.
 
+mod disjoint_sets;
 mod error;
 mod hash;
 mod ids;
@@ -9,6 +10,7 @@ mod ranges;
 mod step_report;
 pub(crate) mod symbolic_perturbation;
 
+pub(crate) use disjoint_sets::DisjointSets;
 pub use error::{Error, Result};
 pub(crate) use hash::StateHasher;
 pub use ids::{AttachmentId, BladeId, BodyId, ToolId};

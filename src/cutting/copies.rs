@@ -3,14 +3,14 @@
 use super::changes::{PieceOfCell, PieceOfNode, PieceOfSpring};
 use super::divided::{Divided, NONE, Node};
 use super::pieces::Copier;
-use super::union::Union;
+use crate::base::DisjointSets;
 use crate::base::{Result, memory};
 
 impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
     /// Copies each of the nodes for each set of cells about it that hangs together by their material, but for that in which the material has
     /// a vertex at the node, of several that with the most material.
     pub(super) fn part_nodes(&mut self, nodes: &[u32]) -> Result<()> {
-        let mut union = Union::default();
+        let mut union = DisjointSets::default();
         let mut corners = Vec::new();
         for &node in nodes {
             self.list_corners(node, &mut corners)?;
@@ -36,7 +36,7 @@ impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
     }
 
     /// Unites a cell with those that its material goes on in, across sides that the node moves.
-    fn join_across(&self, node: u32, cell: u32, at: usize, corners: &[u32], union: &mut Union) {
+    fn join_across(&self, node: u32, cell: u32, at: usize, corners: &[u32], union: &mut DisjointSets) {
         for simplex in self.body.simplices_in(cell) {
             let it = self.body.simplex(simplex);
             let is_moved = |&corner: &usize| self.body.bonds(it.corners[corner]).0.contains(&node);
@@ -52,7 +52,7 @@ impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
         }
     }
 
-    fn part_node(&mut self, node: u32, corners: &[u32], union: &mut Union) -> Result<()> {
+    fn part_node(&mut self, node: u32, corners: &[u32], union: &mut DisjointSets) -> Result<()> {
         // Each set, by its lowest corner, with whether the material has a vertex there, and how much of it there is.
         let mut sets: Vec<(usize, bool, f64)> = Vec::new();
         for (at, &corner) in corners.iter().enumerate() {

@@ -94,7 +94,7 @@ impl Limits {
             return Ok(());
         }
         Err(Error::Capacity(format!(
-            "the cut needs more than the {limit} {what} there may be"
+            "the cut needs more than the {limit} {what} that spare_nodes of the definition leave room for"
         )))
     }
 }

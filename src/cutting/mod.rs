@@ -31,7 +31,6 @@ mod split;
 mod surface;
 mod tear;
 mod tracked;
-mod union;
 
 pub use changes::{BoundPoint, Changes, CutFace, PieceOfCell, PieceOfNode, PieceOfSpring, RimEdge, Source};
 pub use cut::{Limits, Sweep};

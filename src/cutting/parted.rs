@@ -6,7 +6,7 @@ use super::changes::{CutFace, RimEdge};
 use super::divided::{Divided, NONE};
 use super::solid::CutSolid;
 use super::surface::CutSurface;
-use super::union::Union;
+use crate::base::DisjointSets;
 use crate::base::{Result, memory};
 
 impl CutSurface {
@@ -123,7 +123,7 @@ struct Floods {
     reached: HashMap<u32, usize>,
     /// Those that a flood has reached, but not looked beyond; of floods that have met, the lowest has all.
     open: Vec<Vec<u32>>,
-    met: Union,
+    met: DisjointSets,
 }
 
 impl Floods {

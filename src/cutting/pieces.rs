@@ -3,7 +3,7 @@
 use super::changes::{Changes, PieceOfCell};
 use super::cut::Limits;
 use super::divided::{Cell, Divided, NONE};
-use super::union::Union;
+use crate::base::DisjointSets;
 use crate::base::{Result, memory};
 
 /// Copies cells and nodes whose material a cut has parted.
@@ -17,7 +17,7 @@ impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
     /// Copies each of the cells for each piece of its material but the largest, and then their nodes.
     pub(crate) fn part(&mut self, cells: &[u32]) -> Result<()> {
         let mut nodes = Vec::new();
-        let mut union = Union::default();
+        let mut union = DisjointSets::default();
         let mut inside = Vec::new();
         for &cell in cells {
             for node in self.body.cell(cell).nodes {
@@ -44,7 +44,7 @@ impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
         self.part_nodes(&nodes)
     }
 
-    fn part_cell(&mut self, cell: u32, inside: &[u32], union: &mut Union) -> Result<()> {
+    fn part_cell(&mut self, cell: u32, inside: &[u32], union: &mut DisjointSets) -> Result<()> {
         let whole = self.body.cell(cell);
         // The pieces, each by its lowest simplex, with the part of the cell that it has.
         let mut pieces = Vec::new();
@@ -108,7 +108,7 @@ impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
 
 /// How many pieces simplices with these neighbours are, found by going through all.
 pub(crate) fn piece_count<const N: usize>(neighbours: impl ExactSizeIterator<Item = [u32; N]>) -> Result<u32> {
-    let (mut union, count) = (Union::default(), neighbours.len());
+    let (mut union, count) = (DisjointSets::default(), neighbours.len());
     union.reset(count)?;
     for (at, neighbours) in neighbours.enumerate() {
         for neighbour in neighbours.into_iter().filter(|&neighbour| neighbour != NONE) {

@@ -370,7 +370,7 @@ impl BodyDefinition<'_> {
     fn check_masses(&self) -> Result<()> {
         match self.masses {
             Values::Uniform(mass) if !(mass >= SMALLEST_MASS && mass.is_finite()) => Err(Error::invalid(format!(
-                "node_mass is {mass}: must be above 0 and finite"
+                "node_mass is {mass}: must be above 0 and finite, or a material be given a density instead"
             ))),
             Values::Uniform(_) => Ok(()),
             Values::Each(masses) => {

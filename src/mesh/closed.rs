@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{check_indices, tetrahedron_volume};
-use crate::base::memory;
+use crate::base::{DisjointSets, memory};
 use crate::geometry::Bounds;
 use crate::geometry::predicates::{crosses, solid_angle};
 use crate::geometry::tree::Tree;
@@ -223,8 +223,7 @@ impl ClosedSurface {
             }
         }
         sides.sort_unstable();
-        let mut parts: Vec<u32> = memory::reserved(self.triangles.len())?;
-        parts.extend(0..self.triangles.len() as u32);
+        let mut parts = DisjointSets::new(self.triangles.len())?;
         for same in sides.chunk_by(|a, b| a.0 == b.0) {
             let ahead = same.iter().filter(|side| side.2).count();
             let back = same.len() - ahead;
@@ -241,14 +240,10 @@ impl ClosedSurface {
                 )));
             }
             for pair in same.windows(2) {
-                let [a, b] = [root(&mut parts, pair[0].1), root(&mut parts, pair[1].1)];
-                parts[a.max(b) as usize] = a.min(b);
+                parts.unite(pair[0].1 as usize, pair[1].1 as usize);
             }
         }
-        for index in 0..parts.len() as u32 {
-            parts[index as usize] = root(&mut parts, index);
-        }
-        Ok(parts)
+        Ok(parts.into_lowest())
     }
 
     /// What some triangles enclose, m³: seen from a point of theirs, so that a solid far away loses no digits.
@@ -371,13 +366,4 @@ fn pierces(nodes: &[u32; 3], corners: [Vec3; 3], others: &[u32; 3], triangle: [V
         ends.iter().all(|&end| !others.contains(&nodes[end]))
             && crosses(corners[ends[0]], corners[ends[1]], triangle, depth)
     })
-}
-
-/// The first of those joined to `index`, with the way to it made shorter.
-pub(super) fn root(parts: &mut [u32], mut index: u32) -> u32 {
-    while parts[index as usize] != index {
-        parts[index as usize] = parts[parts[index as usize] as usize];
-        index = parts[index as usize];
-    }
-    index
 }

@@ -96,11 +96,11 @@ pub(crate) fn cell_boundary(cells: &[[u32; 8]]) -> Result<Vec<[u32; 3]>> {
     Ok(surface)
 }
 
-/// The faces that exactly one element has, in the order of the elements.
-fn faces_of_one<const CORNERS: usize, const SIDES: usize, const FACES: usize>(
+/// Each face of each element, as its nodes in ascending order and its number, in ascending order: equal faces beside each other.
+pub(super) fn sorted_faces<const CORNERS: usize, const SIDES: usize, const FACES: usize>(
     elements: &[[u32; CORNERS]],
     sides: &[[usize; SIDES]; FACES],
-) -> Result<Vec<[u32; SIDES]>> {
+) -> Result<Vec<([u32; SIDES], usize)>> {
     let mut faces = memory::reserved(elements.len() * FACES)?;
     for (i, element) in elements.iter().enumerate() {
         for (k, corners) in sides.iter().enumerate() {
@@ -108,7 +108,15 @@ fn faces_of_one<const CORNERS: usize, const SIDES: usize, const FACES: usize>(
         }
     }
     faces.sort_unstable();
+    Ok(faces)
+}
 
+/// The faces that exactly one element has, in the order of the elements.
+fn faces_of_one<const CORNERS: usize, const SIDES: usize, const FACES: usize>(
+    elements: &[[u32; CORNERS]],
+    sides: &[[usize; SIDES]; FACES],
+) -> Result<Vec<[u32; SIDES]>> {
+    let faces = sorted_faces(elements, sides)?;
     let mut once = Vec::new();
     for same in faces.chunk_by(|a, b| a.0 == b.0) {
         if let [(_, face)] = same {

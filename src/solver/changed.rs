@@ -46,6 +46,8 @@ pub(super) enum Cached {
     Rates,
     /// The energy account, and how many substeps the last steps took.
     Energy,
+    /// How much shorter the energy account made substeps.
+    Refinement,
     /// The energy that equations took the last step to end with.
     EquationEnergy,
     /// What positions lack of where the nodes are.
@@ -66,7 +68,7 @@ impl Changed {
         use Cached::*;
         match self {
             Self::Positions => &[
-                Sleep, Forces, Stability, Energy, Remainders, History, Matrix, Candidates, Holds,
+                Sleep, Forces, Stability, Energy, Refinement, Remainders, History, Matrix, Candidates, Holds,
             ],
             // The energy account is told what the change puts in.
             Self::Velocity => &[DampingForces, EquationEnergy],
@@ -90,10 +92,6 @@ impl System {
         for &known in changed.concerns() {
             self.forget(known);
         }
-        if matches!(changed, Changed::Positions) {
-            // Another motion begins, which may need no shorter substeps.
-            self.carry.energy = EnergyAccount::UNKNOWN;
-        }
     }
 
     fn forget(&mut self, known: Cached) {
@@ -112,6 +110,8 @@ impl System {
             Cached::Stability => self.carry.stability = Stability::UNKNOWN,
             Cached::Rates => self.forces.forget_rates(),
             Cached::Energy => self.carry.forget(),
+            // Another motion begins, which may need no shorter substeps.
+            Cached::Refinement => self.carry.energy = EnergyAccount::UNKNOWN,
             Cached::Remainders => self.state.forget_remainders(),
             Cached::Candidates => self.contacts.iter_mut().for_each(|contacts| contacts.forget()),
             Cached::Holds => self.contacts.iter_mut().for_each(|contacts| contacts.holds.forget()),

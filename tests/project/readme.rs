@@ -138,10 +138,11 @@ fn what_else_the_documents_show_is_part_of_programs_that_run() {
         .map(read)
         .collect();
     let wrapped = read("c_examples/quickstart.cpp");
+    let managed = read("c_examples/engines/mono/Program.cs");
     let mut count = 0;
     for document in documents() {
         let text = read(&document);
-        for (language, programs) in [("c", &programs), ("cpp", &wrapped)] {
+        for (language, programs) in [("c", &programs), ("cpp", &wrapped), ("csharp", &managed)] {
             for snippet in code(&text, language) {
                 assert!(
                     programs.contains(snippet),

@@ -5,9 +5,9 @@
 
 use super::body::{CutSolid, Face};
 use super::cut::SolidCut;
+use crate::base::DisjointSets;
 use crate::base::{Result, memory};
 use crate::cutting::divided::NONE;
-use crate::cutting::union::Union;
 
 /// A tetrahedron and which of its faces.
 type FaceOf = (u32, usize);
@@ -29,7 +29,7 @@ struct Bare {
 /// What hangs together about a vertex once faces are open.
 struct VertexParts {
     star: Vec<(u32, usize)>,
-    union: Union,
+    union: DisjointSets,
 }
 
 impl VertexParts {
@@ -329,7 +329,7 @@ impl CutSolid {
     fn parts(&self, vertex: u32) -> Result<VertexParts> {
         let mut parts = VertexParts {
             star: Vec::new(),
-            union: Union::default(),
+            union: DisjointSets::default(),
         };
         self.star(vertex, &mut parts.star)?;
         parts.union.reset(parts.star.len())?;

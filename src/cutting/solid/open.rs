@@ -2,10 +2,10 @@
 
 use super::body::{Face, SolidTriangle};
 use super::cut::SolidCut;
+use crate::base::DisjointSets;
 use crate::base::{Result, memory};
 use crate::cutting::changes::{CutFace, NewVertex, RimEdge};
 use crate::cutting::divided::NONE;
-use crate::cutting::union::Union;
 
 impl SolidCut<'_> {
     /// Parts tetrahedra at faces marked as opening, each given by one of its sides. Returns the cells beside them.
@@ -68,7 +68,7 @@ impl SolidCut<'_> {
 
     /// Gives each part of what lay about a vertex, but that of the lowest tetrahedron, a vertex of its own.
     fn part_vertex(&mut self, vertex: u32, star: &[(u32, usize)]) -> Result<()> {
-        let mut union = Union::default();
+        let mut union = DisjointSets::default();
         union.reset(star.len())?;
         for (at, &(tetrahedron, corner)) in star.iter().enumerate() {
             for face in (0..4).filter(|&face| face != corner) {

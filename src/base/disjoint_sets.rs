@@ -1,15 +1,22 @@
 //! Which of a few things hang together (union-find).
 
-use crate::base::Result;
+use super::{Result, memory};
 
-/// Sets of the numbers from 0 on.
+/// Disjoint sets of the numbers from 0 on.
 #[derive(Default)]
-pub(crate) struct Union {
+pub(crate) struct DisjointSets {
     parents: Vec<u32>,
 }
 
-impl Union {
+impl DisjointSets {
     /// Each of `count` numbers is alone.
+    pub(crate) fn new(count: usize) -> Result<Self> {
+        let mut parents = memory::reserved(count)?;
+        parents.extend(0..count as u32);
+        Ok(Self { parents })
+    }
+
+    /// Makes each of `count` numbers alone again.
     pub(crate) fn reset(&mut self, count: usize) -> Result<()> {
         self.parents.clear();
         self.parents.try_reserve(count)?;
@@ -30,6 +37,14 @@ impl Union {
     pub(crate) fn unite(&mut self, a: usize, b: usize) {
         let (a, b) = (self.lowest(a), self.lowest(b));
         self.parents[a.max(b)] = a.min(b) as u32;
+    }
+
+    /// The lowest number of the set of each number.
+    pub(crate) fn into_lowest(mut self) -> Vec<u32> {
+        for at in 0..self.parents.len() {
+            self.parents[at] = self.lowest(at) as u32;
+        }
+        self.parents
     }
 
     /// Whether all are in one set.
