@@ -1,6 +1,7 @@
+# make docs   the guide and the references of C, C++ and Rust, in target/docs
 # make web    the samples as a page, in target/web
 
-web:
-	$(MAKE) -C web
+docs web:
+	$(MAKE) -C $@
 
-.PHONY: web
+.PHONY: docs web
