@@ -55,6 +55,15 @@ pub(crate) struct Separation {
 }
 
 impl Segment {
+    /// One without thickness that stays where it is.
+    pub fn still(ends: [Vec3; 2]) -> Self {
+        Self {
+            ends,
+            steps: [Vec3::ZERO; 2],
+            radius: 0.0,
+        }
+    }
+
     /// One of its ends alone.
     pub fn end(&self, index: usize) -> Self {
         Self {
@@ -128,9 +137,29 @@ impl Separation {
 }
 
 impl Corners {
+    /// Of what stays where it is.
+    pub fn still(points: impl Iterator<Item = Vec3>) -> Self {
+        let mut corners = Self {
+            points: [Vec3::ZERO; 3],
+            steps: [Vec3::ZERO; 3],
+            count: 0,
+        };
+        for point in points.take(3) {
+            corners.points[corners.count] = point;
+            corners.count += 1;
+        }
+        corners
+    }
+
     /// The box about them as the substep begins.
     pub fn bounds(&self) -> Bounds {
         Bounds::of(self.points[..self.count].iter().copied())
+    }
+
+    /// The box about their ways.
+    pub fn way(&self) -> Bounds {
+        let ways = self.points.iter().zip(&self.steps).take(self.count);
+        Bounds::of(ways.flat_map(|(&point, &step)| [point, point + step]))
     }
 
     /// Of a node.

@@ -183,9 +183,6 @@ impl Skin {
         let triangles = change.triangles.len();
         self.triangles.try_reserve(triangles)?;
         self.owned.try_reserve(triangles)?;
-        if let Some(nearby) = &mut self.nearby {
-            nearby.reserve(self.nodes.len() + corners, self.edges.len() + edges)?;
-        }
         if let Some(images) = &mut self.images {
             images.reserve(triangles)?;
         }
@@ -352,9 +349,6 @@ impl Skin {
         }
         if let Some(tree) = change.tree {
             self.forest.add(tree);
-        }
-        if let Some(nearby) = &mut self.nearby {
-            nearby.forget();
         }
         self.is_closed &= !change.is_open;
     }

@@ -104,8 +104,8 @@ fn mark(first: &Skin, second: &Skin, are_joined: impl Fn(&[u32], &[u32]) -> bool
     let mut count = 0;
     let shift = shift(first, second);
     let is_of_one = std::ptr::eq(first, second);
-    let edges = first.edges.iter().zip(pierces).enumerate();
-    for (number, (edge, pierces)) in edges.filter(|(_, (edge, _))| edge[0] != NONE) {
+    let edges = first.edges.iter().zip(pierces);
+    for (edge, pierces) in edges.filter(|(edge, _)| edge[0] != NONE) {
         let ends = edge.map(|node| first.starts.get(node as usize) + shift);
         let mut passes = false;
         let around = Bounds::of(ends.into_iter());
@@ -123,11 +123,7 @@ fn mark(first: &Skin, second: &Skin, are_joined: impl Fn(&[u32], &[u32]) -> bool
             };
             passes = crosses(ends[0], ends[1], corners, depth);
         };
-        if is_of_one {
-            second.near_edge(number, &around, 0.0, see);
-        } else {
-            second.near(&around, 0.0, see);
-        }
+        second.near(&around, 0.0, see);
         if passes {
             *pierces = true;
             count += 1;

@@ -230,6 +230,12 @@ impl Islands {
         &self.members[self.islands[island].members.clone()]
     }
 
+    /// What is searched for contacts in an island: each member with itself, then the near pairs.
+    pub fn searches(&self, island: usize) -> impl Iterator<Item = [usize; 2]> + '_ {
+        let members = self.members(island).iter();
+        members.map(|&place| [place as usize; 2]).chain(self.pairs(island))
+    }
+
     /// The near pairs of an island, the lower place first, in order.
     pub fn pairs(&self, island: usize) -> impl Iterator<Item = [usize; 2]> + '_ {
         let members = if self.is_full { self.members(island) } else { &[] };

@@ -17,7 +17,6 @@ mod islands;
 mod link;
 mod lockstep;
 mod narrow_phase;
-mod nearby;
 mod pairs;
 mod plan;
 mod search;
@@ -114,9 +113,14 @@ impl Tissue {
         self.pushes.reserve(room)?;
         self.touches.reserve(room)?;
         self.touching.reserve(room)?;
-        let features = |skin: &Skin| skin.nodes.capacity() + skin.edges.capacity();
-        let known = self.skins.iter().flatten().map(features).sum::<usize>();
-        self.pairs.reserve(known + features(&skin), self.islands.room())?;
+        let mut features = [0; 2];
+        for skin in self.skins.iter().flatten().chain([&skin]) {
+            let own = skin.nodes.capacity() + skin.edges.capacity();
+            features[0] += if skin.meets_bodies { own } else { 0 };
+            features[1] += if skin.firsts.is_some() { own } else { 0 };
+        }
+        let lists = self.islands.room() + self.skins.len() + 1;
+        self.pairs.reserve(lists, features)?;
         let spare = body.spare_nodes();
         let clearances = if body.contact.with_bodies {
             Some(Clearances::new(skin.nodes.len() + spare, skin.edges.len() + 3 * spare)?)
@@ -234,7 +238,7 @@ impl Tissue {
                 skin.follow(body, moment.duration, moment.begins);
             }
         }
-        self.pairs.advance(self.islands.pairs(island), &self.skins);
+        self.pairs.advance(self.islands.searches(island), &self.skins);
         self.bonds.follow(bodies, &self.skins, moment);
         self.draw(island, bodies, moment);
         watch.stop(moment.profile, Stage::BroadPhase);

@@ -48,9 +48,7 @@ impl Tissue {
 
     /// Whether what may meet where impulses have led nodes was found before they acted.
     pub(super) fn has_foreseen(&self, island: usize, bodies: &impl Systems, moment: &Span) -> bool {
-        let of_one = self.islands.members(island).iter().map(|&place| [place as usize; 2]);
-        let mut all = of_one.chain(self.islands.pairs(island));
-        all.all(|pair| {
+        self.islands.searches(island).all(|pair| {
             let search = Self::search((&self.skins, &self.entangled), pair, bodies, moment);
             search.is_none_or(|search| search.has_foreseen())
         })
@@ -106,7 +104,7 @@ impl Tissue {
             islands,
             ..
         } = self;
-        let mut all = islands.pairs(island).enumerate();
+        let mut all = islands.searches(island).enumerate();
         let holds = all.all(|(number, pair)| {
             let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
             search.is_none_or(|search| pairs.holds(number, &search))
@@ -119,16 +117,9 @@ impl Tissue {
                 skin.fit();
             }
         }
-        if pairs.can_be_found() {
-            pairs.begin();
-            let added = islands.pairs(island).try_for_each(|pair| {
-                let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
-                pairs.add(search.as_ref())
-            });
-            if added.is_none() {
-                pairs.fail();
-            }
-        }
+        let (skins, entangled) = (&*skins, &*entangled);
+        let all = islands.searches(island);
+        pairs.find(all.map(|pair| Self::search_by_distance((skins, entangled), pair, bodies, moment)));
     }
 
     /// Adds the contacts that are not known yet, of those that meet; again in the same substep: where impulses have led further than was looked.
@@ -151,9 +142,7 @@ impl Tissue {
         known.clear();
         known.extend(0..links.len() as u32);
         known.sort_unstable_by_key(|&link| key(&links[link as usize]));
-        let of_one = islands.members(island).iter().map(|&place| (None, [place as usize; 2]));
-        let of_two = islands.pairs(island).enumerate();
-        for (number, [a, b]) in of_one.chain(of_two.map(|(number, pair)| (Some(number), pair))) {
+        for (number, [a, b]) in islands.searches(island).enumerate() {
             let Some(mut search) = Self::search((skins, entangled), [a, b], bodies, moment) else {
                 continue;
             };
@@ -165,7 +154,7 @@ impl Tissue {
                 continue;
             };
             let friction = body_a.contact.friction.max(body_b.contact.friction);
-            let number = number.filter(|_| !search.in_images);
+            let number = Some(number).filter(|_| !search.in_images);
             // A place is lent to neither where it is its own partner.
             let mut none = [None, None];
             let [kept_a, kept_b] = match clearances.get_disjoint_mut([a, b]) {

@@ -105,14 +105,14 @@ impl PairSearch<'_> {
                 let (from, edge) = (From::Known(run.of(features), [moved, reach]), run.number as usize);
                 run.apart = moved + self.edge_with_edges(edge, from, of_first.as_deref_mut(), &mut see);
             }
-            return;
-        }
-        self.nodes_with_faces([first, second], of_first.as_deref_mut(), &mut see);
-        if !self.is_of_one() {
-            self.nodes_with_faces([second, first], of_second, &mut see);
-        }
-        for edge in 0..first.skin.edges.len() {
-            self.edge_with_edges(edge, From::Search, of_first.as_deref_mut(), &mut see);
+        } else {
+            self.nodes_with_faces([first, second], of_first.as_deref_mut(), &mut see);
+            if !self.is_of_one() {
+                self.nodes_with_faces([second, first], of_second, &mut see);
+            }
+            for edge in 0..first.skin.edges.len() {
+                self.edge_with_edges(edge, From::Search, of_first.as_deref_mut(), &mut see);
+            }
         }
         if self.is_of_one() {
             self.across_wounds(&mut see);
@@ -131,11 +131,11 @@ impl PairSearch<'_> {
         self.parties[0].place == self.parties[1].place
     }
 
-    /// Shows the triangles that a corner, by its place among those of its surface, comes within `reach` of on its way through a box; those that are
+    /// Shows the triangles that a corner comes within `reach` of on its way through a box; those that are
     /// seen there where they are to be found in images. Answers how far any of them is, m, at least, as `see` tells of each.
     fn near_corner(
         &self,
-        (corner, from): (usize, From),
+        from: From,
         skin: &Skin,
         bounds: &Bounds,
         reach: f32,
@@ -147,7 +147,6 @@ impl PairSearch<'_> {
         let mut least = f32::INFINITY;
         let see = |triangle| least = least.min(see(triangle));
         match &skin.images {
-            _ if self.is_of_one() => skin.near_itself(corner, bounds, reach + skin.spread, see),
             Some(images) if self.in_images => images.near(skin, bounds, reach, see),
             _ => skin.near(bounds, reach, see),
         }
@@ -215,15 +214,16 @@ impl PairSearch<'_> {
             From::Search => self.reach(),
             From::Known(_, [_, reach]) => reach,
         };
-        let near = Bounds::of([place].into_iter()).extended(far);
-        let least = self.near_corner((corner, from), of_faces.skin, &around, reach, |triangle| {
+        let (within, around_it) = self.worth_comparing([place; 2], [step; 2], far);
+        let least = self.near_corner(from, of_faces.skin, &around, reach, |triangle| {
             let nodes = of_faces.skin.triangles[triangle];
             if self.is_of_one() && (nodes.contains(&node) || of_faces.skin.are_of_wound([node; 2], &nodes)) {
                 return f32::INFINITY;
             }
             let corners = self.corners(of_faces, &nodes);
-            if !near.overlaps(&corners.bounds()) {
-                return far;
+            let apart = self.apart_at_least(&around_it, &corners);
+            if apart > within {
+                return apart;
             }
             let start = corners.separation(&segment, 0.0);
             let distance = start.offset.length();
@@ -311,7 +311,8 @@ impl PairSearch<'_> {
             radius: self.radius_of(kept.as_deref(), SurfaceFeature::Edge(index)),
         };
         let far = self.reach_of_edges();
-        let near = Bounds::of(segment.ends.into_iter()).extended(far);
+        let way = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
+        let (within, around_it) = self.worth_comparing(segment.ends, segment.steps, far);
         let mut least = f32::INFINITY;
         let mut nearest = f32::INFINITY;
         let mut touched: [Option<FeatureMet<[u32; 2]>>; EDGES] = [None; EDGES];
@@ -331,8 +332,9 @@ impl PairSearch<'_> {
                     continue;
                 }
                 let corners = self.corners(second, &other);
-                if !near.overlaps(&corners.bounds()) {
-                    least = least.min(far);
+                let apart = self.apart_at_least(&around_it, &corners);
+                if apart > within {
+                    least = least.min(apart);
                     continue;
                 }
                 let from_start = corners.separation(&segment, 0.0);
@@ -373,14 +375,10 @@ impl PairSearch<'_> {
                 }
             }
             _ => {
-                let around = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
                 let skin = second.skin;
-                let see = |triangle| least = least.min(see_edges(skin.owned(triangle)));
-                if self.is_of_one() {
-                    skin.near_edge(index, &around, reach + skin.spread, see);
-                } else {
-                    skin.near(&around, reach, see);
-                }
+                skin.near(&way, reach, |triangle| {
+                    least = least.min(see_edges(skin.owned(triangle)));
+                });
             }
         }
         self.measure(kept, SurfaceFeature::Edge(index), nearest);
@@ -396,6 +394,27 @@ impl PairSearch<'_> {
             self.show(sides, -found.offset, (clearance, shift), see);
         }
         least
+    }
+
+    /// How near the box about a part of a surface others are to be compared with it, m, and that box. Of other bodies how far they are is remembered for
+    /// the next substeps, so that it is worth knowing; of the same surface most moves too much for that, and only what its way leads near is compared.
+    fn worth_comparing(&self, ends: [Vec3; 2], steps: [Vec3; 2], far: f32) -> (f32, Bounds) {
+        let starts = Bounds::of(ends.into_iter());
+        if self.is_of_one() {
+            let way = starts.with(ends[0] + steps[0]).with(ends[1] + steps[1]);
+            (self.radius + self.ahead, way)
+        } else {
+            (far, starts)
+        }
+    }
+
+    /// How far a feature is from such a box, m, at least.
+    fn apart_at_least(&self, around: &Bounds, corners: &Corners) -> f32 {
+        around.distance(&if self.is_of_one() {
+            corners.way()
+        } else {
+            corners.bounds()
+        })
     }
 
     /// Whether it counts how near others are to an edge that it does not meet.

@@ -6,7 +6,6 @@ use super::change::Changing;
 use super::flatness::{Flatness, Ridge};
 use super::images::Images;
 use super::narrow_phase::LEAST_THICKNESS;
-use super::nearby::Nearby;
 use super::wound::Wound;
 use crate::base::{Result, memory};
 use crate::codec::saved;
@@ -73,8 +72,6 @@ pub(crate) struct Skin {
     pub(super) images: Option<Images>,
     /// What it takes to change, where its body may be cut.
     pub(super) changing: Option<Box<Changing>>,
-    /// What of it is near itself, where it meets itself.
-    pub(super) nearby: Option<Box<Nearby>>,
     /// Whether the trees are where the triangles are.
     is_fitted: bool,
 }
@@ -82,7 +79,7 @@ pub(crate) struct Skin {
 saved! { Skin {
     nodes, edges, triangles, owned, forest, room, is_closed, pierces, flatness, crossings, origin, starts, velocities,
     expected, changes, drift, spread, moved, given, strayed, short, extent, firsts, travel, meets_bodies,
-    asks_for_images, resolution, images, changing, nearby, is_fitted,
+    asks_for_images, resolution, images, changing, is_fitted,
 } }
 
 /// Features that were no further apart at first than this part of the least thickness were one, and are parted.
@@ -207,7 +204,6 @@ impl Skin {
             strayed: 0.0,
             triangles,
             changing,
-            nearby: None,
             is_fitted: true,
         };
         skin.nodes.try_reserve_exact(spare)?;
@@ -217,10 +213,6 @@ impl Skin {
         skin.edges.try_reserve_exact(3 * spare)?;
         skin.pierces.try_reserve_exact(3 * spare)?;
         skin.room += 6 * spare;
-        if contact.with_itself {
-            let nearby = Nearby::new(skin.nodes.len() + spare, skin.edges.len() + 3 * spare)?;
-            skin.nearby = Some(memory::boxed(nearby)?);
-        }
         Ok(skin)
     }
 
@@ -323,21 +315,9 @@ impl Skin {
     /// How far a node or an edge, and an edge or a face of the same body, were from each other at first, m; `None` where it does not meet itself.
     fn first_distance(&self, nodes: [u32; 2], others: &[u32]) -> Option<f32> {
         self.firsts.as_ref().map(|firsts| {
-            let at = |node: &u32| firsts.get(*node as usize);
-            let segment = Segment {
-                ends: nodes.map(|node| at(&node)),
-                steps: [Vec3::ZERO; 2],
-                radius: 0.0,
-            };
-            let mut corners = Corners {
-                points: [Vec3::ZERO; 3],
-                steps: [Vec3::ZERO; 3],
-                count: others.len(),
-            };
-            for (point, other) in corners.points.iter_mut().zip(others) {
-                *point = at(other);
-            }
-            corners.separation(&segment, 0.0).offset.length()
+            let at = |node: u32| firsts.get(node as usize);
+            let corners = Corners::still(others.iter().map(|&other| at(other)));
+            corners.separation(&Segment::still(nodes.map(at)), 0.0).offset.length()
         })
     }
 
@@ -363,7 +343,6 @@ impl Skin {
         if begins {
             self.flatness.measure(&self.starts, &self.triangles, &self.edges);
         }
-        self.know_nearby(&body.contact);
     }
 
     /// Takes nodes to go as impulses have them go by now, and points that are bound to them with those.
@@ -386,7 +365,6 @@ impl Skin {
         }
         self.strayed += duration * strayed.sqrt();
         self.spread = self.spread.max(duration * all.magnitudes().length());
-        self.know_nearby(&body.contact);
     }
 
     /// Remembers what contacts have changed in a substep, before the body knows of it.
@@ -402,29 +380,6 @@ impl Skin {
         }
     }
 
-    /// Has what is near itself known, or the trees where it is, so far as it is looked for.
-    fn know_nearby(&mut self, contact: &BodyContact) {
-        let Some(mut nearby) = self.nearby.take() else {
-            return;
-        };
-        let is_open = self.wound().is_some_and(Wound::is_open);
-        let border = if is_open { self.wound_border() } else { 0.0 };
-        let radius = self.radius_with_itself(contact).unwrap_or(0.0);
-        let apart = radius.max(border) + self.ahead() + 2.0 * self.spread;
-        if !nearby.holds(self, apart) {
-            self.fit();
-            nearby.find(self, apart, radius);
-        }
-        self.nearby = Some(nearby);
-    }
-
-    /// What is near itself is another: it keeps another distance.
-    pub fn forget_nearby(&mut self) {
-        if let Some(nearby) = &mut self.nearby {
-            nearby.forget();
-        }
-    }
-
     /// Takes the trees to where the triangles are, if they are not there.
     pub fn fit(&mut self) {
         if !self.is_fitted {
@@ -433,20 +388,6 @@ impl Skin {
                 .refit(|triangle| triangles[triangle as usize].map(|node| starts.get(node as usize)));
             self.is_fitted = true;
         }
-    }
-
-    /// Shows the triangles that may come within `reach` of a corner of the surface or an edge, by its number after those of corners, which goes through
-    /// this box.
-    pub fn near_itself(&self, number: usize, bounds: &Bounds, reach: f32, mut see: impl FnMut(usize)) {
-        match self.nearby.as_ref().and_then(|nearby| nearby.of(number)) {
-            Some(triangles) => triangles.iter().for_each(|&triangle| see(triangle as usize)),
-            None => self.near(bounds, reach, see),
-        }
-    }
-
-    /// The same of an edge.
-    pub fn near_edge(&self, edge: usize, bounds: &Bounds, reach: f32, see: impl FnMut(usize)) {
-        self.near_itself(self.nodes.len() + edge, bounds, reach, see);
     }
 
     /// Takes the body as it stands when a step that was tried begins, or as it ends.
@@ -459,10 +400,7 @@ impl Skin {
         self.take(body.origin, body.bindings.as_ref(), 0.0, |node| {
             (positions.get(node), Vec3::ZERO)
         });
-        if self.meets_bodies {
-            self.fit();
-        }
-        self.know_nearby(&body.contact);
+        self.fit();
     }
 
     fn take(

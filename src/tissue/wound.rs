@@ -209,7 +209,7 @@ impl PairSearch<'_> {
         };
         let border = skin.wound_border();
         let outward = |[a, b]: [u32; 2]| wound.normals.get(a as usize) + wound.normals.get(b as usize);
-        for (number, &edge) in skin.edges.iter().enumerate() {
+        for &edge in &skin.edges {
             if edge[0] == NONE || !wound.has(edge.into_iter()) {
                 continue;
             }
@@ -224,7 +224,7 @@ impl PairSearch<'_> {
             let within = around.extended(border);
             let away = outward(edge);
             let mut deepest: Option<(f32, [u32; 2], Separation, Vec3)> = None;
-            skin.near_edge(number, &around, border + skin.spread, |triangle| {
+            skin.near(&around, border + skin.spread, |triangle| {
                 for other in skin.owned(triangle).into_iter().filter(|&other| other != NONE) {
                     let other = skin.edges[other as usize];
                     let is_other = other > edge && !other.iter().any(|node| edge.contains(node));

@@ -62,7 +62,6 @@ impl World {
             self.set_meets(body, before.with_bodies, before.with_itself)?;
             return Err(error);
         }
-        let place = self.bodies.place(body.0)?;
         let it = self.bodies.get_mut(body.0)?;
         if (contact.thickness, contact.friction) != (before.thickness, before.friction) {
             it.set_contact(BodyContact {
@@ -70,9 +69,6 @@ impl World {
                 friction: contact.friction,
                 ..it.system().contact
             });
-            if let Some(skin) = self.tissue.as_mut().and_then(|tissue| tissue.skin_mut(place)) {
-                skin.forget_nearby();
-            }
         }
         Ok(())
     }
