@@ -122,6 +122,9 @@ public static unsafe class Sinew
         public uint work_done;
         public float residual;
         public double lag;
+        public sinew_body_id substeps_body;
+        public sinew_body_id restored_body;
+        public sinew_body_id crossing_body;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]

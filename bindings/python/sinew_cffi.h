@@ -97,6 +97,9 @@ typedef struct sinew_step_report {
   uint32_t work_done;
   float residual;
   double lag;
+  sinew_body_id substeps_body;
+  sinew_body_id restored_body;
+  sinew_body_id crossing_body;
 } sinew_step_report;
 sinew_status sinew_world_step(sinew_world *world, float dt, sinew_step_report *report);
 sinew_status sinew_world_set_gravity(sinew_world *world, const float *gravity);

@@ -26,8 +26,7 @@ typedef struct sinew_solver_report {
   size_t struct_size;      ///< Set to sizeof(sinew_solver_report) before the call.
   uint32_t iterations;     ///< IMPLICIT, NEWTON: matrix-vector products of the step.
   /// [m] Remaining error of the solved equations, without that of time steps; 0 for VERLET.
-  /// IMPLICIT: mass-weighted root mean square. NEWTON: largest displacement of the last correction;
-  /// about 1/100 of it remains.
+  /// IMPLICIT: mass-weighted root mean square. NEWTON: last correction; about 1/100 of it remains.
   float error;
   double added_mass;       ///< [kg] VERLET: total mass that mass_scaling adds.
   uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved.

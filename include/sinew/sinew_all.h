@@ -224,8 +224,8 @@ void sinew_world_destroy(sinew_world *world);
 
 /// Report of a step; written on SINEW_STATUS_OK and on SINEW_STATUS_UNSTABLE.
 typedef struct sinew_step_report {
-  size_t struct_size;        ///< Set to sizeof(sinew_step_report) before the call.
-  uint32_t substeps;         ///< Largest number of substeps that a body took.
+  size_t struct_size;           ///< Set to sizeof(sinew_step_report) before the call.
+  uint32_t substeps;            ///< Largest number of substeps that a body took.
   /// [s] Longest stable explicit substep over all bodies; infinity with IMPLICIT and NEWTON.
   float stable_substep;
   /// Number of bodies that became non-finite and were rolled back; the others were stepped.
@@ -235,14 +235,17 @@ typedef struct sinew_step_report {
   /// Number of interpenetrating surface edges that contact could not separate. Edges inside their
   /// own body count if that collides with itself. Later steps push others out of a closed body.
   uint32_t crossings;
-  uint32_t limit;            ///< Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
-  sinew_body_id limit_body;  ///< UNSTABLE: body with the shortest substep.
-  uint32_t limit_nodes[4];   ///< Nodes of what limits it; the last is repeated.
-  uint32_t limit_substeps;   ///< UNSTABLE: substeps that the step needs.
-  uint32_t work;             ///< Budget: units of work allowed.
-  uint32_t work_done;        ///< Budget: units of work done.
-  float residual;            ///< [m] Budget: largest remaining error of an equation.
-  double lag;                ///< [s] Budget: time not simulated yet.
+  uint32_t limit;               ///< Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
+  sinew_body_id limit_body;     ///< UNSTABLE: body with the shortest substep.
+  uint32_t limit_nodes[4];      ///< Nodes of what limits it; the last is repeated.
+  uint32_t limit_substeps;      ///< UNSTABLE: substeps that the step needs.
+  uint32_t work;                ///< Budget: units of work allowed.
+  uint32_t work_done;           ///< Budget: units of work done.
+  float residual;               ///< [m] Budget: largest remaining error of an equation.
+  double lag;                   ///< [s] Budget: time not simulated yet.
+  sinew_body_id substeps_body;  ///< Body that took the most substeps.
+  sinew_body_id restored_body;  ///< First body that was rolled back.
+  sinew_body_id crossing_body;  ///< Body with the most of the crossings.
 } sinew_step_report;
 
 /// Advances everything in the world by one time step.
@@ -701,10 +704,9 @@ typedef struct sinew_tool_def {
   float position[3];            ///< [m] Initial position; default 0 0 0.
   float orientation[4];         ///< Initial orientation; default 0 0 0 1.
   uint32_t reserved;            ///< Reserved; must be 0.
-  /// [m] Mesh, box: pixel size of images or cell size of a distance field; 0 (default): automatic.
-  /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if
-  /// less. Refused above 2^24 pixels or samples, or with no ray or sample inside. Memory: 24 bytes
-  /// per pixel of 3 images, 4 bytes per sample.
+  /// [m] Mesh, box: size of a pixel (images) or cell (distance field); 0 (default): automatic.
+  /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, at most 1/4 of the shortest.
+  /// Refused above 2^24 of them, or with none inside. Memory: 24 bytes a pixel, 4 a sample.
   float resolution;
   /// [N] Largest force that moves the tool; infinity (default) or 0: unlimited. Beyond it the tool
   /// stops short of its pose; see sinew_tool_get_pose.
@@ -1401,9 +1403,8 @@ sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool
     float density, sinew_mass_properties *out);
 
 /// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
-/// `mass` is nullable: kinematic again, as it is created. It starts at rest; a new mass leaves its
-/// velocity. Pinned nodes are obstacles; other tools are not. Bodies near it do not sleep.
-/// force_limit has no effect.
+/// `mass` is nullable: kinematic again. It starts at rest; a new mass leaves its velocity. Pinned
+/// nodes are obstacles; other tools are not. Bodies near it do not sleep. force_limit is ignored.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if an attachment or haptic handle uses it.
 sinew_status sinew_tool_set_mass(sinew_world *world, sinew_tool_id tool,
     const sinew_mass_properties *mass);
@@ -1801,8 +1802,7 @@ typedef struct sinew_solver_report {
   size_t struct_size;      ///< Set to sizeof(sinew_solver_report) before the call.
   uint32_t iterations;     ///< IMPLICIT, NEWTON: matrix-vector products of the step.
   /// [m] Remaining error of the solved equations, without that of time steps; 0 for VERLET.
-  /// IMPLICIT: mass-weighted root mean square. NEWTON: largest displacement of the last correction;
-  /// about 1/100 of it remains.
+  /// IMPLICIT: mass-weighted root mean square. NEWTON: last correction; about 1/100 of it remains.
   float error;
   double added_mass;       ///< [kg] VERLET: total mass that mass_scaling adds.
   uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved.

@@ -40,10 +40,9 @@ typedef struct sinew_tool_def {
   float position[3];            ///< [m] Initial position; default 0 0 0.
   float orientation[4];         ///< Initial orientation; default 0 0 0 1.
   uint32_t reserved;            ///< Reserved; must be 0.
-  /// [m] Mesh, box: pixel size of images or cell size of a distance field; 0 (default): automatic.
-  /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if
-  /// less. Refused above 2^24 pixels or samples, or with no ray or sample inside. Memory: 24 bytes
-  /// per pixel of 3 images, 4 bytes per sample.
+  /// [m] Mesh, box: size of a pixel (images) or cell (distance field); 0 (default): automatic.
+  /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, at most 1/4 of the shortest.
+  /// Refused above 2^24 of them, or with none inside. Memory: 24 bytes a pixel, 4 a sample.
   float resolution;
   /// [N] Largest force that moves the tool; infinity (default) or 0: unlimited. Beyond it the tool
   /// stops short of its pose; see sinew_tool_get_pose.

@@ -67,8 +67,8 @@ void sinew_world_destroy(sinew_world *world);
 
 /// Report of a step; written on SINEW_STATUS_OK and on SINEW_STATUS_UNSTABLE.
 typedef struct sinew_step_report {
-  size_t struct_size;        ///< Set to sizeof(sinew_step_report) before the call.
-  uint32_t substeps;         ///< Largest number of substeps that a body took.
+  size_t struct_size;           ///< Set to sizeof(sinew_step_report) before the call.
+  uint32_t substeps;            ///< Largest number of substeps that a body took.
   /// [s] Longest stable explicit substep over all bodies; infinity with IMPLICIT and NEWTON.
   float stable_substep;
   /// Number of bodies that became non-finite and were rolled back; the others were stepped.
@@ -78,14 +78,17 @@ typedef struct sinew_step_report {
   /// Number of interpenetrating surface edges that contact could not separate. Edges inside their
   /// own body count if that collides with itself. Later steps push others out of a closed body.
   uint32_t crossings;
-  uint32_t limit;            ///< Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
-  sinew_body_id limit_body;  ///< UNSTABLE: body with the shortest substep.
-  uint32_t limit_nodes[4];   ///< Nodes of what limits it; the last is repeated.
-  uint32_t limit_substeps;   ///< UNSTABLE: substeps that the step needs.
-  uint32_t work;             ///< Budget: units of work allowed.
-  uint32_t work_done;        ///< Budget: units of work done.
-  float residual;            ///< [m] Budget: largest remaining error of an equation.
-  double lag;                ///< [s] Budget: time not simulated yet.
+  uint32_t limit;               ///< Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
+  sinew_body_id limit_body;     ///< UNSTABLE: body with the shortest substep.
+  uint32_t limit_nodes[4];      ///< Nodes of what limits it; the last is repeated.
+  uint32_t limit_substeps;      ///< UNSTABLE: substeps that the step needs.
+  uint32_t work;                ///< Budget: units of work allowed.
+  uint32_t work_done;           ///< Budget: units of work done.
+  float residual;               ///< [m] Budget: largest remaining error of an equation.
+  double lag;                   ///< [s] Budget: time not simulated yet.
+  sinew_body_id substeps_body;  ///< Body that took the most substeps.
+  sinew_body_id restored_body;  ///< First body that was rolled back.
+  sinew_body_id crossing_body;  ///< Body with the most of the crossings.
 } sinew_step_report;
 
 /// Advances everything in the world by one time step.

@@ -77,6 +77,12 @@ pub struct StepReport {
     pub crossings: u32,
     /// What a step that is refused as unstable failed by.
     pub limit: Option<StepLimit>,
+    /// The body that took the most substeps.
+    pub substeps_body: Option<BodyId>,
+    /// A body that was put back.
+    pub restored_body: Option<BodyId>,
+    /// The body with the most edges that pass through tissue.
+    pub crossing_body: Option<BodyId>,
 }
 
 /// The body that needs more substeps than are allowed.

@@ -69,8 +69,8 @@ pub unsafe extern "C" fn sinew_tool_get_mass_of_density(
 
 /// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
 ///
-/// `mass` is nullable: kinematic again, as it is created. It starts at rest; a new mass leaves its velocity. Pinned
-/// nodes are obstacles; other tools are not. Bodies near it do not sleep. force_limit has no effect.
+/// `mass` is nullable: kinematic again. It starts at rest; a new mass leaves its velocity. Pinned
+/// nodes are obstacles; other tools are not. Bodies near it do not sleep. force_limit is ignored.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if an attachment or haptic handle uses it.
 #[unsafe(no_mangle)]

@@ -49,8 +49,7 @@ pub struct sinew_solver_report {
     pub iterations: u32,
     /// [m] Remaining error of the solved equations, without that of time steps; 0 for VERLET.
     ///
-    /// IMPLICIT: mass-weighted root mean square. NEWTON: largest displacement of the last correction; about 1/100 of it
-    /// remains.
+    /// IMPLICIT: mass-weighted root mean square. NEWTON: last correction; about 1/100 of it remains.
     pub error: f32,
     /// [kg] VERLET: total mass that mass_scaling adds.
     pub added_mass: f64,

@@ -79,11 +79,10 @@ pub struct sinew_tool_def {
     pub orientation: [f32; 4],
     /// Reserved; must be 0.
     pub reserved: u32,
-    /// [m] Mesh, box: pixel size of images or cell size of a distance field; 0 (default): automatic.
+    /// [m] Mesh, box: size of a pixel (images) or cell (distance field); 0 (default): automatic.
     ///
-    /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if less. Refused above
-    /// 2^24 pixels or samples, or with no ray or sample inside. Memory: 24 bytes per pixel of 3 images, 4 bytes per
-    /// sample.
+    /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, at most 1/4 of the shortest. Refused
+    /// above 2^24 of them, or with none inside. Memory: 24 bytes a pixel, 4 a sample.
     pub resolution: f32,
     /// [N] Largest force that moves the tool; infinity (default) or 0: unlimited.
     ///

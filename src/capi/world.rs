@@ -111,6 +111,12 @@ pub struct sinew_step_report {
     pub residual: f32,
     /// [s] Budget: time not simulated yet.
     pub lag: f64,
+    /// Body that took the most substeps.
+    pub substeps_body: sinew_body_id,
+    /// First body that was rolled back.
+    pub restored_body: sinew_body_id,
+    /// Body with the most of the crossings.
+    pub crossing_body: sinew_body_id,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers and pointers alone; what is no function is the caller's breach.
@@ -123,6 +129,7 @@ unsafe impl Versioned for sinew_step_report {
     const SIZES: &'static [usize] = &[
         offset_of!(Self, crossings),
         offset_of!(Self, limit_body),
+        offset_of!(Self, substeps_body),
         size_of::<Self>(),
     ];
 }
@@ -198,6 +205,9 @@ impl From<StepReport> for sinew_step_report {
             work_done: 0,
             residual: 0.0,
             lag: 0.0,
+            substeps_body: report.substeps_body.unwrap_or_default().into(),
+            restored_body: report.restored_body.unwrap_or_default().into(),
+            crossing_body: report.crossing_body.unwrap_or_default().into(),
         }
     }
 }

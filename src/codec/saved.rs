@@ -401,7 +401,8 @@ saved! { SubstepLimit { kind, nodes, node_count } }
 
 saved! { StepLimit { body, of, needed, is_chosen } }
 
-saved! { StepReport { substeps, stable_substep, bodies_restored, error_estimate, crossings, limit } }
+saved! { StepReport { substeps, stable_substep, bodies_restored, error_estimate, crossings, limit, substeps_body,
+restored_body, crossing_body } }
 
 saved! { BodyId { 0 } }
 

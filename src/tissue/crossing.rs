@@ -50,6 +50,17 @@ impl Tissue {
         count
     }
 
+    /// Which body has the most of those that were found last.
+    pub fn most_crossing(&self) -> Option<usize> {
+        let members = (0..self.islands.count()).flat_map(|island| self.islands.members(island));
+        members.map(|&place| place as usize).max_by_key(|&place| {
+            self.skins
+                .get(place)
+                .and_then(Option::as_ref)
+                .map(|skin| skin.crossings)
+        })
+    }
+
     /// Has two open surfaces that were made through each other let go, and those that no longer cross keep each other off again, from as near as
     /// they are.
     fn entangle(&mut self, pair: [usize; 2], cross: bool) {

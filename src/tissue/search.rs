@@ -14,11 +14,12 @@ use crate::geometry::Bounds;
 /// seen most squarely.
 const SAME: f32 = 1e-4;
 
-/// A corner meets so many faces at most. With the closest alone, a corner in a fold would be pushed out of one face into the next, and tremble.
-const FACES: usize = 3;
+/// A corner meets so many faces at most. With the closest alone, a corner in a fold would be pushed out of one face into the next, and tremble; with
+/// three, so would a tip in a hole of its shape, where eight triangles meet.
+const FACES: usize = 8;
 
 /// An edge meets so many edges at most. With the closest alone, an edge that lies across several would be held up by each in turn, and tremble.
-const EDGES: usize = 4;
+const EDGES: usize = 8;
 
 /// A face that a corner meets, or an edge that an edge meets: whether it only comes near, how far away it is, which it is, where they meet and how far
 /// they keep apart.

@@ -96,7 +96,10 @@ impl World {
             }
             left = left.saturating_sub(1);
         };
-        let report = report(&self.bodies, &self.outcomes, crossings);
+        let report = StepReport {
+            crossing_body: self.most_crossing(crossings),
+            ..report(&self.bodies, &self.outcomes, crossings)
+        };
         let watch = Stopwatch::start(self.profile.as_deref());
         self.commit(dt, team);
         watch.stop(self.profile.as_deref(), Stage::Publish);
@@ -174,6 +177,12 @@ impl World {
         let crossings = tissue.find_crossings(bodies, true);
         watch.stop(profile, Stage::NarrowPhase);
         Ok(crossings)
+    }
+
+    /// The body of which most edges pass through tissue, where any do.
+    fn most_crossing(&self, crossings: u32) -> Option<BodyId> {
+        let tissue = self.tissue.as_ref().filter(|_| crossings > 0)?;
+        self.bodies.id_at(tissue.most_crossing()?).map(BodyId)
     }
 
     /// Has what is pinned press the tools that the tried step leads into it.
@@ -391,11 +400,17 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) ->
         error_estimate: 0.0,
         crossings,
         limit: None,
+        substeps_body: None,
+        restored_body: None,
+        crossing_body: None,
     };
     for (place, body) in bodies.iter() {
+        let id = || bodies.id_at(place).map(BodyId);
         let stable_substep = match outcomes[place] {
             Some(Outcome::Done { substeps, carry, error }) => {
-                report.substeps = report.substeps.max(substeps);
+                if substeps > report.substeps {
+                    (report.substeps, report.substeps_body) = (substeps, id());
+                }
                 report.error_estimate = report.error_estimate.max(error);
                 carry
                     .limit()
@@ -408,6 +423,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) ->
             Some(Outcome::Asleep) => body.system().carry.limit(),
             Some(Outcome::NotFinite) | None => {
                 report.bodies_restored += 1;
+                report.restored_body = report.restored_body.or_else(id);
                 body.system().carry.limit()
             }
         };

@@ -90,6 +90,7 @@ static void the_solver_is_chosen(void)
     CHECK(choice.solver == SINEW_SOLVER_IMPLICIT && choice.auto_substeps > 150);
     MUST(sinew_world_step(world, 1.0f / 60, &report));
     CHECK(report.limit == SINEW_LIMIT_NONE && report.limit_body.index1 == 0);
+    CHECK(report.substeps_body.index1 == soft.index1 && report.restored_body.index1 == 0);
     /* A step that is too long names the body, what limits it and what helps. */
     MUST(sinew_world_set_substeps(world, 0, 1));
     REFUSED(UNSTABLE, "limited by the springs", sinew_world_step(world, 0.1f, &report));

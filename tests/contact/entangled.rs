@@ -54,9 +54,14 @@ fn a_ribbon_that_was_made_through_another_falls_freely() {
         (0.2, Solver::Implicit),
     ] {
         let mut world = world(Vec3::new(0.0, -GRAVITY, 0.0));
-        let [_, falling] = ribbons(&mut world, part * CELL, solver);
+        let [held, falling] = ribbons(&mut world, part * CELL, solver);
         let start = middle(&world, falling).y;
-        assert!(world.step(1e-3).expect("a step").crossings > 0, "they were to cross");
+        let report = world.step(1e-3).expect("a step");
+        assert!(report.crossings > 0, "they were to cross");
+        assert!(
+            [Some(held), Some(falling)].contains(&report.crossing_body),
+            "{report:?}"
+        );
         let mut crossings = 0;
         for _ in 0..499 {
             crossings = world.step(1e-3).expect("a step").crossings;

@@ -221,7 +221,7 @@ fn a_tool_that_is_restored_from_a_blown_up_body_goes_on() {
         .expect("a force");
     world.set_pose(ball, Vec3::Y * -0.015, None).expect("a pose");
     let report = world.step(0.001).expect("a step");
-    assert_eq!(report.bodies_restored, 1);
+    assert_eq!((report.bodies_restored, report.restored_body), (1, Some(hurt)));
     assert_eq!(body(&world, hurt).positions(), &[Vec3::Y * 0.5]);
     assert_eq!(world.pose(ball).expect("a tool").position, Vec3::Y * -0.015);
     assert!(felt(&world, ball) > 0.0);
