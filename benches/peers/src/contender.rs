@@ -44,7 +44,7 @@ pub fn all() -> Vec<Result<Contender, String>> {
     for threads in [1, 2] {
         contenders.push(Ok(contender("Rapier", threads, in_rust("rapier"))));
     }
-    contenders.push(match compile_bullet(here) {
+    contenders.push(match compile_bullet(&here.join("bullet_cloth.cpp"), "bullet_cloth") {
         Ok(program) => Ok(contender("Bullet", 1, vec![program])),
         Err(reason) => Err(format!("Bullet: {reason}")),
     });
@@ -56,7 +56,8 @@ pub fn target() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target")
 }
 
-fn compile_bullet(here: &Path) -> Result<PathBuf, String> {
+/// Compiles a program against Bullet, if it is installed.
+pub fn compile_bullet(source: &Path, name: &str) -> Result<PathBuf, String> {
     let flags = Command::new("pkg-config")
         .args(["--cflags", "--libs", "bullet"])
         .output()
@@ -67,10 +68,11 @@ fn compile_bullet(here: &Path) -> Result<PathBuf, String> {
     let flags = String::from_utf8_lossy(&flags.stdout);
     let folder = target().join("peers");
     std::fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let program = folder.join("bullet_cloth");
+    let folder = folder.canonicalize().map_err(|error| format!("{}: {error}", folder.display()))?;
+    let program = folder.join(name);
     let compiled = Command::new("g++")
         .args(["-std=c++17", "-O3", "-DNDEBUG"])
-        .arg(here.join("bullet_cloth.cpp"))
+        .arg(source)
         .arg("-o")
         .arg(&program)
         .args(flags.split_whitespace())
@@ -78,7 +80,7 @@ fn compile_bullet(here: &Path) -> Result<PathBuf, String> {
         .map_err(|_| "g++ is not installed (apt-get install g++)")?;
     match compiled.success() {
         true => Ok(program),
-        false => Err("bullet_cloth.cpp does not compile here".into()),
+        false => Err(format!("{} does not compile here", source.display())),
     }
 }
 

@@ -4,6 +4,8 @@
 //! cd benches/peers && cargo run --release                  # some 20 minutes
 //! cd benches/peers && cargo run --release -- --seconds 20  # each contender on each cloth, at most
 //! cd benches/peers && cargo run --release -- --quick       # below one minute
+//! cd benches/peers && cargo run --release -- scenes        # error against time in all scenes, some 20 minutes
+//! cd benches/peers && cargo run --release -- scenes --scene rope --engine bullet --limit 20
 //! ```
 //!
 //! What is not installed is skipped, loudly. A table is printed and written to `target/report/peers.md`, with what was
@@ -12,9 +14,12 @@
 mod child;
 mod cloth;
 mod contender;
+mod players;
+mod precision;
 mod protocol;
 mod rapier_cloth;
 mod report;
+mod scenes;
 mod sinew_cloth;
 
 use cloth::Cloth;
@@ -86,11 +91,38 @@ fn main() {
             }
         },
         Some("child") => serve(&arguments[1..]),
+        Some("player") => players::serve(&arguments[1..]),
+        Some("scenes") => match request(&arguments[1..]) {
+            Some(request) => precision::compare(&request),
+            None => {
+                eprintln!("scenes: --scene, --engine and --limit, each with a word or a number, or nothing");
+                std::process::exit(2);
+            }
+        },
         Some(other) => {
             eprintln!("{other} is not understood: --quick, --seconds and a number, or nothing");
             std::process::exit(2);
         }
     }
+}
+
+/// What `scenes` is asked for.
+fn request(arguments: &[String]) -> Option<precision::Request> {
+    let mut request = precision::Request {
+        limit: 8.0,
+        scene: String::new(),
+        engine: String::new(),
+    };
+    for pair in arguments.chunks(2) {
+        let value = pair.get(1)?;
+        match pair[0].as_str() {
+            "--scene" => request.scene.clone_from(value),
+            "--engine" => request.engine = value.to_lowercase(),
+            "--limit" => request.limit = value.parse().ok()?,
+            _ => return None,
+        }
+    }
+    Some(request)
 }
 
 /// Is one of the contenders.

@@ -1,0 +1,201 @@
+// Scenes in Bullet, answering as src/players/serve.rs says. Compiled by the measuring program where Bullet is installed.
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <BulletSoftBody/btDeformableBodySolver.h>
+#include <BulletSoftBody/btDeformableGravityForce.h>
+#include <BulletSoftBody/btDeformableMassSpringForce.h>
+#include <BulletSoftBody/btDeformableMultiBodyConstraintSolver.h>
+#include <BulletSoftBody/btDeformableMultiBodyDynamicsWorld.h>
+#include <BulletSoftBody/btDeformableNeoHookeanForce.h>
+#include <BulletSoftBody/btSoftBody.h>
+#include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
+#include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
+#include <btBulletDynamicsCommon.h>
+
+namespace {
+
+struct Model {
+    std::map<std::string, double> numbers;
+    std::vector<btVector3> positions;
+    std::vector<double> masses;
+    std::vector<int> pinned, tetrahedra, springs;
+
+    explicit Model(const char *path) {
+        std::ifstream file(path);
+        std::string name;
+        double value;
+        while (file >> name >> value) {
+            const int count = int(value);
+            auto read = [&](std::vector<int> &numbers, int width) {
+                numbers.resize(std::size_t(count) * width);
+                for (int &number : numbers) file >> number;
+            };
+            if (name == "nodes") {
+                for (int node = 0; node < count; ++node) {
+                    double x, y, z, mass;
+                    file >> x >> y >> z >> mass;
+                    positions.emplace_back(btScalar(x), btScalar(y), btScalar(z));
+                    masses.push_back(mass);
+                }
+            } else if (name == "pinned") {
+                read(pinned, 1);
+            } else if (name == "tetrahedra") {
+                read(tetrahedra, 4);
+            } else if (name == "springs") {
+                read(springs, 2);
+            } else {
+                numbers[name] = value;
+            }
+        }
+    }
+    double operator[](const char *name) const { return numbers.at(name); }
+};
+
+double processor_seconds() {
+    timespec time;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
+}
+
+// Each iteration takes a share of a link's stretch away. The share with which all of them together move a lone spring as an
+// implicit Euler step of the same stiffness would.
+btScalar share_per_iteration(double stiffness, double step, double mass, int iterations) {
+    const double ratio = stiffness * step * step / mass;
+    return btScalar(1.0 - std::pow(1.0 - ratio / (1.0 + ratio), 1.0 / iterations));
+}
+
+btSoftBody *build(const Model &model, btSoftBodyWorldInfo &info, const std::string &kind, int iterations, double step) {
+    std::vector<btScalar> masses(model.masses.begin(), model.masses.end());
+    std::vector<bool> is_pinned(masses.size(), false);
+    for (int node : model.pinned) {
+        masses[node] = 0;  // Bullet's way to pin.
+        is_pinned[node] = true;
+    }
+    auto *body = new btSoftBody(&info, int(masses.size()), model.positions.data(), masses.data());
+    btSoftBody::Material *free_links = body->m_materials[0], *pinned_links = body->appendMaterial();
+    const bool links = kind == "links";
+    if (links) {
+        free_links->m_kLST = share_per_iteration(model["stiffness"], step, model.masses[0] / 2, iterations);
+        pinned_links->m_kLST = share_per_iteration(model["stiffness"], step, model.masses[0], iterations);
+    }
+    for (std::size_t spring = 0; spring < model.springs.size(); spring += 2) {
+        const int a = model.springs[spring], b = model.springs[spring + 1];
+        body->appendLink(a, b, is_pinned[a] || is_pinned[b] ? pinned_links : free_links);
+    }
+    for (std::size_t corner = 0; corner < model.tetrahedra.size(); corner += 4) {
+        const int *corners = &model.tetrahedra[corner];
+        body->appendTetra(corners[0], corners[1], corners[2], corners[3]);
+    }
+    if (!model.tetrahedra.empty()) body->initializeDmInverse();
+    body->m_cfg.piterations = iterations;
+    body->m_cfg.kDP = links ? btScalar(1 - std::exp(-model["damping"] * step)) : 0;
+    body->m_cfg.drag = 0;
+    body->m_cfg.collisions = 0;
+    body->m_dampingCoefficient = 0;
+    body->m_sleepingThreshold = 0;
+    body->setActivationState(DISABLE_DEACTIVATION);
+    return body;
+}
+
+}  // namespace
+
+int main(int count, char **arguments) {
+    if (count < 3) return 2;
+    const Model model(arguments[1]);
+    std::map<std::string, std::string> settings;
+    for (int argument = 3; argument < count; ++argument) {
+        const std::string setting = arguments[argument];
+        const std::size_t sign = setting.find('=');
+        settings[setting.substr(0, sign)] = setting.substr(sign + 1);
+    }
+    const std::string kind = settings["kind"];
+    const int substeps = std::atoi(settings["substeps"].c_str());
+    const int iterations = settings.count("iterations") ? std::atoi(settings["iterations"].c_str()) : 1;
+    const double step = model["frame"] / substeps;
+    const btVector3 gravity(0, btScalar(-model["gravity"]), 0);
+
+    btSoftBodyRigidBodyCollisionConfiguration configuration;
+    btCollisionDispatcher dispatcher(&configuration);
+    btDbvtBroadphase broadphase;
+    std::unique_ptr<btDeformableBodySolver> deformable_solver;
+    std::unique_ptr<btSequentialImpulseConstraintSolver> solver;
+    std::unique_ptr<btDiscreteDynamicsWorld> world;
+    std::vector<std::unique_ptr<btDeformableLagrangianForce>> forces;
+    btSoftBody *body = nullptr;
+    if (kind == "links") {
+        solver = std::make_unique<btSequentialImpulseConstraintSolver>();
+        auto owned = std::make_unique<btSoftRigidDynamicsWorld>(&dispatcher, &broadphase, solver.get(), &configuration);
+        auto *soft = owned.get();
+        world = std::move(owned);
+        soft->setGravity(gravity);
+        soft->getWorldInfo().m_gravity = gravity;
+        soft->getWorldInfo().air_density = 0;
+        body = build(model, soft->getWorldInfo(), kind, iterations, step);
+        soft->addSoftBody(body);
+    } else {
+        deformable_solver = std::make_unique<btDeformableBodySolver>();
+        auto constraints = std::make_unique<btDeformableMultiBodyConstraintSolver>();
+        constraints->setDeformableSolver(deformable_solver.get());
+        auto owned = std::make_unique<btDeformableMultiBodyDynamicsWorld>(&dispatcher, &broadphase, constraints.get(),
+                                                                          &configuration, deformable_solver.get());
+        auto *soft = owned.get();
+        world = std::move(owned);
+        solver = std::move(constraints);
+        soft->setGravity(gravity);
+        soft->getWorldInfo().m_gravity = gravity;
+        soft->getWorldInfo().m_sparsesdf.setDefaultVoxelsz(0.25);
+        soft->getWorldInfo().m_sparsesdf.Reset();
+        body = build(model, soft->getWorldInfo(), kind, iterations, step);
+        soft->addSoftBody(body);
+        auto add = [&](btDeformableLagrangianForce *force) {
+            forces.emplace_back(force);
+            soft->addForce(body, force);
+        };
+        add(new btDeformableGravityForce(gravity));
+        if (model.tetrahedra.empty()) {
+            add(new btDeformableMassSpringForce(btScalar(model["stiffness"]), 0, false));
+        } else {
+            // The parameters of the law that have the same moduli at small strains (Smith, de Goes, Kim 2018).
+            const double mu = model["young"] / (2 * (1 + model["poisson"]));
+            const double lambda = 2 * mu * model["poisson"] / (1 - 2 * model["poisson"]);
+            add(new btDeformableNeoHookeanForce(btScalar(4.0 / 3.0 * mu), btScalar(lambda + 5.0 / 6.0 * mu), 0));
+        }
+        soft->setImplicit(kind == "implicit");
+        soft->setLineSearch(false);
+    }
+    std::printf("version %d.%02d\n", btGetVersion() / 100, btGetVersion() % 100);
+    std::fflush(stdout);
+
+    // The deformable bodies have no damping against the world: their velocities are scaled between steps.
+    const btScalar kept = kind == "links" ? btScalar(1) : btScalar(std::exp(-model["damping"] * step));
+    std::FILE *file = std::fopen(arguments[2], "wb");
+    double spent = 0;
+    for (int frame = 0; frame < int(model["frames"]); ++frame) {
+        const double start = processor_seconds();
+        for (int substep = 0; substep < substeps; ++substep) {
+            world->stepSimulation(btScalar(step), 0);
+            if (kept < 1)
+                for (int node = 0; node < body->m_nodes.size(); ++node) body->m_nodes[node].m_v *= kept;
+        }
+        spent += processor_seconds() - start;
+        for (int node = 0; node < body->m_nodes.size(); ++node) {
+            const btVector3 &place = body->m_nodes[node].m_x;
+            const double numbers[3] = {place.x(), place.y(), place.z()};
+            std::fwrite(numbers, sizeof numbers, 1, file);
+        }
+        std::fflush(file);
+        std::printf("frame %.9g\n", spent);
+        std::fflush(stdout);
+    }
+    std::fclose(file);
+    std::_Exit(0);
+}

@@ -1,0 +1,58 @@
+"""MuJoCo's flexible bodies: a body with three sliding joints for each node."""
+
+import mujoco
+
+import player
+from player import model, settings, substeps
+
+
+def xml():
+    bodies, names = [], []
+    pinned = set(model.pinned.tolist())
+    for node, (position, mass) in enumerate(zip(model.positions, model.masses)):
+        names.append(f"n{node}")
+        x, y, z = map(repr, position.tolist())
+        joints = "" if node in pinned else "".join(
+            f'<joint type="slide" axis="{axis}" damping="{model.damping * mass!r}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")
+        )
+        bodies.append(
+            f'<body name="n{node}" pos="{x} {y} {z}">{joints}'
+            f'<inertial pos="0 0 0" mass="{float(mass)!r}" diaginertia="1e-6 1e-6 1e-6"/></body>'
+        )
+    if len(model.tetrahedra):
+        dimension, elements = 3, model.tetrahedra
+        law = f'<elasticity young="{model.young!r}" poisson="{model.poisson!r}" damping="0"/>'
+    else:
+        dimension, elements = 1, model.springs
+        law = f'<edge stiffness="{model.stiffness!r}" damping="0"/>'
+    elements = " ".join(map(str, elements.flatten().tolist()))
+    return f"""<mujoco>
+      <compiler boundmass="0" boundinertia="0"/>
+      <option gravity="0 {-model.gravity!r} 0" timestep="{model.frame / substeps!r}" integrator="{settings['integrator']}"/>
+      <size memory="2G"/>
+      <worldbody>{''.join(bodies)}</worldbody>
+      <deformable>
+        <flex name="body" dim="{dimension}" body="{' '.join(names)}" element="{elements}" radius="0.001">
+          {law}<contact contype="0" conaffinity="0" internal="false" selfcollide="none"/>
+        </flex>
+      </deformable>
+    </mujoco>"""
+
+
+try:
+    world = mujoco.MjModel.from_xml_string(xml())
+except ValueError as error:
+    player.refuse(f"MuJoCo does not take it: {error}")
+data = mujoco.MjData(world)
+mujoco.mj_forward(world, data)
+
+
+def frame():
+    mujoco.mj_step(world, data, substeps)
+    for kind in range(len(data.warning)):
+        if data.warning[kind].number:
+            name = mujoco.mjtWarning(kind).name
+            player.refuse(f"{name}, {data.warning[kind].number} times, at {data.time:.3f} s")
+
+
+player.serve(mujoco.__version__, frame, lambda: data.flexvert_xpos if False else data.xpos[1:])

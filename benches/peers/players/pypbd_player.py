@@ -1,0 +1,51 @@
+"""pyPBD: extended position-based springs, and position-based finite elements."""
+
+from importlib.metadata import version
+
+import numpy as np
+import pypbd as pbd
+
+import player
+from player import model, settings, substeps
+
+iterations = int(settings["iterations"])
+step = model.frame / substeps
+kept = float(np.exp(-model.damping * step))
+
+simulation = pbd.Simulation.getCurrent()
+simulation.initDefault()
+world = simulation.getModel()
+count = len(model.positions)
+if len(model.tetrahedra):
+    world.addTetModel(model.positions.astype(np.float32), model.tetrahedra.flatten().astype(np.uint32), testMesh=False)
+    for corners in model.tetrahedra.tolist():
+        world.addFEMTetConstraint(*corners, model.young, model.poisson)
+else:
+    world.addLineModel(count, len(model.springs), model.positions.astype(np.float32), model.springs.flatten().astype(np.uint32), [], [])
+    for a, b in model.springs.tolist():
+        world.addDistanceConstraint_XPBD(a, b, model.stiffness)
+particles = world.getParticles()
+for node, mass in enumerate(model.masses.tolist()):
+    particles.setMass(node, mass)
+for node in model.pinned.tolist():
+    particles.setMass(node, 0.0)
+controller = simulation.getTimeStep()
+controller.setValueUInt(pbd.TimeStepController.NUM_SUB_STEPS, 1)
+controller.setValueUInt(pbd.TimeStepController.MAX_ITERATIONS, iterations)
+pbd.TimeManager.getCurrent().setTimeStepSize(step)
+simulation.setValueVec3Real(pbd.Simulation.GRAVITATION, [0.0, -model.gravity, 0.0])
+
+
+def frame():
+    for _ in range(substeps):
+        controller.step(world)
+        if kept < 1:
+            for node in range(count):
+                particles.setVelocity(node, np.array(particles.getVelocity(node)) * kept)
+
+
+def positions():
+    return np.array([particles.getPosition(node) for node in range(count)])
+
+
+player.serve(version("pypbd"), frame, positions)

@@ -1,0 +1,117 @@
+//! The laws of tetrahedra that engines use, in double precision. Each has the same Young's modulus and Poisson's ratio at
+//! small strains; they differ at large ones, so every law has a reference of its own.
+
+use glam::{DMat3, DVec3};
+
+/// How the tetrahedra of a model resist deformation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Law {
+    /// No tetrahedra: springs alone.
+    Springs,
+    /// `mu tr E² + lambda/2 (J - 1)²`, E being Green's strain: the default of sinew where Poisson's ratio is from 1/4 to 0.4.
+    SignedVolume,
+    /// The stable neo-Hookean law with a logarithm (Smith, de Goes, Kim 2018, equation 14).
+    NeoHookean,
+    /// The same without the logarithm: `mu/2 (I1 - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)²`.
+    PlainNeoHookean,
+    /// St Venant and Kirchhoff's: `mu tr E² + lambda/2 (tr E)²`.
+    StVenantKirchhoff,
+    /// Linear elasticity in the frame of each tetrahedron's rotation R: `mu |F - R|² + lambda/2 tr(R'F - 1)²`.
+    Corotated,
+    /// The same with `lambda/2 (J - 1)²` in place of the trace.
+    FixedCorotated,
+}
+
+impl Law {
+    /// Its name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Springs => "springs",
+            Self::SignedVolume => "signed-volume",
+            Self::NeoHookean => "neo-hookean",
+            Self::PlainNeoHookean => "plain-neo-hookean",
+            Self::StVenantKirchhoff => "st-venant-kirchhoff",
+            Self::Corotated => "corotated",
+            Self::FixedCorotated => "fixed-corotated",
+        }
+    }
+
+    /// The first Piola-Kirchhoff stress of a deformation gradient.
+    pub fn stress(self, f: DMat3, mu: f64, lambda: f64) -> DMat3 {
+        let cofactor = DMat3::from_cols(
+            f.y_axis.cross(f.z_axis),
+            f.z_axis.cross(f.x_axis),
+            f.x_axis.cross(f.y_axis),
+        );
+        let volume = f.x_axis.dot(cofactor.x_axis);
+        let green = || (f.transpose() * f - DMat3::IDENTITY) * 0.5;
+        match self {
+            Self::Springs => DMat3::ZERO,
+            Self::SignedVolume => f * green() * (2.0 * mu) + cofactor * (lambda * (volume - 1.0)),
+            Self::NeoHookean => {
+                let (mu, lambda) = (4.0 / 3.0 * mu, lambda + 5.0 / 6.0 * mu);
+                let square = f.x_axis.length_squared() + f.y_axis.length_squared() + f.z_axis.length_squared();
+                f * (mu * (1.0 - 1.0 / (square + 1.0))) + cofactor * (lambda * (volume - 1.0) - 0.75 * mu)
+            }
+            Self::PlainNeoHookean => f * mu + cofactor * ((lambda + mu) * (volume - 1.0) - mu),
+            Self::StVenantKirchhoff => {
+                let strain = green();
+                f * (strain * (2.0 * mu) + DMat3::IDENTITY * (lambda * trace(strain)))
+            }
+            Self::Corotated => {
+                let rotation = rotation(f, cofactor, volume);
+                let stretch = trace(rotation.transpose() * f) - 3.0;
+                (f - rotation) * (2.0 * mu) + rotation * (lambda * stretch)
+            }
+            Self::FixedCorotated => {
+                (f - rotation(f, cofactor, volume)) * (2.0 * mu) + cofactor * (lambda * (volume - 1.0))
+            }
+        }
+    }
+}
+
+fn trace(matrix: DMat3) -> f64 {
+    matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z
+}
+
+/// The rotation of a deformation that does not turn inside out: Newton's iteration for the polar decomposition (Higham).
+fn rotation(f: DMat3, cofactor: DMat3, volume: f64) -> DMat3 {
+    let mut rotation = (f + cofactor * (1.0 / volume)) * 0.5;
+    for _ in 0..30 {
+        let next = (rotation + rotation.inverse().transpose()) * 0.5;
+        let change = next - rotation;
+        rotation = next;
+        let largest = |column: DVec3| column.abs().max_element();
+        if largest(change.x_axis).max(largest(change.y_axis)).max(largest(change.z_axis)) < 1e-15 {
+            break;
+        }
+    }
+    rotation
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At rest there is no stress, and small strains follow Hooke's law.
+    #[test]
+    fn laws_agree_at_small_strains() {
+        let (mu, lambda) = (3.0, 5.0);
+        let small = 1e-6;
+        let strain = DMat3::from_cols_array(&[1.0, 0.3, 0.2, 0.3, -0.5, 0.1, 0.2, 0.1, 0.7]) * small;
+        let hooke = strain * (2.0 * mu) + DMat3::IDENTITY * (lambda * trace(strain));
+        for law in [
+            Law::SignedVolume,
+            Law::NeoHookean,
+            Law::PlainNeoHookean,
+            Law::StVenantKirchhoff,
+            Law::Corotated,
+            Law::FixedCorotated,
+        ] {
+            let difference = law.stress(DMat3::IDENTITY + strain, mu, lambda) - hooke;
+            for value in difference.to_cols_array() {
+                assert!(value.abs() < 1e-4 * small, "{}: {value}", law.name());
+            }
+        }
+    }
+}

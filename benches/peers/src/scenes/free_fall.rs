@@ -1,0 +1,42 @@
+//! A block and a chain that nothing holds: whoever does not fall like a stone is set up wrongly.
+
+use super::mesh::block;
+use super::{Measure, Scene};
+use crate::precision::model::Model;
+
+pub fn tetrahedra() -> Scene {
+    let block = block([2; 3], 0.05);
+    let mut model = Model {
+        positions: block.positions,
+        tetrahedra: block.tetrahedra,
+        young: 1e5,
+        poisson: 0.3,
+        gravity: 9.81,
+        frames: 30,
+        ..Model::default()
+    };
+    model.fill(1000.0);
+    Scene {
+        name: "free fall",
+        about: "a block of 2 x 2 x 2 cubes falls for half a second".into(),
+        model,
+        measure: Measure::Motion,
+    }
+}
+
+pub fn springs() -> Scene {
+    Scene {
+        name: "free fall of springs",
+        about: "a chain of four nodes falls for half a second".into(),
+        model: Model {
+            positions: (0..4).map(|node| [0.02 * f64::from(node), 0.0, 0.0]).collect(),
+            masses: vec![1e-3; 4],
+            springs: (0..3).map(|node| [node, node + 1]).collect(),
+            stiffness: 500.0,
+            gravity: 9.81,
+            frames: 30,
+            ..Model::default()
+        },
+        measure: Measure::Motion,
+    }
+}

@@ -1,0 +1,50 @@
+//! The scenes: each a discrete model that every engine is given, node by node.
+
+mod cantilever;
+mod cloth;
+mod free_fall;
+mod jelly;
+mod mesh;
+mod organ;
+mod rope;
+mod sofa_beam;
+
+use crate::precision::model::Model;
+
+pub use cantilever::tip_ratio;
+pub use sofa_beam::{SofaBeam, sofa_beams};
+
+/// A model with its name and what is asked of its motion.
+pub struct Scene {
+    pub name: &'static str,
+    /// A line for a reader.
+    pub about: String,
+    pub model: Model,
+    pub measure: Measure,
+}
+
+/// Where an error is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// At the end of each frame.
+    Motion,
+    /// At the last frame, when a damped body rests.
+    Rest,
+}
+
+/// The scenes that are timed.
+pub fn timed() -> Vec<Scene> {
+    vec![
+        cantilever::released(),
+        cantilever::at_rest(),
+        jelly::scene(),
+        organ::scene(),
+        cloth::scene(),
+        rope::scene(),
+    ]
+}
+
+/// What a player must get right before it is timed.
+pub fn checks() -> Vec<Scene> {
+    vec![free_fall::tetrahedra(), free_fall::springs()]
+}

@@ -1,0 +1,52 @@
+//! A bent, rounded and tapered body that hangs by one end.
+
+use super::mesh::{block, nodes};
+use super::{Measure, Scene};
+use crate::precision::model::Model;
+
+const CELLS: [usize; 3] = [16, 8, 6];
+/// Metres from end to end, before it is bent.
+const LENGTH: f64 = 0.16;
+
+pub fn scene() -> Scene {
+    let block = block(CELLS, 1.0);
+    let positions: Vec<[f64; 3]> = block.positions.iter().map(|&place| shaped(place)).collect();
+    let mut model = Model {
+        pinned: nodes(&block.positions, |[x, _, _]| x < 1.5),
+        positions,
+        tetrahedra: block.tetrahedra,
+        young: 1e4,
+        poisson: 0.3,
+        gravity: 9.81,
+        frames: 60,
+        ..Model::default()
+    };
+    model.fill(1050.0);
+    Scene {
+        name: "organ",
+        about: "an organ-like body of 16 x 8 x 6 cells, rounded, tapered and bent, 0.16 m long, hung by one end and released: \
+                E = 10 kPa, nu = 0.3, 1050 kg/m³"
+            .into(),
+        model,
+        measure: Measure::Motion,
+    }
+}
+
+/// Where a corner of the lattice is in the organ.
+fn shaped([x, y, z]: [f64; 3]) -> [f64; 3] {
+    let [x, y, z] = [x / CELLS[0] as f64, y / CELLS[1] as f64, z / CELLS[2] as f64].map(|part| 2.0 * part - 1.0);
+    // Towards the ball of which the cube is the hull, not all the way: edges of the lattice would become flat.
+    let round = 0.75;
+    let pulled = |a: f64, b: f64, c: f64| {
+        let ball = (1.0 - b * b / 2.0 - c * c / 2.0 + b * b * c * c / 3.0).sqrt();
+        a * (1.0 - round + round * ball)
+    };
+    let [x, y, z] = [pulled(x, y, z), pulled(y, x, z), pulled(z, x, y)];
+    let thick = 0.8 - 0.3 * x + 0.1 * (3.0 * x).sin();
+    let (along, across, deep) = (0.5 * LENGTH * x, 0.25 * LENGTH * thick * y, 0.18 * LENGTH * thick * z);
+    // Bent about an axis along z, by 1.2 radians from end to end; it hangs along -y.
+    let radius = LENGTH / 1.2;
+    let angle = along / radius;
+    let distance = radius + across;
+    [distance * angle.cos() - radius, -distance * angle.sin(), deep]
+}
