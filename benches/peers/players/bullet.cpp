@@ -23,6 +23,13 @@
 
 namespace {
 
+// Newton's iterations of a step are fixed in Bullet's own.
+struct Solver : btDeformableBodySolver {
+    explicit Solver(int iterations) {
+        if (iterations > 1) m_maxNewtonIterations = iterations, m_newtonTolerance = 0;
+    }
+};
+
 struct Model {
     std::map<std::string, double> numbers;
     std::vector<btVector3> positions;
@@ -95,7 +102,11 @@ btSoftBody *build(const Model &model, btSoftBodyWorldInfo &info, const std::stri
         const int *corners = &model.tetrahedra[corner];
         body->appendTetra(corners[0], corners[1], corners[2], corners[3]);
     }
-    if (!model.tetrahedra.empty()) body->initializeDmInverse();
+    if (!model.tetrahedra.empty()) {
+        body->m_tetraScratches.resize(body->m_tetras.size());
+        body->m_tetraScratchesTn.resize(body->m_tetras.size());
+        body->initializeDmInverse();
+    }
     body->m_cfg.piterations = iterations;
     body->m_cfg.kDP = links ? btScalar(1 - std::exp(-model["damping"] * step)) : 0;
     body->m_cfg.drag = 0;
@@ -142,7 +153,7 @@ int main(int count, char **arguments) {
         body = build(model, soft->getWorldInfo(), kind, iterations, step);
         soft->addSoftBody(body);
     } else {
-        deformable_solver = std::make_unique<btDeformableBodySolver>();
+        deformable_solver = std::make_unique<Solver>(iterations);
         auto constraints = std::make_unique<btDeformableMultiBodyConstraintSolver>();
         constraints->setDeformableSolver(deformable_solver.get());
         auto owned = std::make_unique<btDeformableMultiBodyDynamicsWorld>(&dispatcher, &broadphase, constraints.get(),
@@ -170,7 +181,8 @@ int main(int count, char **arguments) {
             add(new btDeformableNeoHookeanForce(btScalar(4.0 / 3.0 * mu), btScalar(lambda + 5.0 / 6.0 * mu), 0));
         }
         soft->setImplicit(kind == "implicit");
-        soft->setLineSearch(false);
+        // Without it the implicit solver of version 3.24 leaves every node where it is.
+        soft->setUseProjection(kind == "implicit");
     }
     std::printf("version %d.%02d\n", btGetVersion() / 100, btGetVersion() % 100);
     std::fflush(stdout);

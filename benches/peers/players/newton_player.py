@@ -15,7 +15,7 @@ iterations = int(settings.get("iterations", 1))
 step = model.frame / substeps
 kept = float(np.exp(-model.damping * step))
 
-builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=-model.gravity)
+builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=(0.0, -model.gravity, 0.0))
 masses = model.masses.copy()
 masses[model.pinned] = 0
 for position, mass in zip(model.positions, masses):

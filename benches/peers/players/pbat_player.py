@@ -53,14 +53,15 @@ def xpbd():
     data = (
         sim.Data()
         .with_volume_mesh(X, T)
-        .with_surface_mesh(np.zeros(0, dtype=np.int64), np.zeros((3, 0), dtype=np.int64))
+        # It wants a surface, and meets nothing with it.
+        .with_surface_mesh(np.arange(3), np.arange(3).reshape(3, 1))
         .with_velocity(np.zeros_like(X))
         .with_acceleration(np.asfortranarray(weight))
         .with_mass_inverse(inverse)
         .with_elastic_material(np.asfortranarray(lame))
         .with_compliance(compliance, sim.Constraint.StableNeoHookean)
         .with_damping(np.zeros(2 * T.shape[1]), sim.Constraint.StableNeoHookean)
-        .with_partitions(list(pointers), list(constraints))
+        .with_partitions(list(map(int, pointers)), list(map(int, constraints)))
         .with_dirichlet_vertices(model.pinned)
         .construct()
     )

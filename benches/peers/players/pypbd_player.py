@@ -17,11 +17,11 @@ simulation.initDefault()
 world = simulation.getModel()
 count = len(model.positions)
 if len(model.tetrahedra):
-    world.addTetModel(model.positions.astype(np.float32), model.tetrahedra.flatten().astype(np.uint32), testMesh=False)
+    world.addTetModel(list(model.positions), model.tetrahedra.flatten().tolist())
     for corners in model.tetrahedra.tolist():
         world.addFEMTetConstraint(*corners, model.young, model.poisson)
 else:
-    world.addLineModel(count, len(model.springs), model.positions.astype(np.float32), model.springs.flatten().astype(np.uint32), [], [])
+    world.addLineModel(count, 0, list(model.positions), [], model.springs.flatten().tolist(), [0] * len(model.springs))
     for a, b in model.springs.tolist():
         world.addDistanceConstraint_XPBD(a, b, model.stiffness)
 particles = world.getParticles()
@@ -33,7 +33,8 @@ controller = simulation.getTimeStep()
 controller.setValueUInt(pbd.TimeStepController.NUM_SUB_STEPS, 1)
 controller.setValueUInt(pbd.TimeStepController.MAX_ITERATIONS, iterations)
 pbd.TimeManager.getCurrent().setTimeStepSize(step)
-simulation.setValueVec3Real(pbd.Simulation.GRAVITATION, [0.0, -model.gravity, 0.0])
+# Its weight cannot be set from Python; it is that of every scene.
+assert model.gravity == 9.81
 
 
 def frame():

@@ -109,7 +109,7 @@ fn main() {
 /// What `scenes` is asked for.
 fn request(arguments: &[String]) -> Option<precision::Request> {
     let mut request = precision::Request {
-        limit: 8.0,
+        limit: 4.0,
         scene: String::new(),
         engine: String::new(),
     };

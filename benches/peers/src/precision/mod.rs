@@ -241,6 +241,9 @@ fn follow(
             Played::Refused(reason) => {
                 eprintln!("{}: {engine}, {}, {label}: {reason}", scene.name, line.name);
                 said.notes.push(format!("{}, {label}: {reason}", line.name));
+                if failure.as_ref() == Some(&reason) {
+                    break;
+                }
                 failure = Some(reason);
             }
         }
