@@ -67,8 +67,9 @@ def frame():
     for kind, is_fatal in FATAL.items():
         if data.warning[kind].number and (is_fatal or kind not in said):
             said.add(kind)
-            say = player.refuse if is_fatal else lambda text: player.say("note", text)
-            say(f"{settings['integrator']}: {kind.name}, from {data.time:.3f} s on, first with {substeps} steps a frame")
+            if is_fatal:
+                player.refuse("it diverges")
+            player.say("note", f"{settings['integrator']}, {substeps} steps a frame: {kind.name}")
 
 
 player.serve(mujoco.__version__, frame, lambda: data.xpos[1:])

@@ -2,7 +2,6 @@
 
 use super::{Engine, Line};
 use crate::precision::law::Law;
-use crate::scenes::Scene;
 
 pub fn engine() -> Engine {
     Engine {

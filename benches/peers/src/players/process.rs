@@ -7,6 +7,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
 use crate::contender::target;
+use crate::precision::DIVERGES;
 use crate::precision::model::Model;
 use crate::precision::motion::Motion;
 
@@ -115,6 +116,8 @@ fn run(
     }
     if frames < model.frames {
         return match cut {
+            // What has no numbers any more is often slow; a finer step may be faster.
+            Some(_) if has_diverged(&positions, model) => Err(DIVERGES.into()),
             Some(expected) => Ok(Played::Cut { expected }),
             None => Err(format!("it ended after {frames} frames: {}", last_line(&folder.join("log")))),
         };
@@ -125,8 +128,17 @@ fn run(
     let motion = Motion::from_numbers(&numbers, model);
     match motion.frames.len() == model.frames && motion.is_finite() {
         true => Ok(Played::Whole { motion, seconds }),
-        false => Err("its positions are no numbers".into()),
+        false => Err(DIVERGES.into()),
     }
+}
+
+/// Whether the last frame that was written is nowhere near the first.
+fn has_diverged(positions: &Path, model: &Model) -> bool {
+    let bytes = std::fs::read(positions).unwrap_or_default();
+    let (chunks, _) = bytes.as_chunks::<8>();
+    let numbers: Vec<f64> = chunks.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect();
+    let motion = Motion::from_numbers(&numbers, model);
+    !motion.frames.is_empty() && !(motion.end().displacement() < 100.0)
 }
 
 fn last_line(log: &Path) -> String {

@@ -18,8 +18,6 @@ pub enum Law {
     StVenantKirchhoff,
     /// Linear elasticity in the frame of each tetrahedron's rotation R: `mu |F - R|² + lambda/2 tr(R'F - 1)²`.
     Corotated,
-    /// The same with `lambda/2 (J - 1)²` in place of the trace.
-    FixedCorotated,
 }
 
 impl Law {
@@ -32,7 +30,6 @@ impl Law {
             Self::PlainNeoHookean => "plain-neo-hookean",
             Self::StVenantKirchhoff => "st-venant-kirchhoff",
             Self::Corotated => "corotated",
-            Self::FixedCorotated => "fixed-corotated",
         }
     }
 
@@ -62,9 +59,6 @@ impl Law {
                 let rotation = rotation(f, cofactor, volume);
                 let stretch = trace(rotation.transpose() * f) - 3.0;
                 (f - rotation) * (2.0 * mu) + rotation * (lambda * stretch)
-            }
-            Self::FixedCorotated => {
-                (f - rotation(f, cofactor, volume)) * (2.0 * mu) + cofactor * (lambda * (volume - 1.0))
             }
         }
     }
@@ -106,7 +100,6 @@ mod tests {
             Law::PlainNeoHookean,
             Law::StVenantKirchhoff,
             Law::Corotated,
-            Law::FixedCorotated,
         ] {
             let difference = law.stress(DMat3::IDENTITY + strain, mu, lambda) - hooke;
             for value in difference.to_cols_array() {
