@@ -17,7 +17,7 @@ use crate::precision::law::Law;
 use crate::scenes::Scene;
 
 pub use process::{Played, Said, play};
-pub use serve::{Player, Settings};
+pub use serve::{Player, Settings, processor_seconds};
 pub use sinew::SinewPlayer;
 
 /// An engine, or a part of one that is set up alike.

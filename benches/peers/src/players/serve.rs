@@ -82,7 +82,7 @@ pub fn serve<P: Player>(arguments: &[String]) {
 }
 
 /// What all threads of this process have used of the processor, s.
-fn processor_seconds() -> f64 {
+pub fn processor_seconds() -> f64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
     // SAFETY: the pointer is to a timespec of this function.
     let failed = unsafe { libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &raw mut time) };

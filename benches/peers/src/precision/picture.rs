@@ -7,7 +7,7 @@ use crate::precision::{EngineOutcome, Outcome, Point};
 
 /// Powers of ten that both axes have.
 const SECONDS: [i32; 2] = [-3, 2];
-const ERRORS: [i32; 2] = [-4, 0];
+const ERRORS: [i32; 2] = [-5, 0];
 
 /// A diagram's place in a picture.
 struct Panel {
@@ -96,9 +96,15 @@ fn picture(width: f64, height: f64, body: &str) -> String {
     )
 }
 
+/// Whether a point is in the picture: others are further off than the body moves.
+fn is_shown(point: &Point) -> bool {
+    point.error <= 10f64.powi(ERRORS[1])
+}
+
 /// The points of an engine that no other point of it beats in both time and error, by time.
 fn best(engine: &EngineOutcome) -> Vec<&Point> {
-    let mut points: Vec<&Point> = engine.lines.iter().flatten().flat_map(|line| &line.points).collect();
+    let points = engine.lines.iter().flatten().flat_map(|line| &line.points);
+    let mut points: Vec<&Point> = points.filter(|point| is_shown(point)).collect();
     points.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
     let mut least = f64::INFINITY;
     points.retain(|point| {
@@ -163,7 +169,7 @@ pub fn scene(outcome: &Outcome) -> String {
     for engine in &outcome.engines {
         for (number, line) in engine.lines.iter().flatten().enumerate() {
             let dashes = DASHES[number % DASHES.len()];
-            body += &panel.line(line.points.iter(), engine.color, dashes);
+            body += &panel.line(line.points.iter().filter(|point| is_shown(point)), engine.color, dashes);
             let _ = writeln!(
                 body,
                 "<line x1='600' x2='630' y1='{0}' y2='{0}' stroke='{1}' stroke-width='2' stroke-dasharray='{dashes}'/>\
