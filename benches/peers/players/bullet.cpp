@@ -34,7 +34,8 @@ struct Model {
     std::map<std::string, double> numbers;
     std::vector<btVector3> positions;
     std::vector<double> masses;
-    std::vector<int> pinned, tetrahedra, springs;
+    std::vector<int> pinned, tetrahedra, springs, triangles;
+    double ball[4] = {0, 0, 0, 0};
 
     explicit Model(const char *path) {
         std::ifstream file(path);
@@ -59,6 +60,10 @@ struct Model {
                 read(tetrahedra, 4);
             } else if (name == "springs") {
                 read(springs, 2);
+            } else if (name == "triangles") {
+                read(triangles, 3);
+            } else if (name == "ball") {
+                for (double &number : ball) file >> number;
             } else {
                 numbers[name] = value;
             }
@@ -110,7 +115,14 @@ btSoftBody *build(const Model &model, btSoftBodyWorldInfo &info, const std::stri
     body->m_cfg.piterations = iterations;
     body->m_cfg.kDP = links ? btScalar(1 - std::exp(-model["damping"] * step)) : 0;
     body->m_cfg.drag = 0;
-    body->m_cfg.collisions = 0;
+    for (std::size_t corner = 0; corner < model.triangles.size(); corner += 3)
+        body->appendFace(model.triangles[corner], model.triangles[corner + 1], model.triangles[corner + 2]);
+    body->getCollisionShape()->setMargin(btScalar(1e-3));
+    body->m_cfg.kDF = 0;
+    body->m_cfg.kCHR = 1;
+    body->m_cfg.collisions = model.triangles.empty() ? 0
+                             : links                 ? btSoftBody::fCollision::SDF_RS
+                                                     : btSoftBody::fCollision::SDF_RD | btSoftBody::fCollision::SDF_RDN;
     body->m_dampingCoefficient = 0;
     body->m_sleepingThreshold = 0;
     body->setActivationState(DISABLE_DEACTIVATION);
@@ -150,6 +162,7 @@ int main(int count, char **arguments) {
         soft->setGravity(gravity);
         soft->getWorldInfo().m_gravity = gravity;
         soft->getWorldInfo().air_density = 0;
+        soft->getWorldInfo().m_sparsesdf.Initialize();
         body = build(model, soft->getWorldInfo(), kind, iterations, step);
         soft->addSoftBody(body);
     } else {
@@ -183,6 +196,14 @@ int main(int count, char **arguments) {
         soft->setImplicit(kind == "implicit");
         // Without it the implicit solver of version 3.24 leaves every node where it is.
         soft->setUseProjection(kind == "implicit");
+    }
+    btSphereShape sphere(btScalar(model.ball[3]));
+    std::unique_ptr<btRigidBody> ball;
+    if (model.ball[3] > 0) {
+        ball = std::make_unique<btRigidBody>(0, nullptr, &sphere);
+        ball->setFriction(0);
+        ball->setWorldTransform(btTransform(btQuaternion::getIdentity(), btVector3(btScalar(model.ball[0]), btScalar(model.ball[1]), btScalar(model.ball[2]))));
+        world->addRigidBody(ball.get());
     }
     std::printf("version %d.%02d\n", btGetVersion() / 100, btGetVersion() % 100);
     std::fflush(stdout);

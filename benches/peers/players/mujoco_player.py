@@ -27,15 +27,19 @@ def xml():
     else:
         dimension, elements = 1, model.springs
         law = f'<edge stiffness="{model.stiffness!r}" damping="0"/>'
+    geometry, contact = "", 'contype="0" conaffinity="0"'
+    for x, y, z, radius in model.ball:
+        geometry = f'<geom type="sphere" size="{radius}" pos="{x} {y} {z}" condim="1"/>'
+        contact = 'contype="1" conaffinity="1" condim="1"'
     elements = " ".join(map(str, elements.flatten().tolist()))
     return f"""<mujoco>
       <compiler boundmass="0" boundinertia="0"/>
       <option gravity="0 {-model.gravity!r} 0" timestep="{model.frame / substeps!r}" integrator="{settings['integrator']}"/>
       <size memory="2G"/>
-      <worldbody>{''.join(bodies)}</worldbody>
+      <worldbody>{geometry}{''.join(bodies)}</worldbody>
       <deformable>
         <flex name="body" dim="{dimension}" body="{' '.join(names)}" element="{elements}" radius="0.001">
-          {law}<contact contype="0" conaffinity="0" selfcollide="none"/>
+          {law}<contact {contact} selfcollide="none"/>
         </flex>
       </deformable>
     </mujoco>"""

@@ -28,6 +28,8 @@ for corners in model.tetrahedra.tolist():
     builder.add_tetrahedron(*corners, k_mu=mu, k_lambda=lame_lambda, k_damp=0.0)
 for a, b in model.springs.tolist():
     builder.add_spring(a, b, model.stiffness, 0.0, 0)
+for *center, radius in model.ball:
+    builder.add_shape_sphere(-1, xform=wp.transform(wp.vec3(*center), wp.quat_identity()), radius=radius)
 if kind == "vbd":
     builder.color()
 world = builder.finalize(device="cpu")
@@ -39,6 +41,7 @@ solver = {
 }[kind]()
 now, later = world.state(), world.state()
 control = world.control()
+contacts = world.contacts() if len(model.ball) else None
 
 
 @wp.kernel
@@ -50,7 +53,9 @@ def advance(count):
     global now, later
     for _ in range(count):
         now.clear_forces()
-        solver.step(now, later, control, None, step)
+        if contacts:
+            world.collide(now, contacts)
+        solver.step(now, later, control, contacts, step)
         now, later = later, now
         if kept < 1:
             wp.launch(damp, dim=len(masses), inputs=[now.particle_qd, kept], device="cpu")

@@ -11,17 +11,22 @@ _answers = os.fdopen(os.dup(1), "w", buffering=1)
 os.dup2(2, 1)
 
 
+# Numbers in a line of each section.
+WIDTHS = {"nodes": 4, "pinned": 1, "tetrahedra": 4, "springs": 2, "triangles": 3, "ball": 4}
+
+
 class Model:
     """The model of src/precision/model.rs."""
 
     def __init__(self, path):
+        self.ball = []
         words = iter(open(path).read().split())
         for name in words:
             value = float(next(words))
-            if name in ("nodes", "pinned", "tetrahedra", "springs"):
-                width = {"nodes": 4, "pinned": 1, "tetrahedra": 4, "springs": 2}[name]
+            if name in WIDTHS:
+                width = WIDTHS[name]
                 table = np.array([float(next(words)) for _ in range(int(value) * width)]).reshape(-1, width)
-                setattr(self, name, table if name == "nodes" else table.astype(np.int64))
+                setattr(self, name, table if name in ("nodes", "ball") else table.astype(np.int64))
             else:
                 setattr(self, name, value)
         self.frames = int(self.frames)

@@ -68,7 +68,9 @@ pub fn compile_bullet(source: &Path, name: &str) -> Result<PathBuf, String> {
     let flags = String::from_utf8_lossy(&flags.stdout);
     let folder = target().join("peers");
     std::fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let folder = folder.canonicalize().map_err(|error| format!("{}: {error}", folder.display()))?;
+    let folder = folder
+        .canonicalize()
+        .map_err(|error| format!("{}: {error}", folder.display()))?;
     let program = folder.join(name);
     let compiled = Command::new("g++")
         .args(["-std=c++17", "-O3", "-DNDEBUG"])

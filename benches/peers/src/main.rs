@@ -1,15 +1,24 @@
-//! The same cloth, side by side in one run: sinew, Taichi, NVIDIA Warp, Rapier's soft bodies and Bullet's.
+//! sinew beside other engines, in one run each: a large cloth step by step, and error against time in small scenes.
 //!
 //! ```text
-//! cd benches/peers && cargo run --release                  # some 20 minutes
+//! cd benches/peers && cargo run --release                  # the cloth, some 20 minutes
 //! cd benches/peers && cargo run --release -- --seconds 20  # each contender on each cloth, at most
 //! cd benches/peers && cargo run --release -- --quick       # below one minute
-//! cd benches/peers && cargo run --release -- scenes        # error against time in all scenes, some 20 minutes
+//! cd benches/peers && cargo run --release -- scenes        # error against time, some 20 minutes
 //! cd benches/peers && cargo run --release -- scenes --scene rope --engine bullet --limit 20
 //! ```
 //!
-//! What is not installed is skipped, loudly. A table is printed and written to `target/report/peers.md`, with what was
-//! asked of each engine.
+//! The cloth: Taichi, NVIDIA Warp, Rapier's soft bodies and Bullet's; a table goes to `target/report/peers.md`, with what was
+//! asked of each engine. The scenes: Rapier, Bullet, MuJoCo, pbatoolkit, Newton and pyPBD; tables and diagrams go to
+//! `target/report/engines*`, and `--limit` is the processor time that a point may take for a simulated second.
+//!
+//! What is not installed is skipped, loudly. To have all engines of the scenes:
+//!
+//! ```text
+//! apt-get install g++ pkg-config libbullet-dev
+//! python3 -m venv target/peers/venv
+//! target/peers/venv/bin/pip install mujoco pbatoolkit==0.0.11 newton pypbd
+//! ```
 
 mod child;
 mod cloth;

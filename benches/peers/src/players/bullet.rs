@@ -26,16 +26,40 @@ fn lines(scene: &Scene) -> Vec<Line> {
     let newton = ["kind=implicit", "iterations=10"];
     if scene.model.has(Law::Springs) {
         return vec![
-            Line::doubling("links, 4 iterations", Law::Springs, &["kind=links", "iterations=4"], 1, 4096),
-            Line::doubling("links, 32 iterations", Law::Springs, &["kind=links", "iterations=32"], 1, 4096),
+            Line::doubling(
+                "links, 4 iterations",
+                Law::Springs,
+                &["kind=links", "iterations=4"],
+                1,
+                4096,
+            ),
+            Line::doubling(
+                "links, 32 iterations",
+                Law::Springs,
+                &["kind=links", "iterations=32"],
+                1,
+                4096,
+            ),
             Line::doubling("deformable, explicit", Law::Springs, &["kind=explicit"], 8, 4096),
             Line::doubling("deformable, implicit", Law::Springs, &["kind=implicit"], 1, 4096),
-            Line::doubling("deformable, implicit, 10 Newton iterations", Law::Springs, &newton, 1, 4096),
+            Line::doubling(
+                "deformable, implicit, 10 Newton iterations",
+                Law::Springs,
+                &newton,
+                1,
+                4096,
+            ),
         ];
     }
     vec![
         Line::doubling("deformable, explicit", Law::NeoHookean, &["kind=explicit"], 16, 4096),
         Line::doubling("deformable, implicit", Law::NeoHookean, &["kind=implicit"], 1, 4096),
-        Line::doubling("deformable, implicit, 10 Newton iterations", Law::NeoHookean, &newton, 1, 4096),
+        Line::doubling(
+            "deformable, implicit, 10 Newton iterations",
+            Law::NeoHookean,
+            &newton,
+            1,
+            4096,
+        ),
     ]
 }

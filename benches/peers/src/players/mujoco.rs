@@ -17,7 +17,11 @@ pub fn engine() -> Engine {
 }
 
 fn lines(scene: &Scene) -> Vec<Line> {
-    let law = if scene.model.has(Law::Springs) { Law::Springs } else { Law::StVenantKirchhoff };
+    let law = if scene.model.has(Law::Springs) {
+        Law::Springs
+    } else {
+        Law::StVenantKirchhoff
+    };
     let line = |name: &str, integrator: &str, first| Line::doubling(name, law, &[integrator], first, 4096);
     let mut all = vec![
         line("Euler", "integrator=Euler", 8),

@@ -16,14 +16,24 @@ pub fn engine() -> Engine {
 }
 
 fn lines(scene: &Scene) -> Vec<Line> {
-    let law = if scene.model.has(Law::Springs) { Law::Springs } else { Law::NeoHookean };
+    let law = if scene.model.has(Law::Springs) {
+        Law::Springs
+    } else {
+        Law::NeoHookean
+    };
     let mut all = vec![
         Line::doubling("semi-implicit", law, &["kind=semi-implicit"], 8, 2048),
         Line::doubling("VBD, 10 iterations", law, &["kind=vbd", "iterations=10"], 1, 1024),
         Line::doubling("VBD, 100 iterations", law, &["kind=vbd", "iterations=100"], 1, 1024),
     ];
     if law == Law::Springs {
-        all.push(Line::doubling("XPBD, 10 iterations", law, &["kind=xpbd", "iterations=10"], 1, 1024));
+        all.push(Line::doubling(
+            "XPBD, 10 iterations",
+            law,
+            &["kind=xpbd", "iterations=10"],
+            1,
+            1024,
+        ));
     }
     all
 }

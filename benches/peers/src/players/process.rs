@@ -63,7 +63,11 @@ fn run(
         .args(settings)
         // Engines leave logs and caches where they are started.
         .current_dir(&folder)
-        .envs([("PYTHONDONTWRITEBYTECODE", "1"), ("OMP_NUM_THREADS", "1"), ("TBB_NUM_THREADS", "1")])
+        .envs([
+            ("PYTHONDONTWRITEBYTECODE", "1"),
+            ("OMP_NUM_THREADS", "1"),
+            ("TBB_NUM_THREADS", "1"),
+        ])
         .env("XDG_CACHE_HOME", folder.join("cache"))
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -119,7 +123,10 @@ fn run(
             // What has no numbers any more is often slow; a finer step may be faster.
             Some(_) if has_diverged(&positions, model) => Err(DIVERGES.into()),
             Some(expected) => Ok(Played::Cut { expected }),
-            None => Err(format!("it ended after {frames} frames: {}", last_line(&folder.join("log")))),
+            None => Err(format!(
+                "it ended after {frames} frames: {}",
+                last_line(&folder.join("log"))
+            )),
         };
     }
     let bytes = std::fs::read(&positions).map_err(failed)?;
@@ -143,5 +150,8 @@ fn has_diverged(positions: &Path, model: &Model) -> bool {
 
 fn last_line(log: &Path) -> String {
     let text = std::fs::read_to_string(log).unwrap_or_default();
-    text.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("no word").into()
+    text.lines()
+        .rfind(|line| !line.trim().is_empty())
+        .unwrap_or("no word")
+        .into()
 }

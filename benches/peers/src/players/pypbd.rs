@@ -9,7 +9,10 @@ pub fn engine() -> Engine {
         name: "pyPBD",
         color: "#4d4d4d",
         program: || super::python::script("pypbd_player.py", "pypbd", "pypbd"),
-        lines: |scene| Ok(lines(scene)),
+        lines: |scene| match scene.model.ball {
+            Some(_) => Err("its collision objects for cloth and spheres are not all in its Python interface".into()),
+            None => Ok(lines(scene)),
+        },
         notes: "Springs are extended position-based distance constraints. Its finite elements are plain position-based constraints, \
                 whose stiffness depends on step and iterations: no setting makes them the material.",
     }
@@ -22,5 +25,11 @@ fn lines(scene: &Scene) -> Vec<Line> {
             Line::doubling("XPBD, 10 iterations", Law::Springs, &["iterations=10"], 1, 4096),
         ];
     }
-    vec![Line::doubling("PBD of finite elements, 5 iterations", Law::StVenantKirchhoff, &["iterations=5"], 1, 4096)]
+    vec![Line::doubling(
+        "PBD of finite elements, 5 iterations",
+        Law::StVenantKirchhoff,
+        &["iterations=5"],
+        1,
+        4096,
+    )]
 }

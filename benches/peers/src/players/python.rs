@@ -11,7 +11,10 @@ pub fn script(name: &str, module: &str, package: &str) -> Result<Vec<PathBuf>, S
     let own = target().join("peers/venv/bin/python");
     let python = if own.exists() { own } else { "python3".into() };
     let found = Command::new(&python)
-        .args(["-c", &format!("import importlib.util, sys; sys.exit(importlib.util.find_spec('{module}') is None)")])
+        .args([
+            "-c",
+            &format!("import importlib.util, sys; sys.exit(importlib.util.find_spec('{module}') is None)"),
+        ])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .status()
@@ -19,11 +22,6 @@ pub fn script(name: &str, module: &str, package: &str) -> Result<Vec<PathBuf>, S
     if !found.success() {
         return Err(format!("{module} is not installed (pip install {package})"));
     }
-    let python = if python.is_absolute() || python.components().count() == 1 {
-        python
-    } else {
-        std::path::absolute(&python).map_err(|error| error.to_string())?
-    };
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("players").join(name);
     Ok(vec![python, script])
 }

@@ -8,7 +8,7 @@ use rapier3d::prelude::*;
 use super::serve::{Player, Settings};
 use super::{Engine, Line};
 use crate::precision::law::Law;
-use crate::precision::model::{FRAME, Model};
+use crate::precision::model::{Ball, FRAME, Model};
 use crate::scenes::Scene;
 
 pub fn engine() -> Engine {
@@ -38,7 +38,13 @@ fn lines(scene: &Scene) -> Vec<Line> {
     vec![
         Line::doubling("constraints, corotational", Law::Corotated, &[], 1, 4096),
         Line::doubling("constraints, neo-Hookean", neo, &["law=neo-hookean"], 1, 4096),
-        Line::doubling("constraints, neo-Hookean, 32 sweeps", neo, &["law=neo-hookean", "sweeps=32"], 1, 4096),
+        Line::doubling(
+            "constraints, neo-Hookean, 32 sweeps",
+            neo,
+            &["law=neo-hookean", "sweeps=32"],
+            1,
+            4096,
+        ),
         Line::doubling("FEM, neo-Hookean", neo, &["law=neo-hookean", "solver=fem"], 1, 4096),
         Line::doubling(
             "FEM, neo-Hookean, 500 iterations",
@@ -73,8 +79,18 @@ impl Player for RapierPlayer {
             .masses(model.masses.iter().map(|&mass| mass as f32).collect())
             .pinned_particles(model.pinned.iter().map(|&node| node as u32))
             .linear_damping(model.damping as f32)
-            .no_surface_collider()
             .can_sleep(false);
+        builder = match model.ball {
+            Some(Ball { center, radius }) => {
+                let ball = ColliderBuilder::ball(radius as f32).friction(0.0);
+                let place = RigidBodyBuilder::fixed().translation(position(&center));
+                world.insert(place, ball);
+                let triangles = model.triangles.iter().map(|corners| corners.map(|node| node as u32));
+                let surface = builder.surface(triangles.collect()).particle_radius(1e-3);
+                surface.surface_collider(ColliderBuilder::default().friction(0.0))
+            }
+            None => builder.no_surface_collider(),
+        };
         if let Some(sweeps) = settings.number("sweeps") {
             builder = builder.additional_pgs_iterations(sweeps as usize - 1);
         }
@@ -125,7 +141,13 @@ fn with_cells(builder: SoftBodyBuilder, model: &Model, settings: &Settings) -> S
         _ => SoftBodyCellModel::Corotational,
     };
     builder
-        .cells(model.tetrahedra.iter().map(|corners| corners.map(|node| node as u32)).collect())
+        .cells(
+            model
+                .tetrahedra
+                .iter()
+                .map(|corners| corners.map(|node| node as u32))
+                .collect(),
+        )
         .cell_model(cell_model)
         .material(SoftBodyMaterial {
             young_modulus: model.young as f32,

@@ -29,7 +29,11 @@ pub struct Settings(Vec<(String, String)>);
 impl Settings {
     /// From names and values.
     pub fn new<'a>(settings: impl Iterator<Item = &'a (&'a str, &'a str)>) -> Self {
-        Self(settings.map(|(name, value)| ((*name).into(), (*value).into())).collect())
+        Self(
+            settings
+                .map(|(name, value)| ((*name).into(), (*value).into()))
+                .collect(),
+        )
     }
 
     /// The number of a name, where it is set.
@@ -70,7 +74,8 @@ pub fn serve<P: Player>(arguments: &[String]) {
         spent += processor_seconds() - start;
         for node in 0..model.positions.len() {
             for number in player.position(node) {
-                file.write_all(&f64::from(number).to_le_bytes()).expect("room for positions");
+                file.write_all(&f64::from(number).to_le_bytes())
+                    .expect("room for positions");
             }
         }
         file.flush().expect("room for positions");

@@ -2,13 +2,14 @@
 
 use glam::Vec3;
 use sinew::{
-    BodyDefinition, BodyId, ElementLaw, Material, Model as MaterialModel, Solver, Values, World, WorldDefinition,
+    BodyDefinition, BodyId, ElementLaw, Material, Model as MaterialModel, Pose, Shape, Solver, ToolDefinition, Values,
+    World, WorldDefinition,
 };
 
 use super::serve::{Player, Settings};
 use super::{Engine, Line};
 use crate::precision::law::Law;
-use crate::precision::model::{FRAME, Model};
+use crate::precision::model::{Ball, FRAME, Model};
 use crate::scenes::Scene;
 
 pub fn engine() -> Engine {
@@ -27,7 +28,12 @@ pub fn engine() -> Engine {
 fn lines(scene: &Scene) -> Vec<Line> {
     let is_of_springs = scene.model.has(Law::Springs);
     let law = if is_of_springs { Law::Springs } else { Law::SignedVolume };
-    let point = |settings: &[&str]| settings.iter().map(|setting| (*setting).to_string()).collect::<Vec<_>>();
+    let point = |settings: &[&str]| {
+        settings
+            .iter()
+            .map(|setting| (*setting).to_string())
+            .collect::<Vec<_>>()
+    };
     let mut verlet = Line::doubling("VERLET", law, &["solver=verlet", "mass_scaling=0"], 32, 1024);
     verlet.points.insert(0, point(&["solver=verlet", "mass_scaling=0"]));
     let scaled = ["0.3", "0.1", "0.03", "0.01", "0.001"];
@@ -42,9 +48,27 @@ fn lines(scene: &Scene) -> Vec<Line> {
         verlet,
         line("VERLET, `mass_scaling` 0.3 to 0.001", scaled.into()),
         Line::doubling("IMPLICIT, defaults", law, &["solver=implicit"], 1, 256),
-        Line::doubling("IMPLICIT, `iterations` 8", law, &["solver=implicit", "iterations=8"], 1, 256),
-        Line::doubling("IMPLICIT, `accuracy` 0.1", law, &["solver=implicit", "accuracy=0.1"], 1, 256),
-        Line::doubling("IMPLICIT, `accuracy` 1e-4", law, &["solver=implicit", "accuracy=1e-4"], 1, 256),
+        Line::doubling(
+            "IMPLICIT, `iterations` 8",
+            law,
+            &["solver=implicit", "iterations=8"],
+            1,
+            256,
+        ),
+        Line::doubling(
+            "IMPLICIT, `accuracy` 0.1",
+            law,
+            &["solver=implicit", "accuracy=0.1"],
+            1,
+            256,
+        ),
+        Line::doubling(
+            "IMPLICIT, `accuracy` 1e-4",
+            law,
+            &["solver=implicit", "accuracy=1e-4"],
+            1,
+            256,
+        ),
         Line::doubling("IMPLICIT, `order` 1", law, &["solver=implicit", "order=1"], 1, 256),
     ];
     if !is_of_springs {
@@ -90,15 +114,29 @@ impl Player for SinewPlayer {
             ..WorldDefinition::default()
         })
         .map_err(|error| error.to_string())?;
-        let positions: Vec<Vec3> = model.positions.iter().map(|place| Vec3::from(place.map(|x| x as f32))).collect();
+        let positions: Vec<Vec3> = model
+            .positions
+            .iter()
+            .map(|place| Vec3::from(place.map(|x| x as f32)))
+            .collect();
         let masses: Vec<f32> = model.masses.iter().map(|&mass| mass as f32).collect();
         let springs: Vec<[u32; 2]> = model.springs.iter().map(|ends| ends.map(|node| node as u32)).collect();
-        let tetrahedra: Vec<[u32; 4]> = model.tetrahedra.iter().map(|ends| ends.map(|node| node as u32)).collect();
+        let tetrahedra: Vec<[u32; 4]> = model
+            .tetrahedra
+            .iter()
+            .map(|ends| ends.map(|node| node as u32))
+            .collect();
+        let triangles: Vec<[u32; 3]> = model
+            .triangles
+            .iter()
+            .map(|corners| corners.map(|node| node as u32))
+            .collect();
         let mut definition = BodyDefinition {
             positions: &positions,
             masses: Values::Each(&masses),
             damping_rate: model.damping as f32,
             tetrahedra: &tetrahedra,
+            triangles: &triangles,
             solver,
             order: settings.number("order").unwrap_or(0.0) as u32,
             iterations: settings.number("iterations").unwrap_or(0.0) as u32,
@@ -128,6 +166,16 @@ impl Player for SinewPlayer {
         for &node in &model.pinned {
             pinned.pin(node as u32).map_err(|error| error.to_string())?;
         }
+        if let Some(Ball { center, radius }) = model.ball {
+            let mut pose = Pose::IDENTITY;
+            pose.position = Vec3::from(center.map(|x| x as f32));
+            let shape = Shape::Sphere { radius: radius as f32 };
+            let ball = ToolDefinition {
+                pose,
+                ..ToolDefinition::new(shape)
+            };
+            world.create_tool(&ball).map_err(|error| error.to_string())?;
+        }
         Ok(Self {
             world,
             body,
@@ -151,6 +199,9 @@ impl Player for SinewPlayer {
 
     fn note(&self) -> Option<String> {
         let choice = self.world.body(self.body).expect("still there").solver_choice();
-        Some(format!("{:?}, at most {} substeps a step", choice.solver, self.substeps))
+        Some(format!(
+            "{:?}, at most {} substeps a step",
+            choice.solver, self.substeps
+        ))
     }
 }

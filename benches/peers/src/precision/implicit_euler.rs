@@ -64,7 +64,12 @@ fn corrected(system: &System, positions: &[DVec3], residual: &[DVec3], inertia: 
     let count = positions.len();
     let mut solution = vec![DVec3::ZERO; count];
     let mut left = residual.to_vec();
-    let scaled = |left: &[DVec3]| left.iter().zip(inertia).map(|(force, inertia)| *force / *inertia).collect::<Vec<_>>();
+    let scaled = |left: &[DVec3]| {
+        left.iter()
+            .zip(inertia)
+            .map(|(force, inertia)| *force / *inertia)
+            .collect::<Vec<_>>()
+    };
     let mut preconditioned = scaled(&left);
     let mut way = preconditioned.clone();
     let mut size = dot(&left, &preconditioned);
@@ -74,7 +79,13 @@ fn corrected(system: &System, positions: &[DVec3], residual: &[DVec3], inertia: 
         // A difference small beside the elements, large beside rounding.
         let reach = way.iter().map(|part| part.abs().max_element()).fold(0.0, f64::max);
         let small = 1e-6 / reach;
-        let moved = |sign: f64| positions.iter().zip(&way).map(|(x, d)| *x + *d * (sign * small)).collect::<Vec<_>>();
+        let moved = |sign: f64| {
+            positions
+                .iter()
+                .zip(&way)
+                .map(|(x, d)| *x + *d * (sign * small))
+                .collect::<Vec<_>>()
+        };
         system.forces(&moved(1.0), &mut ahead);
         system.forces(&moved(-1.0), &mut behind);
         let mut product = ahead.clone();

@@ -68,7 +68,7 @@ fn trace(matrix: DMat3) -> f64 {
     matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z
 }
 
-/// The rotation of a deformation that does not turn inside out: Newton's iteration for the polar decomposition (Higham).
+/// The rotation of a deformation that is not inverted: Newton's iteration for the polar decomposition (Higham).
 fn rotation(f: DMat3, cofactor: DMat3, volume: f64) -> DMat3 {
     let mut rotation = (f + cofactor * (1.0 / volume)) * 0.5;
     for _ in 0..30 {
@@ -76,7 +76,11 @@ fn rotation(f: DMat3, cofactor: DMat3, volume: f64) -> DMat3 {
         let change = next - rotation;
         rotation = next;
         let largest = |column: DVec3| column.abs().max_element();
-        if largest(change.x_axis).max(largest(change.y_axis)).max(largest(change.z_axis)) < 1e-15 {
+        if largest(change.x_axis)
+            .max(largest(change.y_axis))
+            .max(largest(change.z_axis))
+            < 1e-15
+        {
             break;
         }
     }

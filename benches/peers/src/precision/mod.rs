@@ -1,5 +1,6 @@
 //! Error against time of every engine in every scene, at 60 frames a second.
 
+mod follow;
 mod implicit_euler;
 pub mod law;
 mod machine;
@@ -15,17 +16,12 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 
 use crate::contender::target;
-use crate::players::{self, Engine, Line, Played};
+use crate::players::{self, Engine, Line, Said};
 use crate::scenes::{self, Measure, Scene, tip_ratio};
+use follow::follow;
 use law::Law;
 use motion::{Motion, relative_difference};
 use reference::Reference;
-
-/// A line ends once a point is as near to the reference as this: well below the finest target.
-const FINE_ENOUGH: f64 = 3e-4;
-
-/// A line is flat where two halvings of the step leave more than this of its error.
-const FLAT: f64 = 0.8;
 
 /// What a player is said to do whose step is too long.
 pub const DIVERGES: &str = "it diverges";
@@ -65,6 +61,17 @@ pub struct LineOutcome {
     pub end: End,
 }
 
+impl LineOutcome {
+    fn failed(line: &Line, reason: &str) -> Self {
+        Self {
+            name: line.name.clone(),
+            law: line.law,
+            points: Vec::new(),
+            end: End::Failed(reason.into()),
+        }
+    }
+}
+
 /// A point of a diagram.
 pub struct Point {
     pub settings: String,
@@ -72,6 +79,8 @@ pub struct Point {
     pub seconds: f64,
     /// A part of the motion.
     pub error: f64,
+    /// Of the nodes at the last frame, on the mean, m.
+    pub height: f64,
 }
 
 /// Why a line has no further points.
@@ -111,7 +120,11 @@ pub fn compare(request: &Request) {
         // After each scene: a run that is cut short has measured something.
         report(&outcomes, &programs, &[]);
     }
-    let beams = if "sofa".contains(&request.scene) { sofa::measure() } else { Vec::new() };
+    let beams = if "sofa".contains(&request.scene) {
+        sofa::measure()
+    } else {
+        Vec::new()
+    };
     report(&outcomes, &programs, &beams);
 }
 
@@ -151,12 +164,23 @@ fn simulate(scene: Scene, programs: &[(Engine, Result<Vec<PathBuf>, String>)], l
         outcome.lines = program.clone().and_then(|program| {
             let lines = (engine.lines)(&scene)?;
             let play = |line: &Line| {
+                if let Some(ball) = scene.model.ball {
+                    let deepest = |motion: &Motion| motion.deepest(&ball).max(0.0) / ball.radius;
+                    return follow(&scene, engine.name, &program, line, &deepest, limit);
+                }
                 let reference = references.entry(line.law).or_insert_with(|| {
                     eprintln!("{}: reference, {}", scene.name, line.law.name());
                     reference::converged(&scene.model, line.law, &folder)
                 });
-                let reference = reference.as_ref().map(|reference| measured(&scene, &reference.motion));
-                follow(&scene, engine.name, &program, line, reference.as_ref(), limit)
+                let Some(reference) = reference else {
+                    return (
+                        LineOutcome::failed(line, "its law has no converged reference here"),
+                        Said::default(),
+                    );
+                };
+                let reference = measured(&scene, &reference.motion);
+                let error = |motion: &Motion| relative_difference(&measured(&scene, motion), &reference);
+                follow(&scene, engine.name, &program, line, &error, limit)
             };
             let mut outcomes = Vec::new();
             for (line, said) in lines.iter().map(play) {
@@ -194,87 +218,10 @@ fn simulate(scene: Scene, programs: &[(Engine, Result<Vec<PathBuf>, String>)], l
     }
 }
 
+/// The part of a motion that a scene asks for.
 fn measured(scene: &Scene, motion: &Motion) -> Motion {
     match scene.measure {
-        Measure::Motion => motion.clone(),
+        Measure::Motion | Measure::Contact => motion.clone(),
         Measure::Rest => motion.end(),
-    }
-}
-
-/// Plays a line's points from coarse to fine, until it need not or may not go on.
-fn follow(
-    scene: &Scene,
-    engine: &str,
-    program: &[PathBuf],
-    line: &Line,
-    reference: Option<&Motion>,
-    limit: f64,
-) -> (LineOutcome, players::Said) {
-    let mut outcome = LineOutcome {
-        name: line.name.clone(),
-        law: line.law,
-        points: Vec::new(),
-        end: End::Tried,
-    };
-    let mut said = players::Said::default();
-    let Some(reference) = reference else {
-        outcome.end = End::Failed("its law has no converged reference here".into());
-        return (outcome, said);
-    };
-    let simulated = scene.model.frames as f64 * model::FRAME;
-    let mut failure = None;
-    for settings in &line.points {
-        let (played, words) = players::play(program, &scene.model, settings, limit * simulated);
-        said.version = words.version.or(said.version);
-        said.notes.extend(words.notes);
-        let label = settings.join(" ");
-        match played {
-            Played::Whole { motion, seconds } => {
-                let error = relative_difference(&measured(scene, &motion), reference);
-                let seconds = seconds / simulated;
-                eprintln!("{}: {engine}, {}, {label}: {seconds:.4} s, {error:.2e}", scene.name, line.name);
-                outcome.points.push(Point {
-                    settings: label,
-                    seconds,
-                    error,
-                });
-            }
-            Played::Cut { expected } => {
-                eprintln!("{}: {engine}, {}, {label}: over the limit", scene.name, line.name);
-                outcome.end = End::Limit(expected / simulated);
-                return (outcome, said);
-            }
-            Played::Refused(reason) => {
-                eprintln!("{}: {engine}, {}, {label}: {reason}", scene.name, line.name);
-                if reason != DIVERGES {
-                    said.notes.push(format!("{}, {label}: {reason}", line.name));
-                }
-                // An engine that cannot do it says the same again; one that is unstable may not be with finer steps.
-                if failure.as_ref() == Some(&reason) && reason != DIVERGES {
-                    break;
-                }
-                failure = Some(reason);
-            }
-        }
-        if outcome.points.last().is_some_and(|point| point.error < FINE_ENOUGH) {
-            outcome.end = End::Reached;
-            return (outcome, said);
-        }
-        if is_flat(&outcome.points) {
-            outcome.end = End::Flat;
-            return (outcome, said);
-        }
-    }
-    if let (true, Some(reason)) = (outcome.points.is_empty(), failure) {
-        outcome.end = End::Failed(reason);
-    }
-    (outcome, said)
-}
-
-/// Whether two halvings of the step have changed little. The first points of a line may be flat because they are coarse.
-fn is_flat(points: &[Point]) -> bool {
-    match points {
-        [_, .., a, _, c] => c.error > FLAT * a.error && a.error < 0.3,
-        _ => false,
     }
 }

@@ -8,6 +8,20 @@ use crate::precision::law::Law;
 /// Frames are of this length, s.
 pub const FRAME: f64 = 1.0 / 60.0;
 
+/// A rigid ball that stays where it is, without friction.
+#[derive(Clone, Copy, Debug)]
+pub struct Ball {
+    pub center: [f64; 3],
+    pub radius: f64,
+}
+
+impl Ball {
+    /// How deep a point is inside, m; below 0 outside.
+    pub fn depth(&self, point: [f64; 3]) -> f64 {
+        self.radius - glam::DVec3::from(point).distance(self.center.into())
+    }
+}
+
 /// A scene's bodies and what acts on them. Numbers are `f64`; engines round them as they must.
 #[derive(Clone, Debug, Default)]
 pub struct Model {
@@ -19,6 +33,10 @@ pub struct Model {
     pub pinned: Vec<usize>,
     pub tetrahedra: Vec<[usize; 4]>,
     pub springs: Vec<[usize; 2]>,
+    /// The surface of what meets the ball.
+    pub triangles: Vec<[usize; 3]>,
+    /// What stands in the way.
+    pub ball: Option<Ball>,
     /// N/m, of every spring. Springs are at rest where they begin.
     pub stiffness: f64,
     /// Pa.
@@ -77,6 +95,17 @@ impl Model {
         for [a, b] in &self.springs {
             let _ = writeln!(text, "{a} {b}");
         }
+        if let Some(Ball {
+            center: [x, y, z],
+            radius,
+        }) = self.ball
+        {
+            let _ = writeln!(text, "triangles {}", self.triangles.len());
+            for [a, b, c] in &self.triangles {
+                let _ = writeln!(text, "{a} {b} {c}");
+            }
+            let _ = writeln!(text, "ball 1\n{x} {y} {z} {radius}");
+        }
         text
     }
 
@@ -85,10 +114,14 @@ impl Model {
         let mut words = text.split_ascii_whitespace();
         let mut model = Self::default();
         while let Some(name) = words.next() {
-            let mut number = || words.next().and_then(|word| word.parse::<f64>().ok()).expect("a number");
+            let mut number = || {
+                words
+                    .next()
+                    .and_then(|word| word.parse::<f64>().ok())
+                    .expect("a number")
+            };
             let value = number();
             let count = value as usize;
-            let mut index = || number() as usize;
             match name {
                 "frame" => assert_eq!(value, FRAME),
                 "frames" => model.frames = count,
@@ -103,9 +136,31 @@ impl Model {
                         model.masses.push(number());
                     }
                 }
-                "pinned" => model.pinned = (0..count).map(|_| index()).collect(),
-                "tetrahedra" => model.tetrahedra = (0..count).map(|_| [index(), index(), index(), index()]).collect(),
-                "springs" => model.springs = (0..count).map(|_| [index(), index()]).collect(),
+                "pinned" => model.pinned = (0..count).map(|_| number() as usize).collect(),
+                "tetrahedra" => {
+                    model.tetrahedra = (0..count)
+                        .map(|_| {
+                            [
+                                number() as usize,
+                                number() as usize,
+                                number() as usize,
+                                number() as usize,
+                            ]
+                        })
+                        .collect()
+                }
+                "triangles" => {
+                    model.triangles = (0..count)
+                        .map(|_| [number() as usize, number() as usize, number() as usize])
+                        .collect()
+                }
+                "ball" => {
+                    model.ball = Some(Ball {
+                        center: [number(), number(), number()],
+                        radius: number(),
+                    });
+                }
+                "springs" => model.springs = (0..count).map(|_| [number() as usize, number() as usize]).collect(),
                 other => panic!("{other} is no section of a model"),
             }
         }

@@ -1,6 +1,6 @@
 //! Where nodes are at the end of each frame, and how far two motions are apart.
 
-use crate::precision::model::Model;
+use crate::precision::model::{Ball, Model};
 
 /// The nodes' positions at the start and at the end of each frame.
 #[derive(Clone)]
@@ -25,6 +25,18 @@ impl Motion {
     pub fn end(&self) -> Self {
         let last = self.frames.last().cloned();
         Self::new(self.start.clone(), last.into_iter().collect())
+    }
+
+    /// How deep any node is in a ball at the end of any frame, m; below 0 where none is.
+    pub fn deepest(&self, ball: &Ball) -> f64 {
+        let depths = self.frames.iter().flatten().map(|&place| ball.depth(place));
+        depths.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The mean height of the nodes at the last frame, m.
+    pub fn height(&self) -> f64 {
+        let last = self.frames.last().map_or(&self.start, |frame| frame);
+        last.iter().map(|place| place[1]).sum::<f64>() / last.len() as f64
     }
 
     /// Whether every coordinate is a number.

@@ -68,7 +68,8 @@ impl Panel {
     }
 
     fn line<'a>(&self, points: impl Iterator<Item = &'a Point> + Clone, color: &str, dashes: &str) -> String {
-        let mut text = format!("<polyline fill='none' stroke='{color}' stroke-width='1.5' stroke-dasharray='{dashes}' points='");
+        let mut text =
+            format!("<polyline fill='none' stroke='{color}' stroke-width='1.5' stroke-dasharray='{dashes}' points='");
         for point in points.clone() {
             let _ = write!(text, "{:.1},{:.1} ", self.x(point.seconds), self.y(point.error));
         }

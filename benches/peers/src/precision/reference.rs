@@ -72,7 +72,11 @@ fn read(file: &Path, model: &Model) -> Option<Reference> {
 fn write(file: &Path, reference: &Reference) {
     let head = [reference.doubt, reference.substeps as f64];
     let positions = reference.motion.frames.iter().flatten().flatten();
-    let bytes: Vec<u8> = head.iter().chain(positions).flat_map(|number| number.to_le_bytes()).collect();
+    let bytes: Vec<u8> = head
+        .iter()
+        .chain(positions)
+        .flat_map(|number| number.to_le_bytes())
+        .collect();
     if let Err(error) = std::fs::write(file, bytes) {
         eprintln!("{}: {error}", file.display());
     }

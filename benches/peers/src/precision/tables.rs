@@ -16,19 +16,29 @@ the RMS displacement there; at rest it is that of the last frame. A line ends wh
 halvings of the step change little, or where a point would take longer than the limit.
 ";
 
-/// Whether a scene is one of those that are timed, not a check.
+/// Whether a scene has errors against time: it is no check, and nothing is in its way.
 pub fn is_timed(outcome: &Outcome) -> bool {
-    checks().iter().all(|check| check.name != outcome.scene.name)
+    outcome.scene.measure != Measure::Contact && checks().iter().all(|check| check.name != outcome.scene.name)
 }
 
 /// The whole report.
 pub fn markdown(outcomes: &[Outcome], notes: &[(&str, &str)], beams: &[sofa::Row]) -> String {
-    let mut text = format!("# Engines: error against time\n\nMachine: {}.\n\n{METHOD}\n", machine::processor());
-    text += "## Summary\n\nSeconds of one thread for a simulated second, for an error of at most 10 % / 1 % / 0.1 %.\n\n";
+    let mut text = format!(
+        "# Engines: error against time\n\nMachine: {}.\n\n{METHOD}\n",
+        machine::processor()
+    );
+    text +=
+        "## Summary\n\nSeconds of one thread for a simulated second, for an error of at most 10 % / 1 % / 0.1 %.\n\n";
     text += &summary(outcomes);
     text += &checked(outcomes);
     for outcome in outcomes.iter().filter(|outcome| is_timed(outcome)) {
         text += &scene(outcome);
+    }
+    for outcome in outcomes
+        .iter()
+        .filter(|outcome| outcome.scene.measure == Measure::Contact)
+    {
+        text += &contact(outcome);
     }
     text += &sofa::markdown(beams);
     text += "## Engines\n\n";
@@ -81,7 +91,10 @@ fn cell(outcome: &Outcome, row: usize, target: f64) -> String {
 /// Free fall, which players pass before their times mean anything.
 fn checked(outcomes: &[Outcome]) -> String {
     let mut text = String::from("## Checks\n\nThe least error of each engine in free fall.\n\n");
-    for outcome in outcomes.iter().filter(|outcome| !is_timed(outcome)) {
+    for outcome in outcomes
+        .iter()
+        .filter(|outcome| checks().iter().any(|check| check.name == outcome.scene.name))
+    {
         let least = outcome.engines.iter().map(|engine| {
             let points = engine.lines.iter().flatten().flat_map(|line| &line.points);
             match points.map(|point| point.error).min_by(f64::total_cmp) {
@@ -89,7 +102,12 @@ fn checked(outcomes: &[Outcome]) -> String {
                 None => format!("{} -", engine.name),
             }
         });
-        let _ = writeln!(text, "- {}: {}", outcome.scene.about, least.collect::<Vec<_>>().join(", "));
+        let _ = writeln!(
+            text,
+            "- {}: {}",
+            outcome.scene.about,
+            least.collect::<Vec<_>>().join(", ")
+        );
     }
     text.push('\n');
     text
@@ -105,7 +123,11 @@ fn scene(outcome: &Outcome) -> String {
         model.tetrahedra.len(),
         model.springs.len(),
         model.frames,
-        if outcome.scene.measure == Measure::Rest { ", error of the last" } else { "" }
+        if outcome.scene.measure == Measure::Rest {
+            ", error of the last"
+        } else {
+            ""
+        }
     );
     for (law, doubt, substeps) in &outcome.references {
         let _ = writeln!(
@@ -149,6 +171,40 @@ fn scene(outcome: &Outcome) -> String {
     for engine in &outcome.engines {
         for note in engine.notes.iter().take(12) {
             let _ = writeln!(text, "- {}: {note}", engine.name);
+        }
+    }
+    text.push('\n');
+    text
+}
+
+/// Time beside penetration.
+fn contact(outcome: &Outcome) -> String {
+    let radius = outcome.scene.model.ball.map_or(1.0, |ball| ball.radius);
+    let mut text = format!(
+        "## {}\n\n{}. A line ends where no node is inside at the end of any frame; the mean height at the end tells whether all \
+         fell alike.\n\n| engine | line | settings | s | deepest, mm | height, mm |\n|---|---|---|---|---|---|\n",
+        outcome.scene.name, outcome.scene.about
+    );
+    for engine in &outcome.engines {
+        if let Err(reason) = &engine.lines {
+            let _ = writeln!(text, "| {} | | not simulated: {reason} | | | |", engine.name);
+        }
+        for line in engine.lines.iter().flatten() {
+            if line.points.is_empty() {
+                let _ = writeln!(text, "| {} | {} | {} | | | |", engine.name, line.name, end(&line.end));
+            }
+            for point in &line.points {
+                let _ = writeln!(
+                    text,
+                    "| {} | {} | {} | {} | {:.3} | {:.1} |",
+                    engine.name,
+                    line.name,
+                    point.settings,
+                    number(point.seconds),
+                    1e3 * radius * point.error,
+                    1e3 * point.height
+                );
+            }
         }
     }
     text.push('\n');

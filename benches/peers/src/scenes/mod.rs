@@ -2,6 +2,7 @@
 
 mod cantilever;
 mod cloth;
+mod draped_cloth;
 mod free_fall;
 mod jelly;
 mod mesh;
@@ -30,6 +31,8 @@ pub enum Measure {
     Motion,
     /// At the last frame, when a damped body rests.
     Rest,
+    /// How deep nodes are in the ball at the end of frames, in parts of its radius. There is no reference.
+    Contact,
 }
 
 /// The scenes that are timed.
@@ -41,6 +44,7 @@ pub fn timed() -> Vec<Scene> {
         organ::scene(),
         cloth::scene(),
         rope::scene(),
+        draped_cloth::scene(),
     ]
 }
 

@@ -8,9 +8,13 @@ const SPRINGS: usize = 40;
 pub fn scene() -> Scene {
     Scene {
         name: "rope",
-        about: "a chain of 40 springs of 2000 N/m, 1 m long, 5 g a node, held at one end and released from the horizontal".into(),
+        about:
+            "a chain of 40 springs of 2000 N/m, 1 m long, 5 g a node, held at one end and released from the horizontal"
+                .into(),
         model: Model {
-            positions: (0..=SPRINGS).map(|node| [node as f64 / SPRINGS as f64, 0.0, 0.0]).collect(),
+            positions: (0..=SPRINGS)
+                .map(|node| [node as f64 / SPRINGS as f64, 0.0, 0.0])
+                .collect(),
             masses: vec![5e-3; SPRINGS + 1],
             pinned: vec![0],
             springs: (0..SPRINGS).map(|node| [node, node + 1]).collect(),

@@ -13,7 +13,9 @@ pub struct SofaBeam {
 }
 
 pub fn sofa_beams() -> Vec<SofaBeam> {
-    [([40, 10, 10], 33.6), ([76, 16, 16], 109.0)].map(|(nodes, published)| beam(nodes, published)).into()
+    [([40, 10, 10], 33.6), ([76, 16, 16], 109.0)]
+        .map(|(nodes, published)| beam(nodes, published))
+        .into()
 }
 
 fn beam(counts: [usize; 3], published: f64) -> SofaBeam {
