@@ -162,7 +162,8 @@ int main(int count, char **arguments) {
         soft->setGravity(gravity);
         soft->getWorldInfo().m_gravity = gravity;
         soft->getWorldInfo().air_density = 0;
-        soft->getWorldInfo().m_sparsesdf.Initialize();
+        soft->getWorldInfo().m_sparsesdf.setDefaultVoxelsz(btScalar(0.01));
+        soft->getWorldInfo().m_sparsesdf.Reset();
         body = build(model, soft->getWorldInfo(), kind, iterations, step);
         soft->addSoftBody(body);
     } else {
@@ -176,7 +177,7 @@ int main(int count, char **arguments) {
         solver = std::move(constraints);
         soft->setGravity(gravity);
         soft->getWorldInfo().m_gravity = gravity;
-        soft->getWorldInfo().m_sparsesdf.setDefaultVoxelsz(0.25);
+        soft->getWorldInfo().m_sparsesdf.setDefaultVoxelsz(btScalar(0.01));
         soft->getWorldInfo().m_sparsesdf.Reset();
         body = build(model, soft->getWorldInfo(), kind, iterations, step);
         soft->addSoftBody(body);

@@ -13,6 +13,9 @@ const FINE_ENOUGH: f64 = 3e-4;
 /// A line is flat where two halvings of the step leave more than this of its error.
 const FLAT: f64 = 0.8;
 
+/// How many times the limit the first point of a line may take that is any good.
+const PATIENCE: f64 = 4.0;
+
 /// Plays a line's points from coarse to fine, until it need not or may not go on.
 pub fn follow(
     scene: &Scene,
@@ -32,6 +35,9 @@ pub fn follow(
     let simulated = scene.model.frames as f64 * model::FRAME;
     let mut failure = None;
     for settings in &line.points {
+        // A line that needs fine steps from the start has its chance.
+        let is_begun = outcome.points.iter().any(|point| point.error < 1.0);
+        let limit = if is_begun { limit } else { PATIENCE * limit };
         let (played, words) = players::play(program, &scene.model, settings, limit * simulated);
         said.version = words.version.or(said.version);
         said.notes.extend(words.notes);
