@@ -52,7 +52,7 @@ fn lines(scene: &Scene) -> Vec<Line> {
         ];
     }
     vec![
-        Line::doubling("deformable, explicit", Law::NeoHookean, &["kind=explicit"], 16, 4096),
+        Line::doubling("deformable, explicit", Law::NeoHookean, &["kind=explicit"], 32, 4096),
         Line::doubling("deformable, implicit", Law::NeoHookean, &["kind=implicit"], 1, 4096),
         Line::doubling(
             "deformable, implicit, 10 Newton iterations",
