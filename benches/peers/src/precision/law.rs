@@ -1,7 +1,7 @@
 //! The laws of tetrahedra that engines use, in double precision. Each has the same Young's modulus and Poisson's ratio at
 //! small strains; they differ at large ones, so every law has a reference of its own.
 
-use glam::{DMat3, DVec3};
+use glam::DMat3;
 
 /// How the tetrahedra of a model resist deformation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -16,8 +16,6 @@ pub enum Law {
     PlainNeoHookean,
     /// St Venant and Kirchhoff's: `mu tr E² + lambda/2 (tr E)²`.
     StVenantKirchhoff,
-    /// Linear elasticity in the frame of each tetrahedron's rotation R: `mu |F - R|² + lambda/2 tr(R'F - 1)²`.
-    Corotated,
 }
 
 impl Law {
@@ -29,7 +27,6 @@ impl Law {
             Self::NeoHookean => "neo-hookean",
             Self::PlainNeoHookean => "plain-neo-hookean",
             Self::StVenantKirchhoff => "st-venant-kirchhoff",
-            Self::Corotated => "corotated",
         }
     }
 
@@ -55,36 +52,12 @@ impl Law {
                 let strain = green();
                 f * (strain * (2.0 * mu) + DMat3::IDENTITY * (lambda * trace(strain)))
             }
-            Self::Corotated => {
-                let rotation = rotation(f, cofactor, volume);
-                let stretch = trace(rotation.transpose() * f) - 3.0;
-                (f - rotation) * (2.0 * mu) + rotation * (lambda * stretch)
-            }
         }
     }
 }
 
 fn trace(matrix: DMat3) -> f64 {
     matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z
-}
-
-/// The rotation of a deformation that is not inverted: Newton's iteration for the polar decomposition (Higham).
-fn rotation(f: DMat3, cofactor: DMat3, volume: f64) -> DMat3 {
-    let mut rotation = (f + cofactor * (1.0 / volume)) * 0.5;
-    for _ in 0..30 {
-        let next = (rotation + rotation.inverse().transpose()) * 0.5;
-        let change = next - rotation;
-        rotation = next;
-        let largest = |column: DVec3| column.abs().max_element();
-        if largest(change.x_axis)
-            .max(largest(change.y_axis))
-            .max(largest(change.z_axis))
-            < 1e-15
-        {
-            break;
-        }
-    }
-    rotation
 }
 
 #[cfg(test)]
@@ -103,7 +76,6 @@ mod tests {
             Law::NeoHookean,
             Law::PlainNeoHookean,
             Law::StVenantKirchhoff,
-            Law::Corotated,
         ] {
             let difference = law.stress(DMat3::IDENTITY + strain, mu, lambda) - hooke;
             for value in difference.to_cols_array() {

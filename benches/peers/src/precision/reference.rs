@@ -13,7 +13,7 @@ use crate::precision::motion::{Motion, relative_difference};
 const SURE: f64 = 3e-5;
 
 /// No more substeps per frame are tried.
-const MOST_SUBSTEPS: usize = 8192;
+const MOST_SUBSTEPS: usize = 2048;
 
 /// A converged motion.
 pub struct Reference {

@@ -13,7 +13,7 @@ pub fn scene() -> Scene {
         pinned: nodes(&block.positions, |[_, y, _]| y < 0.5 * EDGE),
         positions: block.positions,
         tetrahedra: block.tetrahedra,
-        young: 5e3,
+        young: 1e4,
         poisson: 0.3,
         gravity: 9.81,
         frames: 60,
@@ -22,7 +22,7 @@ pub fn scene() -> Scene {
     model.fill(1000.0);
     Scene {
         name: "jelly",
-        about: "a cube of 0.1 m, 8 x 8 x 8 cubes in five tetrahedra each, bonded to a floor, compressed by its weight: E = 5 kPa, \
+        about: "a cube of 0.1 m, 8 x 8 x 8 cubes in five tetrahedra each, bonded to a floor, compressed by its weight: E = 10 kPa, \
                 nu = 0.3, 1000 kg/m³"
             .into(),
         model,
