@@ -9,6 +9,11 @@ use crate::soa::{TILE, tile_count};
 use crate::world::World;
 
 /// A color, 8 bits each, from the highest: red, green, blue, opacity.
+///
+/// ```
+/// let color: sinew::Rgba = 0xff80_00ff;
+/// assert_eq!(color.to_be_bytes(), [255, 128, 0, 255]);
+/// ```
 pub type Rgba = u32;
 
 const PRESSED: Rgba = 0xff40_30ff;
@@ -24,6 +29,28 @@ const COMPRESSED: [f32; 3] = [0.1, 0.3, 1.0];
 const STRETCHED: [f32; 3] = [1.0, 0.15, 0.1];
 
 /// What draws. Places are in the world's coordinates, m.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// #[derive(Default)]
+/// struct LineList(Vec<[Vec3; 2]>);
+/// impl DebugCanvas for LineList {
+///     fn line(&mut self, ends: [Vec3; 2], _: Rgba) { self.0.push(ends); }
+///     fn point(&mut self, _: Vec3, _: Rgba) {}
+///     fn triangle(&mut self, _: [Vec3; 3], _: Rgba) {}
+/// }
+/// let mut lines = LineList::default();
+/// world.debug_draw(&DebugDrawDefinition::default(), &mut lines)?;
+/// assert!(lines.0.len() > mesh.edges()?.len());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 pub trait DebugCanvas {
     /// A line between two points.
     fn line(&mut self, ends: [Vec3; 2], color: Rgba);
@@ -34,6 +61,29 @@ pub trait DebugCanvas {
 }
 
 /// What is drawn.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// # struct LineCount(usize);
+/// # impl DebugCanvas for LineCount {
+/// #     fn line(&mut self, _: [Vec3; 2], _: Rgba) { self.0 += 1; }
+/// #     fn point(&mut self, _: Vec3, _: Rgba) {}
+/// #     fn triangle(&mut self, _: [Vec3; 3], _: Rgba) {}
+/// # }
+/// # let mut lines = LineCount(0);
+/// let definition = DebugDrawDefinition { bounds: false, ..DebugDrawDefinition::default() };
+/// world.debug_draw(&definition, &mut lines)?;
+/// // Springs alone: nothing is touched or attached.
+/// assert_eq!(lines.0, world.body(body)?.spring_pairs()?.len());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DebugDrawDefinition {
     /// A point where a tool pressed a body when the last step ended, and a line along the force on the tool.

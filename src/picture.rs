@@ -11,6 +11,21 @@ use crate::raster::{self, Camera, ColourScale, Coloured, Image, Lines, Look, Sce
 use crate::world::World;
 
 /// How a world is drawn.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// let definition = PictureDefinition { width: 64, height: 48, ..PictureDefinition::default() };
+/// let picture = world.picture(&definition)?;
+/// assert_eq!((picture.width, picture.height), (64, 48));
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureDefinition {
     /// Pixels, 1 to 16384.
@@ -46,6 +61,24 @@ impl Default for PictureDefinition {
 }
 
 /// A body that is coloured by a number for each of its nodes, such as strain or a force.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// # let definition = PictureDefinition { width: 64, height: 48, ..PictureDefinition::default() };
+/// use sinew::raster::{ColourScale, Colours};
+/// let heat: Vec<f32> = mesh.positions.iter().map(|place| place.x).collect();
+/// let scale = ColourScale { colours: Colours::Diverging, low: -0.05, high: 0.05 };
+/// let picture = world.picture_of_values(&definition, &[BodyValues { body, values: &heat, scale }])?;
+/// assert_ne!(picture, world.picture(&definition)?);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyValues<'a> {
     /// Which.

@@ -13,6 +13,21 @@ use crate::geometry::predicates::pierce;
 use crate::world::World;
 
 /// A point of a body's surface.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// let hit = world.cast_ray(vec3(0.01, 0.5, 0.02), Vec3::NEG_Y, 1.0)?.expect("the cloth is below");
+/// assert_eq!(hit.body, body);
+/// assert!((hit.distance - 0.5).abs() < 1e-6);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceHit {
     /// The body it belongs to.
@@ -30,6 +45,18 @@ pub struct SurfaceHit {
 }
 
 /// What a ray meets.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.1 }))?;
+/// match world.cast_ray_at(Vec3::Y, Vec3::NEG_Y, 2.0, CollisionFilter::ALL)? {
+///     Some(RayHit::Tool { tool, distance, .. }) => assert!(tool == ball && (distance - 0.9).abs() < 1e-6),
+///     other => panic!("{other:?}"),
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RayHit {
     /// The surface of a body.

@@ -17,6 +17,22 @@ const MOST_READERS: usize = 126;
 ///
 /// Made by [`World::create_reader`](crate::World::create_reader), and owned by the thread that reads, to which it may be sent. It outlives the body
 /// and the world, and ends on any thread.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// let mut reader = world.create_reader(body)?;
+/// world.step(1.0 / 60.0)?;
+/// let lowest = std::thread::spawn(move || reader.read().positions[12].y);
+/// assert_eq!(lowest.join().expect("no panic"), world.body(body)?.positions()[12].y);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct BodyReader {
     reader: PoolReader<Snapshot>,
@@ -24,6 +40,23 @@ pub struct BodyReader {
 }
 
 /// What a reader sees of a body: all of one moment.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// let mut reader = world.create_reader(body)?;
+/// world.step(1.0 / 60.0)?;
+/// let frame = reader.read();
+/// assert!(frame.is_new && !frame.is_over);
+/// assert_eq!(frame.step, 1);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame<'a> {
     /// Where each node is, m, in the caller's order, with those that cuts have added: [`Body::positions`](crate::Body::positions).

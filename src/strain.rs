@@ -13,6 +13,17 @@ use crate::base::{Error, Result, memory};
 use crate::def::{Values, check_values, expect_count, finite_vectors, node_indices};
 
 /// How a triangle or tetrahedron is strained. What has no area or volume at rest has no strain: 0.
+///
+/// ```
+/// # use glam::Vec3;
+/// use sinew::strain::{Strain, of_triangles};
+/// let rest = [Vec3::ZERO, Vec3::X, Vec3::Z];
+/// let stretched = [Vec3::ZERO, 1.5 * Vec3::X, Vec3::Z];
+/// let mut strains = [Strain::default()];
+/// of_triangles(&rest, &stretched, &[[0, 2, 1]], &mut strains)?;
+/// assert_eq!(strains[0], Strain { largest: 0.5, smallest: 0.0, growth: 0.5 });
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Strain {

@@ -49,6 +49,15 @@ pub use sutures::{SutureDefinition, SutureReport};
 const FRAME: f32 = 1.0 / 60.0;
 
 /// How a world steps.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// let definition = WorldDefinition { gravity: 1.62 * Vec3::NEG_Y, thread_count: 2, ..WorldDefinition::default() };
+/// let world = World::new(definition)?;
+/// assert_eq!(world.gravity().y, -1.62);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorldDefinition {
     /// m/s².
@@ -86,6 +95,23 @@ impl Default for WorldDefinition {
 }
 
 /// Bodies and tools that are stepped together.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// let mut world = World::new(WorldDefinition::default())?;
+/// let body = world.create_body(&cloth)?;
+/// for _ in 0..6 {
+///     world.step(1.0 / 60.0)?;
+/// }
+/// // After 0.1 s of free fall.
+/// assert!((world.body(body)?.positions()[0].y + 0.049).abs() < 1e-3);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct World {
     definition: WorldDefinition,

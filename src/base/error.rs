@@ -3,6 +3,16 @@
 use super::StepReport;
 
 /// Why a call was refused or failed. A call that answers with an error has changed nothing.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// let refused = world.step(-1.0);
+/// assert!(matches!(refused, Err(Error::InvalidArgument(_))));
+/// assert_eq!(world.step_count(), 0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Error {
     /// An argument is out of its range; the message names it and its value.
@@ -31,6 +41,15 @@ pub enum Error {
 }
 
 /// What calls that can fail return.
+///
+/// ```
+/// use sinew::{Result, mesh::Mesh};
+/// fn weight(mesh: &Mesh, density: f64) -> Result<f64> {
+///     Ok(9.81 * density * mesh.volume()?)
+/// }
+/// assert!((weight(&Mesh::block([0.1, 0.1, 0.1], [1, 1, 1])?, 1000.0)? - 9.81).abs() < 1e-4);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {

@@ -3,6 +3,20 @@
 use super::ids::BodyId;
 
 /// What bounds the substeps of a body.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { max_substeps: 1, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # world.create_body(&BodyDefinition { solver: Solver::Verlet, ..cloth })?;
+/// let Err(Error::Unstable { report, .. }) = world.step(1.0 / 60.0) else { panic!("a single substep suffices") };
+/// assert_eq!(report.limit.map(|limit| limit.of.kind), Some(LimitKind::Spring));
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimitKind {
     /// The springs of a node.
@@ -34,6 +48,25 @@ impl LimitKind {
 }
 
 /// The part of a body that allows the shortest substep.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { max_substeps: 1, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # world.create_body(&BodyDefinition { solver: Solver::Verlet, ..cloth })?;
+/// if let Err(Error::Unstable { report: StepReport { limit: Some(limit), .. }, .. }) = world.step(1.0 / 60.0) {
+///     let SubstepLimit { kind, nodes, node_count } = limit.of;
+///     assert_eq!(kind, LimitKind::Spring);
+///     assert!(nodes[..node_count as usize].iter().all(|&node| node < 25));
+/// # } else {
+/// #     panic!("a single substep suffices");
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SubstepLimit {
     /// What it is.
@@ -61,6 +94,22 @@ impl SubstepLimit {
 }
 
 /// What a step did.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// let report = world.step(1.0 / 60.0)?;
+/// assert!(report.substeps as f32 * report.stable_substep >= 1.0 / 60.0);
+/// assert_eq!(report.substeps_body, Some(body));
+/// assert_eq!(report.restored_body, None);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
     /// The most substeps that any body took.
@@ -86,6 +135,25 @@ pub struct StepReport {
 }
 
 /// The body that needs more substeps than are allowed.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { max_substeps: 1, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&BodyDefinition { solver: Solver::Verlet, ..cloth })?;
+/// if let Err(Error::Unstable { report: StepReport { limit: Some(limit), .. }, .. }) = world.step(1.0 / 60.0) {
+///     assert_eq!(limit.body, body);
+///     world.set_substeps(0, limit.needed)?;
+/// # } else {
+/// #     panic!("a single substep suffices");
+/// }
+/// assert!(world.step(1.0 / 60.0).is_ok());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepLimit {
     /// Which.

@@ -5,6 +5,27 @@ use crate::codec::saved;
 use crate::cutting::Changes;
 
 /// Where a node that a cut added comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// let mut texture: Vec<f32> = mesh.positions.iter().map(|place| place.x).collect();
+/// world.cut(sheet, &across)?;
+/// for new in world.body(sheet)?.changes_since(0)?.nodes {
+///     let parts = new.sources.iter().zip(new.weights);
+///     texture.push(parts.map(|(&source, weight)| weight * texture[source as usize]).sum());
+/// }
+/// assert_eq!(texture.len(), world.body(sheet)?.node_count());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewNodeSource {
@@ -20,6 +41,26 @@ pub struct NewNodeSource {
 saved! { NewNodeSource { node, sources, weights } }
 
 /// An edge of the rim of a cut. Each edge that was cut is two of them, one on either side.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// world.cut(sheet, &across)?;
+/// let body = world.body(sheet)?;
+/// for edge in body.changes_since(0)?.rim {
+///     let triangle = body.surface()[edge.triangle as usize];
+///     assert!(edge.nodes.iter().all(|node| triangle.contains(node)));
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewRimEdge {
@@ -32,6 +73,25 @@ pub struct NewRimEdge {
 saved! { NewRimEdge { nodes, triangle } }
 
 /// What has come, changed or gone since a version.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// let before = world.body(sheet)?.topology_version();
+/// let report = world.cut(sheet, &across)?;
+/// let changes = world.body(sheet)?.changes_since(before)?;
+/// assert_eq!(changes.nodes.len(), report.new_nodes as usize);
+/// assert!(changes.version > before && !changes.rim.is_empty());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TopologyChanges<'a> {
     /// What the body's topology has now; to be asked with next time.

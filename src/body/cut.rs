@@ -16,6 +16,24 @@ use crate::terms::Parting;
 use crate::tissue::{Skin, SkinChange, SurfaceToBe};
 
 /// What a cut did.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// let report = world.cut(sheet, &across)?;
+/// assert_eq!(report.pieces_parted, 1);
+/// // The sheet is 0.1 m wide.
+/// assert!((report.length - 0.1).abs() < 1e-3);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CutReport {
     /// Nodes that are new: copies of others, and points of the surface that are bound to nodes.

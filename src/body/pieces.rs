@@ -4,6 +4,24 @@ use super::Body;
 use crate::base::{DisjointSets, Result, memory};
 
 /// The pieces of a body.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// world.cut(sheet, &across)?;
+/// let pieces = world.body(sheet)?.pieces()?;
+/// assert_eq!(pieces.count, 2);
+/// assert_ne!(pieces.of_nodes[0], pieces.of_nodes[4]);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pieces {
     /// Of each node, from 0 on in the order of the lowest nodes.

@@ -7,6 +7,21 @@ use crate::solver::{Changed, make_up_for};
 use crate::springs::{Link, SpringChange, not_joined, pull};
 
 /// A spring as it is.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// let body = world.body_mut(body)?;
+/// body.set_springs(&[[0, 1]], Some(Values::Uniform(40.0)), None)?;
+/// assert_eq!(body.springs(&[[0, 1]])?[0], SpringState { stiffness: 40.0, rest_length: 0.025 });
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpringState {
     /// N/m

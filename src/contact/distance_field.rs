@@ -31,6 +31,19 @@ const HALVINGS: u32 = 8;
 const BORDER: f32 = 1e-4;
 
 /// Signed distances at the corners of cubes.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::mesh::{ClosedSurface, Mesh};
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let triangles = mesh.surface()?;
+/// use sinew::detection::distance_field::DistanceField;
+/// let field = DistanceField::new(&ClosedSurface::new(&mesh.positions, &triangles)?, 0.005)?;
+/// // 1 cm above the cube's upper side, and in its middle.
+/// assert!((field.distance(0.06 * Vec3::Y) - 0.01).abs() < 0.001);
+/// assert!(field.distance(Vec3::ZERO) < -0.045);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct DistanceField {
     low: Vec3,

@@ -6,6 +6,28 @@ use crate::base::{BladeId, BodyId, ToolId};
 use crate::codec::saved;
 
 /// Where a tool pressed a body when the last step ended.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let block = world.create_body(&block)?;
+/// # world.body_mut(block)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, -0.019, 1.0))?;
+/// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
+/// # ball.pose.position = 0.03 * Vec3::Y;
+/// # let ball = world.create_tool(&ball)?;
+/// world.set_pose(ball, 0.028 * Vec3::Y, None)?;
+/// world.step(1.0 / 60.0)?;
+/// let contacts: Vec<Contact> = world.contacts(ball)?.collect();
+/// assert!(!contacts.is_empty());
+/// assert!(contacts.iter().all(|contact| contact.body == block && contact.force.y > 0.0));
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// The body.
@@ -23,6 +45,27 @@ pub struct Contact {
 }
 
 /// A tool and a body that began or ceased to touch in the last step.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let block = world.create_body(&block)?;
+/// # world.body_mut(block)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, -0.019, 1.0))?;
+/// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
+/// # ball.pose.position = 0.03 * Vec3::Y;
+/// # let ball = world.create_tool(&ball)?;
+/// world.set_pose(ball, 0.028 * Vec3::Y, None)?;
+/// world.step(1.0 / 60.0)?;
+/// let begun = ContactChange { tool: ball, body: block, has_begun: true };
+/// assert_eq!(world.contact_changes().next(), Some(begun));
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactChange {
     /// The tool.
@@ -34,6 +77,28 @@ pub struct ContactChange {
 }
 
 /// Two bodies that began or ceased to touch in the last step.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let contact = BodyContact { thickness: 0.001, with_bodies: true, ..BodyContact::default() };
+/// # let [lower, upper] = [0, 1].map(|_| world.create_body(&BodyDefinition { contact, ..cloth }));
+/// # let (lower, upper) = (lower?, upper?);
+/// # world.body_mut(lower)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, 1.0, 1.0))?;
+/// # world.body_mut(upper)?.transform(0.01 * Vec3::Y, Quat::IDENTITY, None)?;
+/// let mut changes = Vec::new();
+/// for _ in 0..10 {
+///     world.step(1.0 / 60.0)?;
+///     changes.extend(world.body_contact_changes());
+/// }
+/// assert_eq!(changes.first(), Some(&BodyContactChange { bodies: [lower, upper], has_begun: true }));
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyContactChange {
     /// The bodies.
@@ -43,6 +108,28 @@ pub struct BodyContactChange {
 }
 
 /// A blade and a body of which contact began or ceased in the last step.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, toughness: 0.01, ..cloth })?;
+/// # let mut blade = BladeDefinition::new([0.01 * Vec3::NEG_Y, 0.01 * Vec3::Y]);
+/// # blade.pose.position = vec3(0.003, 0.0, -0.051);
+/// # let blade = world.create_blade(&blade)?;
+/// let mut changes = Vec::new();
+/// for frame in 0..10 {
+///     world.set_blade_pose(blade, vec3(0.003, 0.0, -0.051 + 0.001 * frame as f32), None)?;
+///     world.step(1.0 / 60.0)?;
+///     changes.extend(world.blade_contact_changes());
+/// }
+/// assert_eq!(changes.first(), Some(&BladeContactChange { blade, body: sheet, has_begun: true }));
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BladeContactChange {
     /// The blade.

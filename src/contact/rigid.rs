@@ -20,6 +20,19 @@ const PARTS: f64 = 256.0;
 const HEAVIEST: f32 = 1e12;
 
 /// Mass, centre of mass and inertia of a rigid tool, in the tool's own axes.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))?;
+/// let mass = world.mass_of_density(ball, 7800.0)?;
+/// assert!((mass.mass - 0.0327).abs() < 1e-4);
+/// world.set_dynamic(ball, Some(&mass))?;
+/// world.step(1.0 / 60.0)?;
+/// assert!(world.pose(ball)?.position.y < 0.0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
     /// kg, 1e-12 to 1e12.

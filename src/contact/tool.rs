@@ -16,6 +16,24 @@ use crate::geometry::rotation::{turn_between, turned};
 use crate::mesh::FURTHEST;
 
 /// The shape of a tool, about its own origin.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// # world.body_mut(body)?.transform(0.01 * Vec3::Y, Quat::IDENTITY, None)?;
+/// world.create_tool(&ToolDefinition::new(Shape::Plane))?;
+/// for _ in 0..30 {
+///     world.step(1.0 / 60.0)?;
+/// }
+/// assert!(world.body(body)?.bounds()[0].y > -1e-5);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape<'a> {
     /// A ball.
@@ -47,6 +65,18 @@ pub enum Shape<'a> {
 }
 
 /// Where a tool is and how it is turned.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))?;
+/// let orientation = Quat::from_rotation_x(0.5);
+/// world.set_pose(ball, 0.1 * Vec3::Y, Some(orientation))?;
+/// world.step(1.0 / 60.0)?;
+/// assert_eq!(world.pose(ball)?, Pose { position: 0.1 * Vec3::Y, orientation });
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Metres, each within 1e9 of 0.
@@ -109,6 +139,30 @@ impl Pose {
 }
 
 /// What a tool is. Plain data, used only during [`World::create_tool`](crate::World::create_tool).
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let block = world.create_body(&block)?;
+/// # world.body_mut(block)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, -0.019, 1.0))?;
+/// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
+/// # ball.pose.position = 0.03 * Vec3::Y;
+/// # let ball = world.create_tool(&ball)?;
+/// # world.destroy_tool(ball)?;
+/// let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
+/// ball.pose.position = 0.03 * Vec3::Y;
+/// let ball = world.create_tool(&ball)?;
+/// world.set_pose(ball, 0.028 * Vec3::Y, None)?;
+/// world.step(1.0 / 60.0)?;
+/// assert!(world.wrench(ball)?.0.y > 0.0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolDefinition<'a> {
     /// Its shape.

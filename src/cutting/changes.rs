@@ -3,6 +3,23 @@
 use crate::base::{Result, memory};
 
 /// A part of what a node was before the cut.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let near = sheet.near(&across, &mesh.positions)?;
+/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// for piece in &changes.nodes {
+///     let pieces = changes.nodes.iter().filter(|other| other.source == piece.source);
+///     assert!((pieces.map(|piece| piece.part).sum::<f64>() - 1.0).abs() < 1e-9);
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PieceOfNode {
     /// The node: its source, which keeps its number, or a new one, which starts with its source's position and velocity.
@@ -14,6 +31,23 @@ pub struct PieceOfNode {
 }
 
 /// A part of what a spring was before the cut. It has its source's rest length.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let near = sheet.near(&across, &mesh.positions)?;
+/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// for piece in &changes.springs {
+///     let pieces = changes.springs.iter().filter(|other| other.source == piece.source);
+///     assert!((pieces.map(|piece| piece.part).sum::<f64>() - 1.0).abs() < 1e-9);
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PieceOfSpring {
     /// Its nodes, in the order of `source`.
@@ -25,6 +59,22 @@ pub struct PieceOfSpring {
 }
 
 /// A part of what a cell was before the cut.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let near = sheet.near(&across, &mesh.positions)?;
+/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// // The copies of cells that fell apart are numbered from the last old cell on.
+/// let copies = changes.cells.iter().filter(|piece| piece.cell != piece.source);
+/// assert_eq!(copies.count(), sheet.cells().len() - mesh.triangles.len());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PieceOfCell {
     /// The cell: its source, which keeps its number, or a new one.
@@ -36,6 +86,23 @@ pub struct PieceOfCell {
 }
 
 /// A point of what is drawn that is at no node, but bound to some.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let near = sheet.near(&across, &mesh.positions)?;
+/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// for bound in &changes.bound {
+///     assert!((bound.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+///     assert!(!bound.nodes.contains(&bound.point));
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundPoint {
     /// Its number among nodes.
@@ -47,6 +114,23 @@ pub struct BoundPoint {
 }
 
 /// Where a new node or point that is drawn comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let near = sheet.near(&across, &mesh.positions)?;
+/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// for new in &changes.sources {
+///     assert!(new.point as usize >= mesh.positions.len());
+///     assert!(new.sources.iter().all(|&source| source < new.point));
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Source {
     /// Its number among nodes.
@@ -67,6 +151,22 @@ pub(crate) struct NewVertex {
 
 /// A new edge of the rim: of surfaces each edge that was cut is two of them, one on either side; of solids those where the inside that was bared
 /// meets the skin.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let near = sheet.near(&across, &mesh.positions)?;
+/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// // Each edge of the cut is two of the rim.
+/// let length: f64 = changes.rim.iter().map(|edge| edge.length).sum();
+/// assert!((length - 2.0 * 0.1).abs() < 1e-3);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RimEdge {
     /// Its ends, by their numbers among nodes, in the order in which its triangle has them.
@@ -80,6 +180,22 @@ pub struct RimEdge {
 }
 
 /// A face of a solid's material that has opened.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSolid, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
+/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
+/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
+/// # let near = solid.near(&across, &mesh.positions)?;
+/// # let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// let area: f64 = changes.faces.iter().map(|face| face.area).sum();
+/// // The block is cut across, snapped to its nodes where it passes near them.
+/// assert!((area - 0.04 * 0.04).abs() < 0.1 * area);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutFace {
     /// The triangles that are drawn on its two sides.
@@ -90,6 +206,21 @@ pub struct CutFace {
 
 /// What a cut has changed. New nodes and points, cells and triangles are numbered from their count before the cut on. The order of all lists
 /// depends on what is cut and the blade alone.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// let near = sheet.near(&across, &mesh.positions)?;
+/// let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// let triangles = sheet.triangles().len() as u32;
+/// assert!((changes.first_triangle..triangles).all(|new| changes.triangles.contains(&new)));
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Changes {
     /// All parts of each node that fell apart; new ones in ascending order.

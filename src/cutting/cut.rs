@@ -8,6 +8,22 @@ use super::surface::CutSurface;
 use crate::base::{Error, Result, memory};
 
 /// What a blade's edge, a segment, passes over in one step: two triangles, which meet from the start's first point to the end's second.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
+/// // An upright edge, moved along z.
+/// let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// let report = world.cut(sheet, &Sweep { start: edge(-0.06), end: edge(0.0) })?;
+/// assert!((report.length - 0.05).abs() < 1e-3);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
     /// Both ends of the edge before the step.
@@ -70,6 +86,21 @@ impl Sweep {
 }
 
 /// How many there may be after a cut; one that needs more is refused.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// let near = sheet.near(&across, &mesh.positions)?;
+/// let refused = sheet.cut(&across, &mesh.positions, &near, Limits { nodes: 26, ..Limits::NONE });
+/// assert!(matches!(refused, Err(sinew::Error::Capacity(_))));
+/// assert_eq!(sheet.piece_count()?, 1);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Nodes, with copies and bound points.

@@ -9,6 +9,22 @@ use crate::base::{Error, Result, memory};
 use crate::codec::saved;
 
 /// A triangle that is simulated.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let near = sheet.near(&across, &mesh.positions)?;
+/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// let area: f64 = sheet.cells().iter().map(|cell| cell.area).sum();
+/// // A cut takes nothing away.
+/// assert!((area - 0.01).abs() < 1e-8);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceCell {
     /// Its nodes.
@@ -26,6 +42,21 @@ pub struct SurfaceCell {
 saved! { SurfaceCell { nodes, area, snap, first, next } }
 
 /// A triangle that is drawn and touched.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let near = sheet.near(&across, &mesh.positions)?;
+/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// let rim = sheet.triangles().iter().flat_map(|triangle| triangle.rim).filter(|&is_rim| is_rim);
+/// assert_eq!(rim.count(), changes.rim.len());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTriangle {
     /// Its vertices.
@@ -43,6 +74,22 @@ pub struct SurfaceTriangle {
 saved! { SurfaceTriangle { corners, cell, rim, neighbours, next } }
 
 /// A corner of what is drawn.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let near = sheet.near(&across, &mesh.positions)?;
+/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// for vertex in sheet.vertices() {
+///     assert!((vertex.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceVertex {
     /// The nodes that it is bound to; unused ones repeat the first with weight 0.
@@ -58,6 +105,23 @@ pub struct SurfaceVertex {
 saved! { SurfaceVertex { nodes, weights, point, around } }
 
 /// A surface that can be cut.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
+/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
+/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let mut sheet = sheet.clone();
+/// let near = sheet.near(&across, &mesh.positions)?;
+/// sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// assert_eq!(sheet.piece_count()?, 2);
+/// sheet.undo();
+/// assert_eq!(sheet.piece_count()?, 1);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct CutSurface {
     pub(crate) nodes: Tracked<Node>,

@@ -3,6 +3,23 @@
 use crate::codec::{saved, saved_enum};
 
 /// A point of a body's surface.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// # let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))?;
+/// let hit = world.nearest_point(vec3(0.01, 0.02, 0.005), 0.1)?.expect("the cloth is 2 cm away");
+/// let point = SurfacePoint { triangle: hit.triangle, weights: hit.weights };
+/// let held = world.attach_points(body, &[point], ball, 0.0)?;
+/// assert!(world.has_attachment(held[0]));
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
     /// Which triangle of [`Body::surface`](crate::Body::surface).
@@ -14,6 +31,24 @@ pub struct SurfacePoint {
 saved! { SurfacePoint { triangle, weights } }
 
 /// Where a body is attached to a body.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let [left, right] = [0, 1].map(|_| world.create_body(&cloth));
+/// # let (left, right) = (left?, right?);
+/// # world.body_mut(right)?.transform(0.1 * Vec3::X, Quat::IDENTITY, None)?;
+/// world.attach_to_body(left, &[Anchor::Node(4)], right, &[Anchor::Node(0)], 0.0)?;
+/// world.step(1.0 / 60.0)?;
+/// let place = |body, node: usize| world.body(body).map(|body| body.positions()[node]);
+/// assert!(place(left, 4)?.distance(place(right, 0)?) < 1e-5);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Anchor {
     /// A node, of the surface or not.

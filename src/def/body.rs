@@ -11,6 +11,12 @@ use super::{Material, Model, Viscosity, Yielding};
 use crate::base::{Error, Result, finite, memory, not_negative};
 
 /// One value for all, or one for each.
+///
+/// ```
+/// use sinew::Values;
+/// assert_eq!(Values::Uniform(0.5).get(7), 0.5);
+/// assert_eq!(Values::Each(&[1.0, 2.0, 3.0]).get(2), 3.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Values<'a> {
     /// The same value for all.
@@ -47,6 +53,21 @@ impl Values<'_> {
 }
 
 /// How a body keeps its springs.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// let packed = world.create_body(&BodyDefinition { storage: Storage::Packed, ..cloth })?;
+/// let linked = world.create_body(&BodyDefinition { storage: Storage::FastLink, ..cloth })?;
+/// let springs = |body| world.body(body).map(|body| body.storage_report().spring_count);
+/// assert_eq!(springs(packed)?, springs(linked)?);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Storage {
     /// Laid out for the processor.
@@ -61,6 +82,21 @@ pub enum Storage {
 }
 
 /// How a body is moved.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// let stiff = BodyDefinition { stiffnesses: Values::Uniform(1e5), solver: Solver::Implicit, ..cloth };
+/// # world.create_body(&stiff)?;
+/// let report = world.step(1.0 / 60.0)?;
+/// assert_eq!(report.substeps, 1);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Solver {
     /// Explicit, with as many substeps as it needs to be stable.
@@ -84,6 +120,23 @@ pub(crate) const SMALLEST_MASS: f32 = 1e-37;
 pub(crate) const MOST_ITERATIONS: u32 = 1_000_000;
 
 /// What a body is made of. Plain data, used only during [`World::create_body`](crate::World::create_body).
+///
+/// ```
+/// use sinew::mesh::Mesh;
+/// use sinew::{BodyDefinition, Values, World, WorldDefinition};
+/// let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// let cloth = BodyDefinition {
+///     positions: &mesh.positions,
+///     triangles: &mesh.triangles,
+///     masses: Values::Uniform(1e-4),
+///     stiffnesses: Values::Uniform(20.0),
+///     ..BodyDefinition::default()
+/// };
+/// let mut world = World::new(WorldDefinition::default())?;
+/// let body = world.create_body(&cloth)?;
+/// assert_eq!(world.body(body)?.spring_pairs()?.len(), mesh.edges()?.len());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct BodyDefinition<'a> {
     /// Where each node is, in metres.

@@ -5,6 +5,32 @@ use crate::codec::{saved, saved_enum};
 use crate::mesh::FURTHEST;
 
 /// How a tool finds what it touches.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let block = world.create_body(&block)?;
+/// # world.body_mut(block)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, -0.019, 1.0))?;
+/// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
+/// # ball.pose.position = 0.03 * Vec3::Y;
+/// # let ball = world.create_tool(&ball)?;
+/// # world.destroy_tool(ball)?;
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.surface()?[..]);
+/// let mut press = ToolDefinition::new(Shape::Mesh { positions, triangles });
+/// press.detection = Detection::DistanceField;
+/// press.pose.position = 0.04 * Vec3::Y;
+/// let press = world.create_tool(&press)?;
+/// world.set_pose(press, 0.039 * Vec3::Y, None)?;
+/// world.step(1.0 / 60.0)?;
+/// assert!(world.wrench(press)?.0.y > 0.0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Detection {
     /// Exact distances, swept over the step.
@@ -19,6 +45,28 @@ pub enum Detection {
 saved_enum!(Detection { 0 => Exact, 1 => ImageSpace, 2 => DistanceField });
 
 /// Which tools and bodies meet: two do where each has a category that the other's mask has.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let block = world.create_body(&block)?;
+/// # world.body_mut(block)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, -0.019, 1.0))?;
+/// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
+/// # ball.pose.position = 0.03 * Vec3::Y;
+/// # let ball = world.create_tool(&ball)?;
+/// // Bodies are of category 1 unless their definition says otherwise.
+/// world.set_collision_filter(ball, CollisionFilter { category: 1, mask: 2 })?;
+/// world.set_pose(ball, 0.025 * Vec3::Y, None)?;
+/// world.step(1.0 / 60.0)?;
+/// assert_eq!(world.contacts(ball)?.count(), 0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CollisionFilter {
     /// The categories that it belongs to, a bit for each.
@@ -55,6 +103,27 @@ impl CollisionFilter {
 }
 
 /// What a body asks of contact.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// let contact = BodyContact { thickness: 0.001, friction: 0.4, with_bodies: true, ..BodyContact::default() };
+/// let body = world.create_body(&BodyDefinition { contact, ..cloth })?;
+/// # let other = world.create_body(&BodyDefinition { contact, ..cloth })?;
+/// # world.body_mut(body)?.transform(0.004 * Vec3::Y, Quat::IDENTITY, None)?;
+/// # world.body_mut(other)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, 1.0, 1.0))?;
+/// for _ in 0..30 {
+///     world.step(1.0 / 60.0)?;
+/// }
+/// // It lies on another cloth at y = 0, two thicknesses above it.
+/// assert!((world.body(body)?.positions()[12].y - 0.002).abs() < 1e-4);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyContact {
     /// What tools and other tissue keep off its surface, m, 0 to 1e9: the thickness of a cloth on either side.

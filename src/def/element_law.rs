@@ -7,6 +7,22 @@ use crate::codec::saved_enum;
 ///
 /// Of F, the deformation, energies have `I1 = |F|²`, `I2 = |cof F|²` and `J = det F`. All have `lambda/2 (J - 1)²` beside what is given here, of all
 /// tetrahedra at a node together from a Poisson's ratio of 0.4 on.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// let rubber = BodyDefinition { element_law: ElementLaw::MooneyRivlin { ratio: 0.25 }, ..block };
+/// assert!(world.create_body(&rubber).is_ok());
+/// let refused = BodyDefinition { element_law: ElementLaw::MooneyRivlin { ratio: 1.5 }, ..block };
+/// assert!(world.create_body(&refused).is_err());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ElementLaw {
     /// St Venant and Kirchhoff's law with a signed volume term: the fastest. It stiffens as it is stretched.

@@ -4,6 +4,23 @@ use super::{BodyDefinition, Values};
 use crate::base::{Error, Result, above_zero, not_negative};
 
 /// How a material's numbers become forces.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let material = material.expect("the block has one");
+/// let mut with = |model| world.create_body(&BodyDefinition { material: Some(Material { model, ..material }), ..block });
+/// // Poisson's ratio is 0.45: elements can have it, springs cannot.
+/// assert!(with(Model::Tetrahedra).is_ok());
+/// assert!(with(Model::Springs).is_err());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Model {
     /// Springs along the edges of the elements. Poisson's ratio is what such springs imply: 1/4 for tetrahedra and cells, 1/3
@@ -37,6 +54,29 @@ pub enum Model {
 }
 
 /// What a body is made of, by its numbers. Plain data.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// let material = Material {
+///     model: Model::Tetrahedra,
+///     young_modulus: 5000.0,
+///     poisson_ratio: 0.45,
+///     density: 1000.0,
+///     ..Material::default()
+/// };
+/// let body = world.create_body(&BodyDefinition { material: Some(material), ..block })?;
+/// # let mut masses = vec![0.0; mesh.positions.len()];
+/// world.body(body)?.node_masses(&mut masses)?;
+/// assert!((masses.iter().sum::<f32>() - 0.064).abs() < 1e-6);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Material {
     /// How they become forces.

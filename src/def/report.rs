@@ -3,6 +3,21 @@
 use crate::codec::saved;
 
 /// How much memory the springs of a body take.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// let report = world.body(body)?.storage_report();
+/// assert_eq!(report.spring_count, mesh.edges()?.len());
+/// assert!(report.bytes_used <= report.bytes_reserved);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StorageReport {
     /// Nodes of the body.
@@ -16,6 +31,21 @@ pub struct StorageReport {
 }
 
 /// What a body encloses: the sums of the cavities that are closed; all 0 where it was not asked to keep or press anything.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-3), Values::Uniform(20.0));
+/// # let balloon = BodyDefinition { positions, tetrahedra, masses, stiffnesses, ..BodyDefinition::default() };
+/// let body = world.create_body(&BodyDefinition { enclosed_stiffness: 1e4, ..balloon })?;
+/// let enclosed = world.body(body)?.enclosed();
+/// assert_eq!(enclosed.cavity_count, 1);
+/// assert!((enclosed.volume - 0.04_f64.powi(3)).abs() < 1e-9);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnclosedReport {
     /// Cavities that have not been cut open.
@@ -29,6 +59,22 @@ pub struct EnclosedReport {
 }
 
 /// How a body's solver took the last step.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// let body = world.create_body(&BodyDefinition { solver: Solver::Implicit, ..cloth })?;
+/// # world.body_mut(body)?.pin(0)?;
+/// world.step(1.0 / 60.0)?;
+/// let report = world.body(body)?.solver_report();
+/// assert!(report.has_converged && report.iterations > 0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SolverReport {
     /// Products with the matrices of the step's equations; 0 for bodies that are moved explicitly.
@@ -61,6 +107,23 @@ impl SolverReport {
 }
 
 /// Energy in joules, at the time of the positions.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// world.step(1.0 / 60.0)?;
+/// let energy = world.body(body)?.energy(world.gravity());
+/// // It falls freely from y = 0.
+/// assert!(energy.kinetic > 0.0);
+/// assert!((energy.kinetic + energy.gravitational).abs() < 0.01 * energy.kinetic);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
     /// Of the nodes that are free to move, along the axes along which they are. What mass scaling adds to them does not count: it has no weight

@@ -4,6 +4,23 @@ use crate::base::{Result, above_zero, not_negative};
 use crate::codec::saved;
 
 /// When tissue at rest is left alone.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// let sleep = Sleep { speed: 1e-3, time: 0.1 };
+/// let body = world.create_body(&BodyDefinition { sleep, ..cloth })?;
+/// for _ in 0..20 {
+///     world.step(1.0 / 60.0)?;
+/// }
+/// assert_eq!(world.body(body)?.awake_share(), 0.0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sleep {
     /// What is slower is at rest, m/s, at least 0; 0: the body never sleeps, and pays nothing for it.
@@ -15,6 +32,21 @@ pub struct Sleep {
 saved! { Sleep { speed, time } }
 
 /// What of a body can be set after it was made.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// let settings = world.body(body)?.settings();
+/// world.set_body_settings(body, BodySettings { thickness: 0.002, ..settings })?;
+/// assert_eq!(world.body(body)?.settings().thickness, 0.002);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodySettings {
     /// [`BodyContact::thickness`](super::BodyContact::thickness).

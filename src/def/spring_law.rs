@@ -5,6 +5,23 @@ use crate::codec::saved_enum;
 
 /// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
 /// the stiffness they are given. Springs that are added later are linear.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let positions = &[Vec3::ZERO, 0.15 * Vec3::X];
+/// # let (masses, stiffnesses) = (Values::Uniform(0.01), Values::Uniform(10.0));
+/// # let (springs, rest_lengths) = (Some(&[[0, 1]][..]), Some(&[0.1][..]));
+/// # let spring = BodyDefinition { positions, springs, rest_lengths, masses, stiffnesses, ..BodyDefinition::default() };
+/// let law = SpringLaw::Exponential { steepness: 4.0, limit: 1.0 };
+/// let stiffening = world.create_body(&BodyDefinition { spring_law: law, ..spring })?;
+/// let linear = world.create_body(&BodyDefinition { spring_law: SpringLaw::Linear, ..spring })?;
+/// let elastic = |body| world.body(body).map(|body| body.energy(Vec3::ZERO).elastic);
+/// // Both are stretched by a half.
+/// assert!(elastic(stiffening)? > 1.5 * elastic(linear)?);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SpringLaw {
     /// `e`.

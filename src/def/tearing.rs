@@ -15,6 +15,23 @@ use crate::codec::{saved, saved_enum};
 /// the gradient F of the deformation: the tetrahedra about it whose middles lie on the two sides of the plane across the largest principal
 /// stretch part along their faces, as far as what is drawn stays a closed surface. Of tetrahedra that are elements each edge counts as a spring with a
 /// strain.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// let tearing = Tearing { strain: 0.5, most_per_step: 4, ..Tearing::default() };
+/// let body = world.create_body(&BodyDefinition { tearing, spare_nodes: 200, ..cloth })?;
+/// let stretched: Vec<Vec3> = mesh.positions.iter().map(|place| vec3(2.0, 1.0, 1.0) * place).collect();
+/// world.body_mut(body)?.set_positions(&stretched)?;
+/// world.step(1e-4)?;
+/// assert!(world.body(body)?.node_count() > stretched.len());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tearing {
     /// The part of its rest length by which a spring may become longer, at least 0; 0: any. A spring without a rest length has no strain.
@@ -30,6 +47,26 @@ pub struct Tearing {
 saved! { Tearing { strain, force, most_per_step, smallest_piece } }
 
 /// What tore in the last step, and what did not.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let tearing = Tearing { strain: 0.5, most_per_step: 4, ..Tearing::default() };
+/// # let body = world.create_body(&BodyDefinition { tearing, spare_nodes: 200, ..cloth })?;
+/// # let stretched: Vec<Vec3> = mesh.positions.iter().map(|place| vec3(2.0, 1.0, 1.0) * place).collect();
+/// # world.body_mut(body)?.set_positions(&stretched)?;
+/// // The body is stretched to twice its length, and may tear four times in a step.
+/// world.step(1e-4)?;
+/// let report = world.body(body)?.tear_report();
+/// assert!(report.tears >= 1 && report.tears <= 4);
+/// assert!(report.waiting > 0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TearReport {
     /// Tears that were made.

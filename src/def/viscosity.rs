@@ -11,6 +11,24 @@ use crate::soa::Rates;
 /// After a step of strain the stress relaxes as `E (1 + retardation_time / relaxation_time exp(-t / relaxation_time))`: where E0 is
 /// measured at once and E in the end, `retardation_time` is `relaxation_time (E0 / E - 1)`. Any times are stable, with VERLET for the price
 /// of shorter substeps.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let positions = &[Vec3::ZERO, 0.15 * Vec3::X];
+/// # let (masses, stiffnesses) = (Values::Uniform(0.01), Values::Uniform(10.0));
+/// # let (springs, rest_lengths) = (Some(&[[0, 1]][..]), Some(&[0.1][..]));
+/// # let spring = BodyDefinition { positions, springs, rest_lengths, masses, stiffnesses, ..BodyDefinition::default() };
+/// let viscosity = Viscosity { retardation_time: 0.05, relaxation_time: 0.0 };
+/// let body = world.create_body(&BodyDefinition { viscosity, ..spring })?;
+/// let before = world.body(body)?.energy(Vec3::ZERO).elastic;
+/// for _ in 0..60 {
+///     world.step(1.0 / 60.0)?;
+/// }
+/// assert!(world.body(body)?.energy(Vec3::ZERO).elastic < 1e-3 * before);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Viscosity {
     /// The dashpot's viscosity over the stiffness, s, at least 0, at most 1e6; 0: there is none. VERLET takes substeps as short as a dashpot

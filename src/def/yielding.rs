@@ -4,6 +4,23 @@ use crate::base::{Error, Result, not_negative};
 
 /// From which strain on springs, and tetrahedra that are elements, take a set: they are at rest elsewhere from then on (perfect
 /// plasticity).
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let positions = &[Vec3::ZERO, 0.15 * Vec3::X];
+/// # let (masses, stiffnesses) = (Values::Uniform(0.01), Values::Uniform(10.0));
+/// # let (springs, rest_lengths) = (Some(&[[0, 1]][..]), Some(&[0.1][..]));
+/// # let spring = BodyDefinition { positions, springs, rest_lengths, masses, stiffnesses, ..BodyDefinition::default() };
+/// let yielding = Yielding { strain: 0.1, ..Yielding::default() };
+/// let body = world.create_body(&BodyDefinition { yielding, ..spring })?;
+/// world.body_mut(body)?.pin_nodes(&[0, 1])?;
+/// world.step(1.0 / 60.0)?;
+/// // 10 N/m, 0.1 m at rest, held at 0.15 m: it pulls with 0.1 N, not 0.5 N.
+/// assert!((world.body(body)?.pin_force(1)?.x - 0.1).abs() < 1e-5);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Yielding {
     /// Of a spring, or a rod of tetrahedra, that is stretched or pressed; at least 0; 0: none.

@@ -18,6 +18,22 @@ use bind::Binding;
 use follow::Follower;
 
 /// A surface that is drawn, and what of a body it goes with. Plain data, used only during [`World::create_embedding`].
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let body = world.create_body(&block)?;
+/// let skin = EmbeddingDefinition { vertices: &[0.01 * Vec3::ONE], tetrahedra: &mesh.tetrahedra, ..EmbeddingDefinition::default() };
+/// let embedding = world.create_embedding(body, &skin)?;
+/// assert!(embedding.positions()[0].distance(0.01 * Vec3::ONE) < 1e-6);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EmbeddingDefinition<'a> {
     /// Where each vertex is while the body is where it is, m, within 1e9 m of the origin.
@@ -35,6 +51,25 @@ pub struct EmbeddingDefinition<'a> {
 /// In a tetrahedron a vertex keeps its barycentric weights, so that an affine motion of the body is one of the surface; over a triangle it keeps
 /// its place in it and its distance along the normal. It follows cuts and tears: each vertex goes on with its own side, and triangles that would reach
 /// across are left out.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let body = world.create_body(&block)?;
+/// # let skin = EmbeddingDefinition { vertices: &[0.01 * Vec3::ONE], tetrahedra: &mesh.tetrahedra, ..EmbeddingDefinition::default() };
+/// let mut embedding = world.create_embedding(body, &skin)?;
+/// world.step(1.0 / 60.0)?;
+/// embedding.update(&world)?;
+/// // It has fallen with the body.
+/// assert!(embedding.positions()[0].y < skin.vertices[0].y);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Embedding {
     body: BodyId,

@@ -3,6 +3,19 @@
 use std::ffi::CStr;
 
 /// A tissue's figures. Those of single organs differ from one another by more than the digits given here suggest.
+///
+/// ```
+/// use sinew::material::{Material, Model, presets::LIVER};
+/// let material = Material {
+///     model: Model::Tetrahedra,
+///     young_modulus: LIVER.young_modulus(),
+///     poisson_ratio: 0.45,
+///     density: LIVER.density,
+///     ..Material::default()
+/// };
+/// // Soft tissue hardly changes its volume: E is three times G.
+/// assert_eq!(material.young_modulus, 3.0 * LIVER.shear_modulus);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preset {
     /// `CStr`: handed out by the C interface too.

@@ -27,6 +27,17 @@ const TRIES: usize = 16;
 /// The surface of a solid: triangles that enclose a volume, face outward and do not cross each other.
 ///
 /// Parts that lie apart, touch, or are hollow (an outer surface and an inner one that faces into the hole) are one solid.
+///
+/// ```
+/// use sinew::mesh::{ClosedSurface, Mesh};
+/// let block = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// let surface = ClosedSurface::new(&block.positions, &block.surface()?)?;
+/// assert!((surface.volume() - 1e-3).abs() < 1e-9);
+/// // A sheet encloses nothing.
+/// let sheet = Mesh::cloth([0.1, 0.1], [2, 2])?;
+/// assert!(ClosedSurface::new(&sheet.positions, &sheet.triangles).is_err());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct ClosedSurface {
     positions: Vec<Vec3>,

@@ -28,6 +28,14 @@ pub(crate) use topology::{
 pub use topology::{boundary, edges, is_closed};
 
 /// Nodes joined by triangles, tetrahedra or cells. Positions in metres; triangles outward by the right-hand rule.
+///
+/// ```
+/// use sinew::mesh::Mesh;
+/// let block = Mesh::block([0.04, 0.02, 0.03], [4, 2, 3])?;
+/// assert_eq!(block.positions.len(), 5 * 3 * 4);
+/// assert!((block.volume()? - 0.04 * 0.02 * 0.03).abs() < 1e-10);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Where each node is, in metres.

@@ -16,6 +16,17 @@ pub const NO_NODE: u32 = u32::MAX;
 const WELD: f64 = 1e-6;
 
 /// A tidy mesh, and what became of the vertices it was made from.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::mesh::{Mesh, tidy};
+/// // Two triangles with a corner that is written twice.
+/// let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Z, Vec3::X, Vec3::Z, Vec3::X + Vec3::Z];
+/// let loaded = tidy(&Mesh { positions, triangles: vec![[0, 2, 1], [3, 4, 5]], ..Mesh::default() })?;
+/// assert_eq!(loaded.mesh.triangles, [[0, 2, 1], [1, 2, 3]]);
+/// assert_eq!(loaded.node_of_vertex, [0, 1, 2, 1, 2, 3]);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadedMesh {
     /// Every node is used; no element repeats a node.
@@ -27,6 +38,16 @@ pub struct LoadedMesh {
 }
 
 /// What was changed to make a mesh tidy. `welded_vertices + dropped_vertices` and the nodes add up to the vertices.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::mesh::{Mesh, tidy};
+/// // Nothing uses the last vertex, and a triangle is there twice.
+/// let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Z, Vec3::Y];
+/// let report = tidy(&Mesh { positions, triangles: vec![[0, 2, 1], [2, 1, 0]], ..Mesh::default() })?.report;
+/// assert_eq!((report.dropped_vertices, report.doubled_triangles), (1, 1));
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TidyReport {
     /// Vertices that became one node with an earlier one.

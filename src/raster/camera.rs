@@ -14,6 +14,15 @@ const NEAREST: f64 = 0.02;
 const NEAR: f64 = 1e-3;
 
 /// A pinhole camera.
+///
+/// ```
+/// # use glam::Vec3;
+/// use sinew::raster::Camera;
+/// let camera = Camera { eye: Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, field_of_view: 0.6 };
+/// let middle = camera.view(64, 48)?.project(Vec3::ZERO).expect("it is in front");
+/// assert!((middle.x - 32.0).abs() < 1e-6 && (middle.y - 24.0).abs() < 1e-6);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Where the camera is, in metres.

@@ -4,6 +4,14 @@
 pub const GUARD: f64 = 131_072.0;
 
 /// A vertex in pixel coordinates.
+///
+/// ```
+/// # use glam::Vec3;
+/// use sinew::raster::View;
+/// let view = View::orthographic(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 100.0, 64, 48);
+/// let vertex = view.project(Vec3::new(0.1, 0.0, -2.0)).expect("it is in front");
+/// assert!((vertex.x - 42.0).abs() < 1e-4 && (vertex.depth - 2.0).abs() < 1e-9);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelVertex {
     /// Pixels from the left edge of the picture.
@@ -17,6 +25,12 @@ pub struct PixelVertex {
 }
 
 /// A rectangle of pixels; the right column and the bottom row are outside.
+///
+/// ```
+/// use sinew::raster::Window;
+/// let window = Window::new(64, 48);
+/// assert_eq!(window, Window { left: 0, top: 0, right: 64, bottom: 48 });
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
     /// First column.
@@ -42,6 +56,17 @@ impl Window {
 }
 
 /// One pixel of a triangle or a line.
+///
+/// ```
+/// # use glam::Vec3;
+/// use sinew::raster::{View, Window};
+/// let view = View::orthographic(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 100.0, 64, 48);
+/// let mut depths = Vec::new();
+/// let corners = [Vec3::NEG_Z, Vec3::new(0.1, 0.0, -1.0), Vec3::new(0.0, 0.1, -1.0)];
+/// view.triangle(&Window::new(64, 48), corners, |fragment| depths.push(fragment.depth));
+/// // Half of ten by ten pixels, 1 m away.
+/// assert!((45..=55).contains(&depths.len()) && depths.iter().all(|depth| (depth - 1.0).abs() < 1e-6));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fragment {
     /// Column.

@@ -24,6 +24,21 @@ const MAX_SIZE: u32 = 16_384;
 const NOTHING: u32 = u32::MAX;
 
 /// Pixels, row by row from the upper left.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::raster::{Look, Scene, Shape};
+/// # let path = std::env::temp_dir().join(format!("sinew_image_{}.png", std::process::id()));
+/// # let mut scene = Scene::default();
+/// # scene.shapes.push((Shape::Sphere { centre: Vec3::ZERO, radius: 0.1 }, Look::INSTRUMENT));
+/// # let camera = scene.camera(Vec3::Z, Vec3::Y, 0.6, 1.0)?;
+/// let image = scene.draw(&camera, 32, 32)?;
+/// assert_eq!(image.pixels.len(), 32 * 32);
+/// # #[cfg(feature = "pictures")]
+/// image.write_png(&path)?;
+/// # std::fs::remove_file(&path).ok();
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     /// Pixels in a row.

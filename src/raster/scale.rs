@@ -8,6 +8,20 @@ use glam::{Mat3, Vec3};
 use crate::base::{Error, Result};
 
 /// Which colours numbers have.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::raster::{ColourScale, Coloured, Colours, Look, Scene, Surface};
+/// # let (positions, triangles) = (&[Vec3::ZERO, Vec3::X, Vec3::Z][..], &[[0, 2, 1]][..]);
+/// let drawn = |colours| {
+///     let coloured = Some(Coloured { values: &[0.2; 3], scale: ColourScale { colours, low: 0.0, high: 1.0 } });
+///     let surface = Surface { positions, triangles, look: Look::CHART, coloured };
+///     let scene = Scene { surfaces: vec![surface], ..Scene::default() };
+///     scene.draw(&scene.camera(Vec3::Y, Vec3::NEG_Z, 0.6, 1.0)?, 32, 32)
+/// };
+/// assert_ne!(drawn(Colours::Diverging)?, drawn(Colours::Sequential)?);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Colours {
     /// From blue by a light grey, in the middle, to red: for what has a sign.
@@ -18,6 +32,22 @@ pub enum Colours {
 }
 
 /// The colours of numbers between two.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::raster::{ColourScale, Coloured, Colours, Look, Scene, Surface};
+/// # let (positions, triangles) = (&[Vec3::ZERO, Vec3::X, Vec3::Z][..], &[[0, 2, 1]][..]);
+/// # let drawn = |value: f32, scale| {
+/// #     let surface = Surface { positions, triangles, look: Look::CHART, coloured: Some(Coloured { values: &[value; 3], scale }) };
+/// #     let scene = Scene { surfaces: vec![surface], ..Scene::default() };
+/// #     scene.draw(&scene.camera(Vec3::Y, Vec3::NEG_Z, 0.6, 1.0)?, 32, 32)
+/// # };
+/// let scale = ColourScale { colours: Colours::Sequential, low: 0.0, high: 0.3 };
+/// // A value above the last one has its colour.
+/// assert_eq!(drawn(0.9, scale)?, drawn(0.3, scale)?);
+/// assert_ne!(drawn(0.1, scale)?, drawn(0.3, scale)?);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColourScale {
     /// Which.
@@ -29,6 +59,20 @@ pub struct ColourScale {
 }
 
 /// Numbers that a thing is coloured by.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::raster::{ColourScale, Coloured, Colours, Look, Scene, Surface};
+/// # let (positions, triangles) = (&[Vec3::ZERO, Vec3::X, Vec3::Z][..], &[[0, 2, 1]][..]);
+/// let scale = ColourScale { colours: Colours::Sequential, low: 0.0, high: 1.0 };
+/// let coloured = Some(Coloured { values: &[0.0, 0.5, 1.0], scale });
+/// let surface = Surface { positions, triangles, look: Look::CHART, coloured };
+/// let scene = Scene { surfaces: vec![surface], ..Scene::default() };
+/// # let plain = Scene { surfaces: vec![Surface { coloured: None, ..surface }], ..Scene::default() };
+/// # let camera = scene.camera(Vec3::Y, Vec3::NEG_Z, 0.6, 1.0)?;
+/// assert_ne!(scene.draw(&camera, 32, 32)?, plain.draw(&camera, 32, 32)?);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coloured<'a> {
     /// One for each position; between them they are interpolated.

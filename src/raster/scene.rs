@@ -6,6 +6,12 @@ use crate::Result;
 use glam::Vec3;
 
 /// How a thing looks.
+///
+/// ```
+/// use sinew::raster::Look;
+/// let green = Look::TISSUE.coloured([0.2, 0.6, 0.3]);
+/// assert_eq!((green.colour, green.gloss), ([0.2, 0.6, 0.3], Look::TISSUE.gloss));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Red, green, blue as on a screen (sRGB), 0 to 1.
@@ -98,6 +104,19 @@ impl Look {
 }
 
 /// Triangles between points.
+///
+/// ```
+/// # use glam::Vec3;
+/// use sinew::mesh::Mesh;
+/// use sinew::raster::{Look, Scene, Surface};
+/// let Mesh { positions, triangles, .. } = &Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// let surface = Surface { positions, triangles, look: Look::CLOTH, coloured: None };
+/// let scene = Scene { surfaces: vec![surface], ..Scene::default() };
+/// let camera = scene.camera(Vec3::Y, Vec3::NEG_Z, 0.6, 1.0)?;
+/// let middle = scene.draw(&camera, 32, 32)?.pixels[16 * 32 + 16];
+/// assert_ne!(middle, Scene::default().draw(&camera, 32, 32)?.pixels[16 * 32 + 16]);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Surface<'a> {
     /// Where the points are, in metres.
@@ -111,6 +130,19 @@ pub struct Surface<'a> {
 }
 
 /// Straight lines between points, such as springs.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::mesh::Mesh;
+/// # use sinew::raster::{Lines, Look, Scene};
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (positions, pairs) = (&mesh.positions[..], &mesh.edges()?[..]);
+/// let mut scene = Scene::default();
+/// scene.lines.push(Lines { positions, pairs, thickness: 3.0, look: Look::SPRINGS, coloured: None });
+/// let camera = scene.camera(Vec3::Y, Vec3::NEG_Z, 0.6, 1.0)?;
+/// assert_ne!(scene.draw(&camera, 32, 32)?, Scene::default().draw(&camera, 32, 32)?);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Lines<'a> {
     /// Where the points are, in metres.
@@ -126,6 +158,16 @@ pub struct Lines<'a> {
 }
 
 /// The shape of an instrument or of the surroundings, in world coordinates.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::raster::{Look, Scene, Shape};
+/// let mut scene = Scene::default();
+/// scene.shapes.push((Shape::Capsule { start: Vec3::ZERO, end: 0.1 * Vec3::Y, radius: 0.01 }, Look::INSTRUMENT));
+/// let camera = scene.camera(Vec3::Z, Vec3::Y, 0.6, 1.0)?;
+/// assert_ne!(scene.draw(&camera, 32, 32)?, Scene::default().draw(&camera, 32, 32)?);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// A ball.

@@ -6,6 +6,15 @@ use super::triangle::rasterise_triangle;
 use glam::{DVec3, Vec3};
 
 /// A camera or a parallel projection bound to a grid of pixels: where each point of space falls, and how deep.
+///
+/// ```
+/// # use glam::Vec3;
+/// use sinew::raster::View;
+/// let view = View::orthographic(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 100.0, 64, 48);
+/// let place = Vec3::new(0.1, 0.05, -2.0);
+/// let vertex = view.project(place).expect("it is in front");
+/// assert!(view.unproject(vertex.x, vertex.y, vertex.depth).distance(place) < 1e-6);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     origin: DVec3,

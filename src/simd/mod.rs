@@ -30,6 +30,16 @@ use crate::base::{Error, Result};
 pub(crate) struct Record(pub [f32; 4]);
 
 /// The widest instructions that kernels use.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// // The same bits on every machine.
+/// let world = World::new(WorldDefinition { kernel: Kernel::Portable, ..WorldDefinition::default() })?;
+/// # let other = World::new(WorldDefinition { kernel: Kernel::Portable, ..WorldDefinition::default() })?;
+/// assert_eq!(world.state_hash(), other.state_hash());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kernel {
     /// What the processor offers, the widest first.

@@ -26,6 +26,24 @@ const SPREAD: f64 = 0.05;
 const MOST_TURN: f64 = 0.5;
 
 /// What a blade is. Plain data, used only during [`World::create_blade`](crate::World::create_blade).
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
+/// let mut blade = BladeDefinition::new([0.01 * Vec3::NEG_Y, 0.01 * Vec3::Y]);
+/// blade.pose.position = vec3(0.003, 0.0, -0.06);
+/// let blade = world.create_blade(&blade)?;
+/// world.set_blade_pose(blade, vec3(0.003, 0.0, 0.06), None)?;
+/// world.step(1.0 / 60.0)?;
+/// assert_eq!(world.body(sheet)?.pieces()?.count, 2);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BladeDefinition {
     /// Both ends of the cutting edge about the blade's own origin, m, each coordinate within 1e9 of 0; not at one place.
@@ -52,6 +70,27 @@ impl BladeDefinition {
 }
 
 /// What a blade did in the last step, and what was done to it.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
+/// # let mut blade = BladeDefinition::new([0.01 * Vec3::NEG_Y, 0.01 * Vec3::Y]);
+/// # blade.pose.position = vec3(0.003, 0.0, -0.06);
+/// # let blade = world.create_blade(&blade)?;
+/// world.set_blade_pose(blade, vec3(0.003, 0.0, 0.0), None)?;
+/// world.step(1.0 / 60.0)?;
+/// let report = world.blade_report(blade)?;
+/// // Half of the sheet is cut.
+/// assert!((report.length - 0.05).abs() < 1e-3);
+/// assert_eq!(report.refused, None);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BladeReport {
     /// The force on it, world axes, mean over the step, N.

@@ -8,6 +8,23 @@ use crate::solver::Outcome;
 ///
 /// Times are in seconds. `step` is the time of the whole step. The other times are sums over the threads that took part, so several threads
 /// can exceed `step` together; with one thread the sum of the stages is less than `step`. What is left is checks and choices of substeps.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let body = world.create_body(&cloth)?;
+/// world.set_profiling(true)?;
+/// world.step(1.0 / 60.0)?;
+/// let profile = world.profile().expect("profiling is on");
+/// assert_eq!(profile.bodies, 1);
+/// assert!(profile.step > 0.0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepProfile {
     /// The whole step.

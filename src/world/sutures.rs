@@ -7,6 +7,26 @@ use crate::def::Anchor;
 use crate::tissue::{Thread, distance};
 
 /// What a suture is like.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let [left, right] = [0, 1].map(|_| world.create_body(&cloth));
+/// # let (left, right) = (left?, right?);
+/// # world.body_mut(right)?.transform(0.11 * Vec3::X, Quat::IDENTITY, None)?;
+/// let definition = SutureDefinition { length: Some(0.002), ..SutureDefinition::default() };
+/// let suture = world.suture(left, &Anchor::Node(4), right, &Anchor::Node(0), &definition)?;
+/// for _ in 0..30 {
+///     world.step(1.0 / 60.0)?;
+/// }
+/// assert!(world.suture_report(suture)?.distance < 0.0021);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SutureDefinition {
     /// How long the thread is between its points while nothing pulls, m, at least 0; `None`: as long as they are apart.
@@ -28,6 +48,25 @@ impl Default for SutureDefinition {
 }
 
 /// How a suture is now.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
+/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let [left, right] = [0, 1].map(|_| world.create_body(&cloth));
+/// # let (left, right) = (left?, right?);
+/// # world.body_mut(right)?.transform(0.11 * Vec3::X, Quat::IDENTITY, None)?;
+/// # let suture = world.suture(left, &Anchor::Node(4), right, &Anchor::Node(0), &SutureDefinition::default())?;
+/// // The points are 1 cm apart, and the thread is just as long.
+/// let report = world.suture_report(suture)?;
+/// assert!((report.distance - 0.01).abs() < 1e-6);
+/// assert_eq!(report.length, report.distance);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SutureReport {
     /// How long its thread is while nothing pulls, m.

@@ -7,6 +7,19 @@ use crate::base::{Error, Result};
 use crate::mesh::ClosedSurface;
 
 /// A solid, rigid or changing its shape, that finds what lies within it.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::detection::exact::*;
+/// # use sinew::mesh::{ClosedSurface, Mesh};
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let cube = Exact::new(&ClosedSurface::new(&mesh.positions, &mesh.surface()?)?)?;
+/// # let points = [vec3(0.0, 0.04, 0.0), vec3(0.0, 0.14, 0.0)];
+/// assert!(cube.is_inside(points[0]) && !cube.is_inside(points[1]));
+/// let (distance, normal) = cube.distance(vec3(0.0, 0.052, 0.0), 0.01).expect("it is 2 mm away");
+/// assert!((distance - 0.002).abs() < 1e-6 && normal.y > 0.99);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Exact {
     solid: ExactSolid,
@@ -14,6 +27,19 @@ pub struct Exact {
 }
 
 /// What lies within a solid. Its memory is used again by the next search.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::detection::exact::*;
+/// # use sinew::mesh::{ClosedSurface, Mesh};
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let cube = Exact::new(&ClosedSurface::new(&mesh.positions, &mesh.surface()?)?)?;
+/// # let points = [vec3(0.0, 0.04, 0.0), vec3(0.0, 0.14, 0.0)];
+/// let mut overlap = Overlap::default();
+/// cube.find(&points, &[[0, 1]], &mut overlap)?;
+/// assert_eq!((overlap.points.len(), overlap.edges.len()), (1, 1));
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Overlap {
     /// In the order of the points.
@@ -24,6 +50,22 @@ pub struct Overlap {
 }
 
 /// A point within a solid.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::detection::exact::*;
+/// # use sinew::mesh::{ClosedSurface, Mesh};
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let cube = Exact::new(&ClosedSurface::new(&mesh.positions, &mesh.surface()?)?)?;
+/// # let points = [vec3(0.0, 0.04, 0.0), vec3(0.0, 0.14, 0.0)];
+/// # let mut overlap = Overlap::default();
+/// cube.find(&points, &[], &mut overlap)?;
+/// let inside = overlap.points[0];
+/// assert_eq!(inside.point, 0);
+/// // The upper side is 1 cm away.
+/// assert!((inside.depth - 0.01).abs() < 1e-6 && inside.normal.y > 0.99);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointInside {
     /// Its number.
@@ -35,6 +77,21 @@ pub struct PointInside {
 }
 
 /// A stretch of an edge within a solid.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::detection::exact::*;
+/// # use sinew::mesh::{ClosedSurface, Mesh};
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let cube = Exact::new(&ClosedSurface::new(&mesh.positions, &mesh.surface()?)?)?;
+/// # let points = [vec3(0.0, 0.04, 0.0), vec3(0.0, 0.14, 0.0)];
+/// # let mut overlap = Overlap::default();
+/// cube.find(&points, &[[0, 1]], &mut overlap)?;
+/// let EdgeInside { enters, leaves, .. } = overlap.edges[0];
+/// // From 4 cm to 14 cm above the middle; the upper side is at 5 cm.
+/// assert!(enters == 0.0 && (leaves - 0.1).abs() < 1e-5);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeInside {
     /// The edge's number.

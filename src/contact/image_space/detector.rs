@@ -12,6 +12,21 @@ use super::volume::add_volume;
 use crate::base::{Error, Result, above_zero};
 
 /// From where bodies are looked at.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::detection::image_space::*;
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
+/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
+/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+/// let definition = ImageSpaceDefinition { views: Views::Along(Vec3::Y), ..ImageSpaceDefinition::new(0.002) };
+/// let mut space = ImageSpace::new(&definition, &[&cube, &cube])?;
+/// assert!(!space.detect(&bodies)?.inside[0].points.is_empty());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Views {
     /// Along one direction, not zero.
@@ -21,6 +36,22 @@ pub enum Views {
 }
 
 /// How an image is made.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::detection::image_space::*;
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
+/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
+/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+/// let definition = ImageSpaceDefinition { form: Form::Counted, ..ImageSpaceDefinition::new(0.002) };
+/// let mut space = ImageSpace::new(&definition, &[&cube, &cube])?;
+/// // The counted form measures no volume.
+/// assert_eq!(space.detect(&bodies)?.volume, 0.0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// As its authors describe it: edges are drawn into a depth buffer, faces in front of them counted. Of the edges that
@@ -32,6 +63,21 @@ pub enum Form {
 }
 
 /// How bodies are compared. Plain data, used only during [`ImageSpace::new`].
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::detection::image_space::*;
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
+/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
+/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+/// let definition = ImageSpaceDefinition { pixels: 1 << 16, ..ImageSpaceDefinition::new(0.002) };
+/// let mut space = ImageSpace::new(&definition, &[&cube, &cube])?;
+/// assert_eq!(space.detect(&bodies)?.pixel, 0.002);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageSpaceDefinition {
     /// The side of a pixel, m, above 0.
@@ -65,6 +111,22 @@ impl ImageSpaceDefinition {
 /// Halic, Kockara, Bayrak, Rowe, Chen, section 2.1 (CInDeR), and Faure, Barbier, Allard, Falipou 2008 for volumes. The time
 /// is linear in polygons and in pixels covered. Bodies are compared where they are: what passes through a thin part
 /// between two detections is not seen.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::detection::image_space::*;
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
+/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
+/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+/// let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
+/// // Cubes of 10 cm, one 8 cm beside the other.
+/// let overlap = space.detect(&bodies)?;
+/// assert!((overlap.volume - 0.1 * 0.1 * 0.02).abs() < 0.1 * overlap.volume);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct ImageSpace {
     pixel: f32,

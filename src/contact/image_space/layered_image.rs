@@ -35,6 +35,18 @@ const EQUAL: f32 = 1e-4;
 /// Distances come from the faces seen at a point's pixels, and at those around them where more or fewer are seen. They are exact where the
 /// closest face is seen there, else wrong by no more than about a pixel near the surface; what no ray passes, a part thinner than a pixel
 /// along two axes, is not seen at all.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::mesh::{ClosedSurface, Mesh};
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let triangles = mesh.surface()?;
+/// use sinew::detection::image_space::LayeredImage;
+/// let image = LayeredImage::new(&mesh.positions, &triangles, 0.002)?;
+/// let (distance, normal) = image.distance(0.052 * Vec3::Y, 0.01).expect("it is 2 mm away");
+/// assert!((distance - 0.002).abs() < 1e-4 && normal.y > 0.99);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct LayeredImage {
     triangles: Vec<SearchTriangle>,

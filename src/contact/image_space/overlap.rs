@@ -6,6 +6,23 @@ use super::surface::Surface;
 use crate::base::{Result, memory};
 
 /// What two surfaces have in common. Index 0 belongs to the first, 1 to the second.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::detection::image_space::*;
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
+/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
+/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+/// # let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
+/// # let overlap = space.detect(&bodies)?;
+/// // The second cube is 8 cm along x: the first moves back.
+/// assert!(overlap.normal.x < -0.99);
+/// assert!((overlap.depth - 0.02).abs() < 0.002);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Overlap {
     /// What of each lies inside the other; nothing where the other is open.
@@ -25,6 +42,23 @@ pub struct Overlap {
 }
 
 /// What of a surface lies inside another.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::detection::image_space::*;
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
+/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
+/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+/// # let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
+/// # let overlap = space.detect(&bodies)?;
+/// let [first, second] = &overlap.inside;
+/// assert!(!first.points.is_empty() && !second.points.is_empty());
+/// assert_eq!(first.unlisted, 0);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Debug, Default)]
 pub struct Inside {
     /// In ascending order; none of a surface that is open.
@@ -36,6 +70,24 @@ pub struct Inside {
 }
 
 /// A node inside a surface.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::detection::image_space::*;
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
+/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
+/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+/// # let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
+/// # let overlap = space.detect(&bodies)?;
+/// for point in &overlap.inside[0].points {
+///     assert!(mesh.positions[point.node as usize].x > 0.03);
+///     assert!(point.depth <= 0.021);
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointInside {
     /// The node.
@@ -47,6 +99,24 @@ pub struct PointInside {
 }
 
 /// A part of an edge inside a surface.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::detection::image_space::*;
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
+/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
+/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+/// # let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
+/// # let overlap = space.detect(&bodies)?;
+/// for part in &overlap.inside[0].edges {
+///     let [start, end] = cube.edges()[part.edge as usize].map(|node| mesh.positions[node as usize]);
+///     assert!(start.lerp(end, part.entry).x > 0.028 && start.lerp(end, part.exit).x > 0.028);
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeInside {
     /// Its place among [`Surface::edges`].

@@ -10,6 +10,20 @@ pub(super) const OPEN: &str =
     "the surface is not closed: an occluder must be, with each edge as often in one direction as in the other";
 
 /// The triangles of a body and their edges.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::detection::image_space::*;
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
+/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// assert!(cube.is_closed());
+/// // A closed surface has three edges for two triangles.
+/// assert_eq!(2 * cube.edges().len(), 3 * cube.triangles().len());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Surface {
     node_count: usize,
@@ -19,6 +33,20 @@ pub struct Surface {
 }
 
 /// A surface where its nodes are now.
+///
+/// ```
+/// # use glam::Vec3;
+/// # use sinew::detection::image_space::*;
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
+/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
+/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
+/// let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
+/// let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
+/// let overlap = space.detect(&[place(&mesh.positions[..]), place(&moved[..])])?;
+/// assert!(!overlap.is_empty());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
     /// What is joined to what.

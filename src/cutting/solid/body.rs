@@ -13,6 +13,22 @@ use crate::cutting::tracked::Tracked;
 pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// A tetrahedron that is simulated.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSolid, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
+/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
+/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
+/// # let near = solid.near(&across, &mesh.positions)?;
+/// # let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// let volume: f64 = solid.cells().iter().map(|cell| cell.volume).sum();
+/// // A cut takes nothing away.
+/// assert!((volume - 0.04_f64.powi(3)).abs() < 1e-9);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidCell {
     /// Its nodes, in the order in which they were given.
@@ -43,6 +59,23 @@ pub(crate) enum Face {
 saved_enum!(Face { 0 => Whole, 1 => Severed, 2 => Opening });
 
 /// A tetrahedron of the material.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSolid, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
+/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
+/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
+/// # let near = solid.near(&across, &mesh.positions)?;
+/// # let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// for tetrahedron in solid.tetrahedra() {
+///     assert!(tetrahedron.volume > 0.0);
+///     assert!(tetrahedron.volume <= solid.cells()[tetrahedron.cell as usize].volume * (1.0 + 1e-9));
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidTetrahedron {
     /// Its vertices; seen from the first the others are clockwise, that is, their triple product is above 0.
@@ -66,6 +99,21 @@ pub struct SolidTetrahedron {
 saved! { SolidTetrahedron { corners, cell, volume, neighbours, faces, drawn, turned, next } }
 
 /// A triangle that is drawn and touched: a face of the material with nothing across.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSolid, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
+/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
+/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
+/// # let near = solid.near(&across, &mesh.positions)?;
+/// # let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// let inner = solid.triangles().iter().filter(|triangle| triangle.is_inner);
+/// assert_eq!(inner.count(), 2 * changes.faces.len());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidTriangle {
     /// Its vertices, counterclockwise seen from outside.
@@ -81,6 +129,22 @@ pub struct SolidTriangle {
 saved! { SolidTriangle { corners, cell, is_inner, tetrahedron } }
 
 /// A corner of the material. Those that triangles have are drawn; others lie inside.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSolid, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
+/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
+/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
+/// # let near = solid.near(&across, &mesh.positions)?;
+/// # let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// for vertex in solid.vertices() {
+///     assert!((vertex.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+/// }
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidVertex {
     /// The nodes that it is bound to; unused ones repeat the first with weight 0.
@@ -99,6 +163,21 @@ pub struct SolidVertex {
 saved! { SolidVertex { nodes, weights, point, around, mark, other_mark } }
 
 /// A solid that can be cut.
+///
+/// ```
+/// # use glam::vec3;
+/// # use sinew::cutting::{CutSolid, Limits, Sweep};
+/// # use sinew::mesh::Mesh;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
+/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
+/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
+/// let near = solid.near(&across, &mesh.positions)?;
+/// let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// assert_eq!(solid.piece_count()?, 2);
+/// assert!(!changes.faces.is_empty());
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct CutSolid {
     pub(crate) nodes: Tracked<Node>,

@@ -22,6 +22,24 @@ const CANCELS: f64 = 1e-5;
 const SADDLES: u32 = 50;
 
 /// How a state of rest is looked for; see [`World::rest_state`](crate::World::rest_state).
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let body = world.create_body(&block)?;
+/// # world.body_mut(body)?.pin_box(vec3(-1.0, 0.019, -1.0), vec3(1.0, 1.0, 1.0))?;
+/// // The block hangs from its upper side.
+/// let report = world.rest_state(body, &RestStateDefinition { tolerance: 1e-6, ..RestStateDefinition::default() })?;
+/// assert!(report.error <= 1e-6);
+/// assert!(world.body(body)?.bounds()[0].y < -0.02);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RestStateDefinition {
     /// How far a node may be from where it is at rest, as far as that can be told, m; 0: a millionth of the body's extent.
@@ -31,6 +49,23 @@ pub struct RestStateDefinition {
 }
 
 /// How a state of rest was found.
+///
+/// ```
+/// # use glam::{Quat, Vec3, vec3};
+/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
+/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
+/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
+/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
+/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let body = world.create_body(&block)?;
+/// # world.body_mut(body)?.pin_box(vec3(-1.0, 0.019, -1.0), vec3(1.0, 1.0, 1.0))?;
+/// let report = world.rest_state(body, &RestStateDefinition::default())?;
+/// assert!(report.energy_after < report.energy_before);
+/// assert!(report.iterations > 0 && report.residual < 1e-3);
+/// # Ok::<(), sinew::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RestStateReport {
     /// Linearised equations that were solved.
