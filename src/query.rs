@@ -15,13 +15,12 @@ use crate::world::World;
 /// A point of a body's surface.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::{Vec3, vec3};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let body = world.create_body(&cloth)?;
 /// let hit = world.cast_ray(vec3(0.01, 0.5, 0.02), Vec3::NEG_Y, 1.0)?.expect("the cloth is below");
 /// assert_eq!(hit.body, body);
@@ -47,8 +46,8 @@ pub struct SurfaceHit {
 /// What a ray meets.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::*;
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.1 }))?;
 /// match world.cast_ray_at(Vec3::Y, Vec3::NEG_Y, 2.0, CollisionFilter::ALL)? {

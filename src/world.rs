@@ -51,8 +51,8 @@ const FRAME: f32 = 1.0 / 60.0;
 /// How a world steps.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::*;
 /// let definition = WorldDefinition { gravity: 1.62 * Vec3::NEG_Y, thread_count: 2, ..WorldDefinition::default() };
 /// let world = World::new(definition)?;
 /// assert_eq!(world.gravity().y, -1.62);
@@ -97,12 +97,10 @@ impl Default for WorldDefinition {
 /// Bodies and tools that are stepped together.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// let mut world = World::new(WorldDefinition::default())?;
 /// let body = world.create_body(&cloth)?;
 /// for _ in 0..6 {

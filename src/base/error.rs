@@ -5,8 +5,7 @@ use super::StepReport;
 /// Why a call was refused or failed. A call that answers with an error has changed nothing.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::*;
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// let refused = world.step(-1.0);
 /// assert!(matches!(refused, Err(Error::InvalidArgument(_))));

@@ -60,13 +60,11 @@ impl WorldTag {
 /// A body of a world.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// let body = world.create_body(&cloth)?;
 /// world.destroy_body(body)?;
 /// assert!(!world.has_body(body));
@@ -78,8 +76,7 @@ pub struct BodyId(pub(crate) SlotId);
 /// A tool of a world.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::*;
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))?;
 /// assert!(world.has_tool(ball));
@@ -91,13 +88,11 @@ pub struct ToolId(pub(crate) SlotId);
 /// What a tool holds of a body, or a body of another.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let body = world.create_body(&cloth)?;
 /// # let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))?;
 /// let held = world.attach_node(body, 12, ball, 0.0)?;
@@ -111,8 +106,8 @@ pub struct AttachmentId(pub(crate) SlotId);
 /// A blade of a world.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::*;
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// let blade = world.create_blade(&BladeDefinition::new([Vec3::NEG_Y, Vec3::Y]))?;
 /// assert!(world.has_blade(blade));

@@ -5,13 +5,11 @@ use super::ids::BodyId;
 /// What bounds the substeps of a body.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { max_substeps: 1, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # world.create_body(&BodyDefinition { solver: Solver::Verlet, ..cloth })?;
 /// let Err(Error::Unstable { report, .. }) = world.step(1.0 / 60.0) else { panic!("a single substep suffices") };
 /// assert_eq!(report.limit.map(|limit| limit.of.kind), Some(LimitKind::Spring));
@@ -50,13 +48,11 @@ impl LimitKind {
 /// The part of a body that allows the shortest substep.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { max_substeps: 1, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # world.create_body(&BodyDefinition { solver: Solver::Verlet, ..cloth })?;
 /// if let Err(Error::Unstable { report: StepReport { limit: Some(limit), .. }, .. }) = world.step(1.0 / 60.0) {
 ///     let SubstepLimit { kind, nodes, node_count } = limit.of;
@@ -96,13 +92,11 @@ impl SubstepLimit {
 /// What a step did.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let body = world.create_body(&cloth)?;
 /// let report = world.step(1.0 / 60.0)?;
 /// assert!(report.substeps as f32 * report.stable_substep >= 1.0 / 60.0);
@@ -137,13 +131,11 @@ pub struct StepReport {
 /// The body that needs more substeps than are allowed.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { max_substeps: 1, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let body = world.create_body(&BodyDefinition { solver: Solver::Verlet, ..cloth })?;
 /// if let Err(Error::Unstable { report: StepReport { limit: Some(limit), .. }, .. }) = world.step(1.0 / 60.0) {
 ///     assert_eq!(limit.body, body);

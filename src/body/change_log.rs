@@ -7,13 +7,12 @@ use crate::cutting::Changes;
 /// Where a node that a cut added comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
+/// # use glam::vec3;
 /// # use sinew::{cutting::Sweep, mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
 /// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
@@ -43,18 +42,18 @@ saved! { NewNodeSource { node, sources, weights } }
 /// An edge of the rim of a cut. Each edge that was cut is two of them, one on either side.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
+/// # use glam::vec3;
 /// # use sinew::{cutting::Sweep, mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
 /// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
 /// world.cut(sheet, &across)?;
 /// let body = world.body(sheet)?;
+/// # assert!(!body.changes_since(0)?.rim.is_empty());
 /// for edge in body.changes_since(0)?.rim {
 ///     let triangle = body.surface()[edge.triangle as usize];
 ///     assert!(edge.nodes.iter().all(|node| triangle.contains(node)));
@@ -75,13 +74,12 @@ saved! { NewRimEdge { nodes, triangle } }
 /// What has come, changed or gone since a version.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
+/// # use glam::vec3;
 /// # use sinew::{cutting::Sweep, mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
 /// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };

@@ -18,13 +18,12 @@ use crate::tissue::{Skin, SkinChange, SurfaceToBe};
 /// What a cut did.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
+/// # use glam::vec3;
 /// # use sinew::{cutting::Sweep, mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
 /// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };

@@ -8,16 +8,13 @@ use crate::codec::saved;
 /// Where a tool pressed a body when the last step ended.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
-/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
-/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
-/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
+/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
 /// # let block = world.create_body(&block)?;
-/// # world.body_mut(block)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, -0.019, 1.0))?;
 /// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
 /// # ball.pose.position = 0.03 * Vec3::Y;
 /// # let ball = world.create_tool(&ball)?;
@@ -47,16 +44,13 @@ pub struct Contact {
 /// A tool and a body that began or ceased to touch in the last step.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
-/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
-/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
-/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
+/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
 /// # let block = world.create_body(&block)?;
-/// # world.body_mut(block)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, -0.019, 1.0))?;
 /// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
 /// # ball.pose.position = 0.03 * Vec3::Y;
 /// # let ball = world.create_tool(&ball)?;
@@ -80,12 +74,11 @@ pub struct ContactChange {
 ///
 /// ```
 /// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let contact = BodyContact { thickness: 0.001, with_bodies: true, ..BodyContact::default() };
 /// # let [lower, upper] = [0, 1].map(|_| world.create_body(&BodyDefinition { contact, ..cloth }));
 /// # let (lower, upper) = (lower?, upper?);
@@ -110,13 +103,12 @@ pub struct BodyContactChange {
 /// A blade and a body of which contact began or ceased in the last step.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::{Vec3, vec3};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, toughness: 0.01, ..cloth })?;
 /// # let mut blade = BladeDefinition::new([0.01 * Vec3::NEG_Y, 0.01 * Vec3::Y]);
 /// # blade.pose.position = vec3(0.003, 0.0, -0.051);

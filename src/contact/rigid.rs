@@ -22,8 +22,7 @@ const HEAVIEST: f32 = 1e12;
 /// Mass, centre of mass and inertia of a rigid tool, in the tool's own axes.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::*;
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))?;
 /// let mass = world.mass_of_density(ball, 7800.0)?;

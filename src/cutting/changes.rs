@@ -14,6 +14,7 @@ use crate::base::{Result, memory};
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// # assert!(!changes.nodes.is_empty());
 /// for piece in &changes.nodes {
 ///     let pieces = changes.nodes.iter().filter(|other| other.source == piece.source);
 ///     assert!((pieces.map(|piece| piece.part).sum::<f64>() - 1.0).abs() < 1e-9);
@@ -42,6 +43,7 @@ pub struct PieceOfNode {
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// # assert!(!changes.springs.is_empty());
 /// for piece in &changes.springs {
 ///     let pieces = changes.springs.iter().filter(|other| other.source == piece.source);
 ///     assert!((pieces.map(|piece| piece.part).sum::<f64>() - 1.0).abs() < 1e-9);
@@ -97,6 +99,7 @@ pub struct PieceOfCell {
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// # assert!(!changes.bound.is_empty());
 /// for bound in &changes.bound {
 ///     assert!((bound.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
 ///     assert!(!bound.nodes.contains(&bound.point));
@@ -125,6 +128,7 @@ pub struct BoundPoint {
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// # assert!(!changes.sources.is_empty());
 /// for new in &changes.sources {
 ///     assert!(new.point as usize >= mesh.positions.len());
 ///     assert!(new.sources.iter().all(|&source| source < new.point));

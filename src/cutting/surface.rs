@@ -111,10 +111,9 @@ saved! { SurfaceVertex { nodes, weights, point, around } }
 /// # use sinew::cutting::{CutSurface, Limits, Sweep};
 /// # use sinew::mesh::Mesh;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
 /// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
-/// # let mut sheet = sheet.clone();
+/// let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
 /// let near = sheet.near(&across, &mesh.positions)?;
 /// sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// assert_eq!(sheet.piece_count()?, 2);

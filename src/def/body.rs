@@ -13,9 +13,18 @@ use crate::base::{Error, Result, finite, memory, not_negative};
 /// One value for all, or one for each.
 ///
 /// ```
-/// use sinew::Values;
-/// assert_eq!(Values::Uniform(0.5).get(7), 0.5);
-/// assert_eq!(Values::Each(&[1.0, 2.0, 3.0]).get(2), 3.0);
+/// # use sinew::{mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// let mut masses = vec![1e-4; mesh.positions.len()];
+/// // The first node is pinned for good.
+/// masses[0] = 0.0;
+/// let body = world.create_body(&BodyDefinition { masses: Values::Each(&masses), ..cloth })?;
+/// world.step(1.0 / 60.0)?;
+/// assert_eq!(world.body(body)?.positions()[0], mesh.positions[0]);
+/// # Ok::<(), sinew::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Values<'a> {
@@ -55,13 +64,11 @@ impl Values<'_> {
 /// How a body keeps its springs.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// let packed = world.create_body(&BodyDefinition { storage: Storage::Packed, ..cloth })?;
 /// let linked = world.create_body(&BodyDefinition { storage: Storage::FastLink, ..cloth })?;
 /// let springs = |body| world.body(body).map(|body| body.storage_report().spring_count);
@@ -84,13 +91,11 @@ pub enum Storage {
 /// How a body is moved.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// let stiff = BodyDefinition { stiffnesses: Values::Uniform(1e5), solver: Solver::Implicit, ..cloth };
 /// # world.create_body(&stiff)?;
 /// let report = world.step(1.0 / 60.0)?;

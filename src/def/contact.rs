@@ -7,16 +7,13 @@ use crate::mesh::FURTHEST;
 /// How a tool finds what it touches.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
-/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
-/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
-/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
+/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
 /// # let block = world.create_body(&block)?;
-/// # world.body_mut(block)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, -0.019, 1.0))?;
 /// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
 /// # ball.pose.position = 0.03 * Vec3::Y;
 /// # let ball = world.create_tool(&ball)?;
@@ -47,16 +44,13 @@ saved_enum!(Detection { 0 => Exact, 1 => ImageSpace, 2 => DistanceField });
 /// Which tools and bodies meet: two do where each has a category that the other's mask has.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
-/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
-/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
-/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
+/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
 /// # let block = world.create_body(&block)?;
-/// # world.body_mut(block)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, -0.019, 1.0))?;
 /// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
 /// # ball.pose.position = 0.03 * Vec3::Y;
 /// # let ball = world.create_tool(&ball)?;
@@ -106,12 +100,11 @@ impl CollisionFilter {
 ///
 /// ```
 /// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// let contact = BodyContact { thickness: 0.001, friction: 0.4, with_bodies: true, ..BodyContact::default() };
 /// let body = world.create_body(&BodyDefinition { contact, ..cloth })?;
 /// # let other = world.create_body(&BodyDefinition { contact, ..cloth })?;

@@ -9,14 +9,11 @@ use crate::codec::saved_enum;
 /// tetrahedra at a node together from a Poisson's ratio of 0.4 on.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
-/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
-/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
-/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
+/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
 /// let rubber = BodyDefinition { element_law: ElementLaw::MooneyRivlin { ratio: 0.25 }, ..block };
 /// assert!(world.create_body(&rubber).is_ok());
 /// let refused = BodyDefinition { element_law: ElementLaw::MooneyRivlin { ratio: 1.5 }, ..block };

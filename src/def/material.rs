@@ -6,14 +6,11 @@ use crate::base::{Error, Result, above_zero, not_negative};
 /// How a material's numbers become forces.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
-/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
-/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
-/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
+/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
 /// # let material = material.expect("the block has one");
 /// let mut with = |model| world.create_body(&BodyDefinition { material: Some(Material { model, ..material }), ..block });
 /// // Poisson's ratio is 0.45: elements can have it, springs cannot.
@@ -56,14 +53,11 @@ pub enum Model {
 /// What a body is made of, by its numbers. Plain data.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
-/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
-/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
-/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
+/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
 /// let material = Material {
 ///     model: Model::Tetrahedra,
 ///     young_modulus: 5000.0,

@@ -5,13 +5,11 @@ use crate::codec::saved;
 /// How much memory the springs of a body take.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let body = world.create_body(&cloth)?;
 /// let report = world.body(body)?.storage_report();
 /// assert_eq!(report.spring_count, mesh.edges()?.len());
@@ -33,8 +31,7 @@ pub struct StorageReport {
 /// What a body encloses: the sums of the cavities that are closed; all 0 where it was not asked to keep or press anything.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
 /// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
@@ -61,13 +58,11 @@ pub struct EnclosedReport {
 /// How a body's solver took the last step.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// let body = world.create_body(&BodyDefinition { solver: Solver::Implicit, ..cloth })?;
 /// # world.body_mut(body)?.pin(0)?;
 /// world.step(1.0 / 60.0)?;
@@ -109,13 +104,11 @@ impl SolverReport {
 /// Energy in joules, at the time of the positions.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let body = world.create_body(&cloth)?;
 /// world.step(1.0 / 60.0)?;
 /// let energy = world.body(body)?.energy(world.gravity());

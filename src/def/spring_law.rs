@@ -7,12 +7,11 @@ use crate::codec::saved_enum;
 /// the stiffness they are given. Springs that are added later are linear.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::*;
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let positions = &[Vec3::ZERO, 0.15 * Vec3::X];
-/// # let (masses, stiffnesses) = (Values::Uniform(0.01), Values::Uniform(10.0));
-/// # let (springs, rest_lengths) = (Some(&[[0, 1]][..]), Some(&[0.1][..]));
+/// # let (positions, rest_lengths) = (&[Vec3::ZERO, 0.15 * Vec3::X], Some(&[0.1][..]));
+/// # let (springs, masses, stiffnesses) = (Some(&[[0, 1]][..]), Values::Uniform(0.01), Values::Uniform(10.0));
 /// # let spring = BodyDefinition { positions, springs, rest_lengths, masses, stiffnesses, ..BodyDefinition::default() };
 /// let law = SpringLaw::Exponential { steepness: 4.0, limit: 1.0 };
 /// let stiffening = world.create_body(&BodyDefinition { spring_law: law, ..spring })?;

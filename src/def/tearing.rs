@@ -17,13 +17,12 @@ use crate::codec::{saved, saved_enum};
 /// strain.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::{Vec3, vec3};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// let tearing = Tearing { strain: 0.5, most_per_step: 4, ..Tearing::default() };
 /// let body = world.create_body(&BodyDefinition { tearing, spare_nodes: 200, ..cloth })?;
 /// let stretched: Vec<Vec3> = mesh.positions.iter().map(|place| vec3(2.0, 1.0, 1.0) * place).collect();
@@ -49,13 +48,12 @@ saved! { Tearing { strain, force, most_per_step, smallest_piece } }
 /// What tore in the last step, and what did not.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::{Vec3, vec3};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let tearing = Tearing { strain: 0.5, most_per_step: 4, ..Tearing::default() };
 /// # let body = world.create_body(&BodyDefinition { tearing, spare_nodes: 200, ..cloth })?;
 /// # let stretched: Vec<Vec3> = mesh.positions.iter().map(|place| vec3(2.0, 1.0, 1.0) * place).collect();

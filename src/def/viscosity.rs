@@ -13,12 +13,11 @@ use crate::soa::Rates;
 /// of shorter substeps.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::*;
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let positions = &[Vec3::ZERO, 0.15 * Vec3::X];
-/// # let (masses, stiffnesses) = (Values::Uniform(0.01), Values::Uniform(10.0));
-/// # let (springs, rest_lengths) = (Some(&[[0, 1]][..]), Some(&[0.1][..]));
+/// # let (positions, rest_lengths) = (&[Vec3::ZERO, 0.15 * Vec3::X], Some(&[0.1][..]));
+/// # let (springs, masses, stiffnesses) = (Some(&[[0, 1]][..]), Values::Uniform(0.01), Values::Uniform(10.0));
 /// # let spring = BodyDefinition { positions, springs, rest_lengths, masses, stiffnesses, ..BodyDefinition::default() };
 /// let viscosity = Viscosity { retardation_time: 0.05, relaxation_time: 0.0 };
 /// let body = world.create_body(&BodyDefinition { viscosity, ..spring })?;

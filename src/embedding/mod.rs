@@ -20,14 +20,12 @@ use follow::Follower;
 /// A surface that is drawn, and what of a body it goes with. Plain data, used only during [`World::create_embedding`].
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
-/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
-/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
-/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
+/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
 /// # let body = world.create_body(&block)?;
 /// let skin = EmbeddingDefinition { vertices: &[0.01 * Vec3::ONE], tetrahedra: &mesh.tetrahedra, ..EmbeddingDefinition::default() };
 /// let embedding = world.create_embedding(body, &skin)?;
@@ -53,14 +51,12 @@ pub struct EmbeddingDefinition<'a> {
 /// across are left out.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::Vec3;
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let (positions, tetrahedra) = (&mesh.positions[..], &mesh.tetrahedra[..]);
-/// # let (model, young_modulus, poisson_ratio, density) = (Model::Tetrahedra, 5000.0, 0.45, 1000.0);
-/// # let material = Some(Material { model, young_modulus, poisson_ratio, density, thickness: 0.0 });
-/// # let block = BodyDefinition { positions, tetrahedra, material, ..BodyDefinition::default() };
+/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
+/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
 /// # let body = world.create_body(&block)?;
 /// # let skin = EmbeddingDefinition { vertices: &[0.01 * Vec3::ONE], tetrahedra: &mesh.tetrahedra, ..EmbeddingDefinition::default() };
 /// let mut embedding = world.create_embedding(body, &skin)?;

@@ -10,8 +10,7 @@ const SOFTEST: f64 = 1e-6;
 /// How a device is coupled to a tool. Plain data, used only during [`World::create_haptic`](crate::World::create_haptic).
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::*;
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))?;
 /// let definition = HapticDefinition { stiffness: 500.0, force_limit: 3.0, ..HapticDefinition::new(ball) };

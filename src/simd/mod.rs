@@ -32,12 +32,17 @@ pub(crate) struct Record(pub [f32; 4]);
 /// The widest instructions that kernels use.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
-/// // The same bits on every machine.
-/// let world = World::new(WorldDefinition { kernel: Kernel::Portable, ..WorldDefinition::default() })?;
-/// # let other = World::new(WorldDefinition { kernel: Kernel::Portable, ..WorldDefinition::default() })?;
-/// assert_eq!(world.state_hash(), other.state_hash());
+/// # use sinew::{mesh::Mesh, *};
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// let fallen = |kernel| {
+///     let mut world = World::new(WorldDefinition { kernel, ..WorldDefinition::default() })?;
+///     let body = world.create_body(&cloth)?;
+///     world.step(1.0 / 60.0)?;
+///     world.body(body).map(|body| body.positions()[0])
+/// };
+/// assert!(fallen(Kernel::Best)?.distance(fallen(Kernel::Portable)?) < 1e-6);
 /// # Ok::<(), sinew::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

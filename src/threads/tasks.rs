@@ -27,8 +27,7 @@ type CRun = unsafe extern "C" fn(context: *mut c_void, task: Option<CTask>, task
 /// should not be asked for more tasks than it has threads that are free.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// fn run(count: u32, task: &(dyn Fn(u32) + Sync)) {
 ///     std::thread::scope(|scope| (0..count).for_each(|index| drop(scope.spawn(move || task(index)))));
 /// }
@@ -36,8 +35,7 @@ type CRun = unsafe extern "C" fn(context: *mut c_void, task: Option<CTask>, task
 /// let mut world = World::new(WorldDefinition { thread_count: 2, tasks, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let body = world.create_body(&cloth)?;
 /// world.step(1.0 / 60.0)?;
 /// assert!(world.body(body)?.bounds()[1].y < 0.0);

@@ -9,13 +9,12 @@ use crate::tissue::{Thread, distance};
 /// What a suture is like.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::{Quat, Vec3};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let [left, right] = [0, 1].map(|_| world.create_body(&cloth));
 /// # let (left, right) = (left?, right?);
 /// # world.body_mut(right)?.transform(0.11 * Vec3::X, Quat::IDENTITY, None)?;
@@ -50,13 +49,12 @@ impl Default for SutureDefinition {
 /// How a suture is now.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use glam::{Quat, Vec3};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let [left, right] = [0, 1].map(|_| world.create_body(&cloth));
 /// # let (left, right) = (left?, right?);
 /// # world.body_mut(right)?.transform(0.11 * Vec3::X, Quat::IDENTITY, None)?;

@@ -38,7 +38,7 @@ const EQUAL: f32 = 1e-4;
 ///
 /// ```
 /// # use glam::Vec3;
-/// # use sinew::mesh::{ClosedSurface, Mesh};
+/// # use sinew::mesh::Mesh;
 /// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
 /// # let triangles = mesh.surface()?;
 /// use sinew::detection::image_space::LayeredImage;

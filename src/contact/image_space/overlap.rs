@@ -82,6 +82,7 @@ pub struct Inside {
 /// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
 /// # let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
 /// # let overlap = space.detect(&bodies)?;
+/// # assert!(!overlap.inside[0].points.is_empty());
 /// for point in &overlap.inside[0].points {
 ///     assert!(mesh.positions[point.node as usize].x > 0.03);
 ///     assert!(point.depth <= 0.021);
@@ -111,6 +112,7 @@ pub struct PointInside {
 /// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
 /// # let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
 /// # let overlap = space.detect(&bodies)?;
+/// # assert!(!overlap.inside[0].edges.is_empty());
 /// for part in &overlap.inside[0].edges {
 ///     let [start, end] = cube.edges()[part.edge as usize].map(|node| mesh.positions[node as usize]);
 ///     assert!(start.lerp(end, part.entry).x > 0.028 && start.lerp(end, part.exit).x > 0.028);

@@ -12,12 +12,9 @@ pub(super) const OPEN: &str =
 /// The triangles of a body and their edges.
 ///
 /// ```
-/// # use glam::Vec3;
-/// # use sinew::detection::image_space::*;
+/// # use sinew::detection::image_space::Surface;
 /// # use sinew::mesh::Mesh;
 /// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
-/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
-/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
 /// let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
 /// assert!(cube.is_closed());
 /// // A closed surface has three edges for two triangles.

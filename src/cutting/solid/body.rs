@@ -169,9 +169,9 @@ saved! { SolidVertex { nodes, weights, point, around, mark, other_mark } }
 /// # use sinew::cutting::{CutSolid, Limits, Sweep};
 /// # use sinew::mesh::Mesh;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
 /// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
 /// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
+/// let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
 /// let near = solid.near(&across, &mesh.positions)?;
 /// let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// assert_eq!(solid.piece_count()?, 2);

@@ -20,12 +20,11 @@ use scanner::Scanner;
 /// ```
 /// use sinew::mesh::{MeshFormat, load};
 /// # let path = std::env::temp_dir().join(format!("sinew_mesh_format_{}.txt", std::process::id()));
-/// # let io = |error: std::io::Error| sinew::Error::Io(error.to_string());
-/// std::fs::write(&path, "v 0 0 0\nv 100 0 0\nv 0 0 100\nf 1 3 2\n").map_err(io)?;
-/// // The name says nothing about the format, and the file is in millimetres.
+/// # std::fs::write(&path, "v 0 0 0\nv 100 0 0\nv 0 0 100\nf 1 3 2\n").expect("a file");
+/// // A file in millimetres, whose name says nothing about its format.
 /// let loaded = load(&path, MeshFormat::Obj, 0.001)?;
 /// assert_eq!(loaded.mesh.positions[1].x, 0.1);
-/// # std::fs::remove_file(&path).map_err(io)?;
+/// # std::fs::remove_file(&path).expect("the file");
 /// # Ok::<(), sinew::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

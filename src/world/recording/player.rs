@@ -13,13 +13,11 @@ use crate::codec::seal;
 /// What came of a replay.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let (positions, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
-/// # let cloth = BodyDefinition { positions, triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let body = world.create_body(&cloth)?;
 /// # let path = std::env::temp_dir().join(format!("sinew_replay_report_{}", std::process::id()));
 /// world.start_recording(&path)?;
@@ -27,7 +25,7 @@ use crate::codec::seal;
 /// world.stop_recording()?;
 /// let report = World::replay(&path, 1)?;
 /// assert_eq!((report.steps, report.difference, report.is_cut_short), (1, None, false));
-/// # std::fs::remove_file(&path).map_err(|error| Error::Io(error.to_string()))?;
+/// # std::fs::remove_file(&path).expect("the file");
 /// # Ok::<(), sinew::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,8 +41,7 @@ pub struct ReplayReport {
 /// The first difference of a replay from its recording.
 ///
 /// ```
-/// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::*;
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let path = std::env::temp_dir().join(format!("sinew_replay_difference_{}", std::process::id()));
 /// # world.start_recording(&path)?;
@@ -53,7 +50,7 @@ pub struct ReplayReport {
 /// if let Some(ReplayDifference { step, recorded, replayed }) = World::replay(&path, 1)?.difference {
 ///     panic!("step {step} came to {replayed:x} instead of {recorded:x}");
 /// }
-/// # std::fs::remove_file(&path).map_err(|error| Error::Io(error.to_string()))?;
+/// # std::fs::remove_file(&path).expect("the file");
 /// # Ok::<(), sinew::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
