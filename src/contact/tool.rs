@@ -26,6 +26,7 @@ use crate::mesh::FURTHEST;
 /// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// # let body = world.create_body(&cloth)?;
 /// # world.body_mut(body)?.transform(0.01 * Vec3::Y, Quat::IDENTITY, None)?;
+/// // The cloth begins 1 cm above it.
 /// world.create_tool(&ToolDefinition::new(Shape::Plane))?;
 /// for _ in 0..30 {
 ///     world.step(1.0 / 60.0)?;
@@ -146,11 +147,7 @@ impl Pose {
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
 /// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
 /// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
-/// # let block = world.create_body(&block)?;
-/// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
-/// # ball.pose.position = 0.03 * Vec3::Y;
-/// # let ball = world.create_tool(&ball)?;
-/// # world.destroy_tool(ball)?;
+/// # world.create_body(&block)?;
 /// let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
 /// ball.pose.position = 0.03 * Vec3::Y;
 /// let ball = world.create_tool(&ball)?;
