@@ -76,17 +76,18 @@ saved! { SurfaceTriangle { corners, cell, rim, neighbours, next } }
 /// A corner of what is drawn.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
+/// # use glam::{Vec3, vec3};
+/// # use sinew::cutting::{CutSurface, Sweep};
 /// # use sinew::mesh::Mesh;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
 /// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
-/// # let near = sheet.near(&across, &mesh.positions)?;
-/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// // As long as nothing is cut, each vertex is at a node.
 /// for vertex in sheet.vertices() {
-///     assert!((vertex.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+///     let parts = vertex.nodes.iter().zip(vertex.weights);
+///     let place: Vec3 = parts.map(|(&node, weight)| weight as f32 * mesh.positions[node as usize]).sum();
+///     assert_eq!(place, mesh.positions[vertex.point as usize]);
 /// }
 /// # Ok::<(), sinew::Error>(())
 /// ```

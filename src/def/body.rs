@@ -70,9 +70,9 @@ impl Values<'_> {
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
 /// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
 /// let packed = world.create_body(&BodyDefinition { storage: Storage::Packed, ..cloth })?;
-/// let linked = world.create_body(&BodyDefinition { storage: Storage::FastLink, ..cloth })?;
-/// let springs = |body| world.body(body).map(|body| body.storage_report().spring_count);
-/// assert_eq!(springs(packed)?, springs(linked)?);
+/// let linked = world.create_body(&BodyDefinition { storage: Storage::Efficient, ..cloth })?;
+/// let bytes = |body| world.body(body).map(|body| body.storage_report().bytes_used);
+/// assert!(bytes(packed)? < bytes(linked)?);
 /// # Ok::<(), sinew::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -94,7 +94,7 @@ pub struct HapticTick {
 /// When it is dropped, the tool is the world's again.
 ///
 /// ```
-/// # use glam::{Vec3, vec3};
+/// # use glam::Vec3;
 /// # use sinew::{mesh::Mesh, *};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
@@ -104,10 +104,10 @@ pub struct HapticTick {
 /// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
 /// # ball.pose.position = 0.03 * Vec3::Y;
 /// # let ball = world.create_tool(&ball)?;
-/// # world.body_mut(block)?.pin_box(vec3(-1.0, -1.0, -1.0), vec3(1.0, -0.019, 1.0))?;
+/// # let pose = Pose { position: 0.03 * Vec3::Y, ..Pose::IDENTITY };
 /// let mut handle = world.create_haptic(&HapticDefinition::new(ball))?;
 /// let device = std::thread::spawn(move || {
-///     (0..100).try_for_each(|_| handle.tick(Pose::IDENTITY, None, None, 0.001).map(|_| ()))
+///     (0..100).try_for_each(|_| handle.tick(pose, None, None, 0.001).map(|_| ()))
 /// });
 /// world.step(1.0 / 60.0)?;
 /// assert_eq!(device.join().expect("no tick panics"), Ok(()));

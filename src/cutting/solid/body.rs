@@ -131,17 +131,18 @@ saved! { SolidTriangle { corners, cell, is_inner, tetrahedron } }
 /// A corner of the material. Those that triangles have are drawn; others lie inside.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSolid, Limits, Sweep};
+/// # use glam::{Vec3, vec3};
+/// # use sinew::cutting::{CutSolid, Sweep};
 /// # use sinew::mesh::Mesh;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
 /// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
 /// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
 /// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
-/// # let near = solid.near(&across, &mesh.positions)?;
-/// # let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// // As long as nothing is cut, each vertex is at a node.
 /// for vertex in solid.vertices() {
-///     assert!((vertex.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+///     let parts = vertex.nodes.iter().zip(vertex.weights);
+///     let place: Vec3 = parts.map(|(&node, weight)| weight as f32 * mesh.positions[node as usize]).sum();
+///     assert_eq!(place, mesh.positions[vertex.point as usize]);
 /// }
 /// # Ok::<(), sinew::Error>(())
 /// ```
