@@ -37,7 +37,7 @@ const STRETCHED: [f32; 3] = [1.0, 0.15, 0.1];
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
 /// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
-/// # let body = world.create_body(&cloth)?;
+/// # world.create_body(&cloth)?;
 /// #[derive(Default)]
 /// struct LineList(Vec<[Vec3; 2]>);
 /// impl DebugCanvas for LineList {

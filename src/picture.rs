@@ -18,7 +18,7 @@ use crate::world::World;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
 /// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
-/// # let body = world.create_body(&cloth)?;
+/// # world.create_body(&cloth)?;
 /// let definition = PictureDefinition { width: 64, height: 48, ..PictureDefinition::default() };
 /// let picture = world.picture(&definition)?;
 /// assert_eq!((picture.width, picture.height), (64, 48));

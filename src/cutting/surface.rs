@@ -19,7 +19,7 @@ use crate::codec::saved;
 /// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
 /// # let near = sheet.near(&across, &mesh.positions)?;
-/// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// # sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// let area: f64 = sheet.cells().iter().map(|cell| cell.area).sum();
 /// // A cut takes nothing away.
 /// assert!((area - 0.01).abs() < 1e-8);
@@ -76,13 +76,10 @@ saved! { SurfaceTriangle { corners, cell, rim, neighbours, next } }
 /// A corner of what is drawn.
 ///
 /// ```
-/// # use glam::{Vec3, vec3};
-/// # use sinew::cutting::{CutSurface, Sweep};
-/// # use sinew::mesh::Mesh;
+/// # use glam::Vec3;
+/// # use sinew::{cutting::CutSurface, mesh::Mesh};
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+/// # let sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
 /// // As long as nothing is cut, each vertex is at a node.
 /// for vertex in sheet.vertices() {
 ///     let parts = vertex.nodes.iter().zip(vertex.weights);

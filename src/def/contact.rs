@@ -46,7 +46,7 @@ saved_enum!(Detection { 0 => Exact, 1 => ImageSpace, 2 => DistanceField });
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
 /// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
 /// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
-/// # let block = world.create_body(&block)?;
+/// # world.create_body(&block)?;
 /// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
 /// # ball.pose.position = 0.03 * Vec3::Y;
 /// # let ball = world.create_tool(&ball)?;

@@ -77,7 +77,7 @@ impl BladeDefinition {
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
 /// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
-/// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
+/// # world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
 /// # let mut blade = BladeDefinition::new([0.01 * Vec3::NEG_Y, 0.01 * Vec3::Y]);
 /// # blade.pose.position = vec3(0.003, 0.0, -0.06);
 /// # let blade = world.create_blade(&blade)?;

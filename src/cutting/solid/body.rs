@@ -23,7 +23,7 @@ pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 
 /// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
 /// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
 /// # let near = solid.near(&across, &mesh.positions)?;
-/// # let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// # solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// let volume: f64 = solid.cells().iter().map(|cell| cell.volume).sum();
 /// // A cut takes nothing away.
 /// assert!((volume - 0.04_f64.powi(3)).abs() < 1e-9);
@@ -69,7 +69,7 @@ saved_enum!(Face { 0 => Whole, 1 => Severed, 2 => Opening });
 /// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
 /// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
 /// # let near = solid.near(&across, &mesh.positions)?;
-/// # let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
+/// # solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// for tetrahedron in solid.tetrahedra() {
 ///     assert!(tetrahedron.volume > 0.0);
 ///     assert!(tetrahedron.volume <= solid.cells()[tetrahedron.cell as usize].volume * (1.0 + 1e-9));
@@ -131,13 +131,10 @@ saved! { SolidTriangle { corners, cell, is_inner, tetrahedron } }
 /// A corner of the material. Those that triangles have are drawn; others lie inside.
 ///
 /// ```
-/// # use glam::{Vec3, vec3};
-/// # use sinew::cutting::{CutSolid, Sweep};
-/// # use sinew::mesh::Mesh;
+/// # use glam::Vec3;
+/// # use sinew::{cutting::CutSolid, mesh::Mesh};
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
-/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
-/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
+/// # let solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
 /// // As long as nothing is cut, each vertex is at a node.
 /// for vertex in solid.vertices() {
 ///     let parts = vertex.nodes.iter().zip(vertex.weights);
