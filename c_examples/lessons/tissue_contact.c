@@ -34,7 +34,7 @@ int main(void) {
   const sinew_body_id lower = create_cube(world, 0.0f), upper = create_cube(world, 0.05f);
   pin_below(world, lower, 1, -0.019f);
 
-  sinew_contact contacts[64];
+  sinew_contact contacts[256];
   size_t count;
   CHECK(sinew_body_get_contacts(world, upper, NULL, 0, &count)); /* how many there are */
   printf("before they meet: %u contacts\n", (unsigned)count);
@@ -50,8 +50,8 @@ int main(void) {
   printf("pairs of bodies that touch, by their events: %d\n", touching);
   float carried = 0;
   int others = 0;
-  CHECK(sinew_body_get_contacts(world, upper, contacts, 64, &count));
-  for (size_t i = 0; i < count && i < 64; i++) {
+  CHECK(sinew_body_get_contacts(world, upper, contacts, 256, &count));
+  for (size_t i = 0; i < count && i < 256; i++) {
     carried += contacts[i].force[1]; /* on the upper cube, N */
     others += !sinew_body_id_equals(contacts[i].body, lower);
   }
