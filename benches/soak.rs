@@ -169,12 +169,9 @@ impl Play {
 
     /// A place for what reaches so far from its middle, mostly one where nothing is yet; and whether something may be.
     fn place(&mut self, most: f32, half: Vec3) -> (Vec3, bool) {
-        let is_wild = self.dice.below(16) == 0;
-        for _ in 0..20 {
+        let tries = if self.dice.below(16) == 0 { 0 } else { 20 };
+        for _ in 0..tries {
             let place = self.dice.vector(most);
-            if is_wild {
-                return (place, true);
-            }
             if self.is_free(place - half, place + half) {
                 return (place, false);
             }
