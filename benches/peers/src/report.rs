@@ -147,7 +147,7 @@ fn ratio(rows: &[Row], threads: usize) -> Option<String> {
 }
 
 /// The processor and the system, as Linux names them.
-fn machine() -> String {
+pub fn machine() -> String {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name"));
     let model = model.map_or("unknown processor", |line| line.trim_start_matches([' ', '\t', ':']));

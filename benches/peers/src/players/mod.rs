@@ -70,6 +70,12 @@ pub fn all() -> Vec<Engine> {
     ]
 }
 
+/// This program, as one of the engines that are built in.
+fn built_in(engine: &str) -> Result<Vec<PathBuf>, String> {
+    let this = std::env::current_exe().map_err(|error| error.to_string())?;
+    Ok(vec![this, "player".into(), engine.into()])
+}
+
 /// Is one of the engines that are built in: `player <engine> <model> <positions> <settings>`.
 pub fn serve(arguments: &[String]) {
     let (engine, arguments) = arguments.split_first().expect("an engine");

@@ -129,10 +129,7 @@ fn run(
             )),
         };
     }
-    let bytes = std::fs::read(&positions).map_err(failed)?;
-    let (chunks, _) = bytes.as_chunks::<8>();
-    let numbers: Vec<f64> = chunks.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect();
-    let motion = Motion::from_numbers(&numbers, model);
+    let motion = read_motion(&positions, model).map_err(failed)?;
     match motion.frames.len() == model.frames && motion.is_finite() {
         true => Ok(Played::Whole { motion, seconds }),
         false => Err(DIVERGES.into()),
@@ -141,11 +138,19 @@ fn run(
 
 /// Whether the last frame that was written is nowhere near the first.
 fn has_diverged(positions: &Path, model: &Model) -> bool {
-    let bytes = std::fs::read(positions).unwrap_or_default();
+    let motion = read_motion(positions, model);
+    motion.is_ok_and(|motion| {
+        let reach = motion.end().displacement();
+        !motion.frames.is_empty() && (reach.is_nan() || reach >= 100.0)
+    })
+}
+
+/// The frames that a player has written.
+fn read_motion(positions: &Path, model: &Model) -> std::io::Result<Motion> {
+    let bytes = std::fs::read(positions)?;
     let (chunks, _) = bytes.as_chunks::<8>();
     let numbers: Vec<f64> = chunks.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect();
-    let motion = Motion::from_numbers(&numbers, model);
-    !motion.frames.is_empty() && !(motion.end().displacement() < 100.0)
+    Ok(Motion::from_numbers(&numbers, model))
 }
 
 fn last_line(log: &Path) -> String {

@@ -10,7 +10,7 @@ pub fn engine() -> Engine {
         color: "#4d4d4d",
         program: || super::python::script("pypbd_player.py", "pypbd", "pypbd"),
         lines: |scene| match scene.model.ball {
-            Some(_) => Err("its collision objects for cloth and spheres are not all in its Python interface".into()),
+            Some(_) => Err("this player has no contact".into()),
             None => Ok(lines(scene)),
         },
         notes: "Springs are extended position-based distance constraints. Its finite elements are plain position-based constraints, \

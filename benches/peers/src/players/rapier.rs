@@ -15,10 +15,7 @@ pub fn engine() -> Engine {
     Engine {
         name: "Rapier",
         color: "#b5541c",
-        program: || {
-            let this = std::env::current_exe().map_err(|error| error.to_string())?;
-            Ok(vec![this, "player".into(), "rapier".into()])
-        },
+        program: || super::built_in("rapier"),
         lines: |scene| Ok(lines(scene)),
         notes: "Rapier 0.36 in single precision, `fem` built in. `substeps` are its solver iterations of one step per frame. \
                 Constraints: 4 sweeps by default, and 32. A spring is a constraint of its frequency against the masses at its ends. \

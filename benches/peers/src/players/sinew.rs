@@ -16,10 +16,7 @@ pub fn engine() -> Engine {
     Engine {
         name: "sinew",
         color: "#0b6e99",
-        program: || {
-            let this = std::env::current_exe().map_err(|error| error.to_string())?;
-            Ok(vec![this, "player".into(), "sinew".into()])
-        },
+        program: || super::built_in("sinew"),
         lines: |scene| Ok(lines(scene)),
         notes: "VERLET chooses its substeps from stability, or takes `substeps` of them; IMPLICIT is stepped so many times a frame.",
     }

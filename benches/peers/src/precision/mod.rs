@@ -3,7 +3,6 @@
 mod follow;
 mod implicit_euler;
 pub mod law;
-mod machine;
 pub mod model;
 pub mod motion;
 mod picture;
@@ -28,7 +27,7 @@ pub const DIVERGES: &str = "it diverges";
 
 /// What a command asks for.
 pub struct Request {
-    /// The processor's seconds that a point may take for its scene.
+    /// The processor's seconds that a point may take for a simulated second.
     pub limit: f64,
     /// Only scenes and engines whose name has this; empty: all.
     pub scene: String,
@@ -109,13 +108,13 @@ pub fn compare(request: &Request) {
         })
         .collect();
     let mut outcomes = Vec::new();
-    for scene in scenes::checks().into_iter().chain(scenes::timed()) {
+    for scene in scenes::all() {
         if !scene.name.contains(&request.scene) {
             continue;
         }
         // Checks are not timed: a short look is enough.
-        let is_check = scenes::checks().iter().any(|check| check.name == scene.name);
-        let limit = if is_check { 0.1 * request.limit } else { request.limit };
+        let part = if scene.measure == Measure::Check { 0.1 } else { 1.0 };
+        let limit = part * request.limit;
         outcomes.push(simulate(scene, &programs, limit));
         // After each scene: a run that is cut short has measured something.
         report(&outcomes, &programs, &[]);
@@ -221,7 +220,7 @@ fn simulate(scene: Scene, programs: &[(Engine, Result<Vec<PathBuf>, String>)], l
 /// The part of a motion that a scene asks for.
 fn measured(scene: &Scene, motion: &Motion) -> Motion {
     match scene.measure {
-        Measure::Motion | Measure::Contact => motion.clone(),
         Measure::Rest => motion.end(),
+        _ => motion.clone(),
     }
 }

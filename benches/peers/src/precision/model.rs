@@ -4,6 +4,7 @@
 use std::fmt::Write;
 
 use crate::precision::law::Law;
+use crate::scenes::Block;
 
 /// Frames are of this length, s.
 pub const FRAME: f64 = 1.0 / 60.0;
@@ -58,8 +59,24 @@ impl Model {
         (mu, young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)))
     }
 
+    /// Tetrahedra of a soft solid under its own weight for a second, with these nodes held: Pa, kg/m³.
+    pub fn solid(block: Block, pinned: Vec<usize>, young: f64, density: f64) -> Self {
+        let mut model = Self {
+            positions: block.positions,
+            tetrahedra: block.tetrahedra,
+            pinned,
+            young,
+            poisson: 0.3,
+            gravity: 9.81,
+            frames: 60,
+            ..Self::default()
+        };
+        model.fill(density);
+        model
+    }
+
     /// Gives each node its share of the mass of tetrahedra of so many kg/m³.
-    pub fn fill(&mut self, density: f64) {
+    fn fill(&mut self, density: f64) {
         self.masses = vec![0.0; self.positions.len()];
         for corners in &self.tetrahedra {
             let [a, b, c, d] = corners.map(|node| glam::DVec3::from(self.positions[node]));

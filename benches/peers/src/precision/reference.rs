@@ -206,7 +206,7 @@ impl System {
                 }
             }
             let reach = positions.iter().map(|position| position.length()).sum::<f64>();
-            if !(reach < 1e3 * positions.len() as f64) {
+            if reach.is_nan() || reach >= 1e3 * positions.len() as f64 {
                 return None;
             }
             frames.push(positions.iter().map(DVec3::to_array).collect());

@@ -24,23 +24,17 @@ pub struct Row {
     error: f64,
 }
 
-const SETTINGS: [&[(&str, &str)]; 7] = [
-    &[("iterations", "1")],
-    &[("iterations", "2")],
-    &[("iterations", "4")],
-    &[("iterations", "8")],
-    &[("iterations", "16")],
-    &[],
-    &[("accuracy", "1e-4")],
-];
-const NAMES: [&str; 7] = [
-    "`iterations` 1",
-    "`iterations` 2",
-    "`iterations` 4",
-    "`iterations` 8",
-    "`iterations` 16",
-    "defaults",
-    "`accuracy` 1e-4",
+/// Their names, and what they set.
+type Setting = (&'static str, &'static [(&'static str, &'static str)]);
+
+const SETTINGS: [Setting; 7] = [
+    ("`iterations` 1", &[("iterations", "1")]),
+    ("`iterations` 2", &[("iterations", "2")]),
+    ("`iterations` 4", &[("iterations", "4")]),
+    ("`iterations` 8", &[("iterations", "8")]),
+    ("`iterations` 16", &[("iterations", "16")]),
+    ("defaults", &[]),
+    ("`accuracy` 1e-4", &[("accuracy", "1e-4")]),
 ];
 
 /// Both beams, each with every setting.
@@ -49,7 +43,7 @@ pub fn measure() -> Vec<Row> {
     for (beam, steps) in sofa_beams().iter().zip([20, 4]) {
         eprintln!("SOFA's beam of {:?} nodes: reference of {steps} steps", beam.nodes);
         let reference = implicit_euler::steps(&beam.model, Law::SignedVolume, STEP, steps);
-        for (settings, name) in SETTINGS.iter().zip(NAMES) {
+        for (name, settings) in SETTINGS {
             match row(beam, &reference, settings, name) {
                 Ok(row) => {
                     eprintln!("  {name}: {:.2} ms, {:.2e}", row.milliseconds, row.error);

@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use crate::precision::summary::{Need, TARGETS, need, number};
-use crate::precision::{End, LineOutcome, Outcome, machine, sofa};
-use crate::scenes::{Measure, checks};
+use crate::precision::{End, LineOutcome, Outcome, Point, sofa};
+use crate::report::machine;
+use crate::scenes::Measure;
 
 /// What is the same for all.
 const METHOD: &str = "\
@@ -18,15 +19,12 @@ halvings of the step change little, or where a point would take longer than the 
 
 /// Whether a scene has errors against time: it is no check, and nothing is in its way.
 pub fn is_timed(outcome: &Outcome) -> bool {
-    outcome.scene.measure != Measure::Contact && checks().iter().all(|check| check.name != outcome.scene.name)
+    matches!(outcome.scene.measure, Measure::Motion | Measure::Rest)
 }
 
 /// The whole report.
 pub fn markdown(outcomes: &[Outcome], notes: &[(&str, &str)], beams: &[sofa::Row]) -> String {
-    let mut text = format!(
-        "# Engines: error against time\n\nMachine: {}.\n\n{METHOD}\n",
-        machine::processor()
-    );
+    let mut text = format!("# Engines: error against time\n\nMachine: {}.\n\n{METHOD}\n", machine());
     text +=
         "## Summary\n\nSeconds of one thread for a simulated second, for an error of at most 10 % / 1 % / 0.1 %.\n\n";
     text += &summary(outcomes);
@@ -93,7 +91,7 @@ fn checked(outcomes: &[Outcome]) -> String {
     let mut text = String::from("## Checks\n\nThe least error of each engine in free fall.\n\n");
     for outcome in outcomes
         .iter()
-        .filter(|outcome| checks().iter().any(|check| check.name == outcome.scene.name))
+        .filter(|outcome| outcome.scene.measure == Measure::Check)
     {
         let least = outcome.engines.iter().map(|engine| {
             let points = engine.lines.iter().flatten().flat_map(|line| &line.points);
@@ -212,7 +210,7 @@ fn contact(outcome: &Outcome) -> String {
 }
 
 fn points(line: &LineOutcome) -> String {
-    let point = |point: &crate::precision::Point| format!("{} / {:.1e}", number(point.seconds), point.error);
+    let point = |point: &Point| format!("{} / {:.1e}", number(point.seconds), point.error);
     line.points.iter().map(point).collect::<Vec<_>>().join(", ")
 }
 

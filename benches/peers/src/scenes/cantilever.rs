@@ -33,19 +33,12 @@ pub fn at_rest() -> Scene {
 
 fn model(damping: f64, frames: usize) -> Model {
     let block = block(CELLS, EDGE);
-    let mut model = Model {
-        pinned: nodes(&block.positions, |[x, _, _]| x < 0.5 * EDGE),
-        positions: block.positions,
-        tetrahedra: block.tetrahedra,
-        young: 2e6,
-        poisson: 0.3,
-        gravity: 9.81,
+    let held = nodes(&block.positions, |[x, _, _]| x < 0.5 * EDGE);
+    Model {
         damping,
         frames,
-        ..Model::default()
-    };
-    model.fill(DENSITY);
-    model
+        ..Model::solid(block, held, 2e6, DENSITY)
+    }
 }
 
 /// The deflection of the end at the last frame, over Timoshenko's for a beam under its own weight.

@@ -5,22 +5,14 @@ use super::{Measure, Scene};
 use crate::precision::model::Model;
 
 pub fn tetrahedra() -> Scene {
-    let block = block([2; 3], 0.05);
-    let mut model = Model {
-        positions: block.positions,
-        tetrahedra: block.tetrahedra,
-        young: 1e5,
-        poisson: 0.3,
-        gravity: 9.81,
-        frames: 30,
-        ..Model::default()
-    };
-    model.fill(1000.0);
     Scene {
         name: "free fall",
         about: "a block of 2 x 2 x 2 cubes falls for half a second".into(),
-        model,
-        measure: Measure::Motion,
+        model: Model {
+            frames: 30,
+            ..Model::solid(block([2; 3], 0.05), Vec::new(), 1e5, 1000.0)
+        },
+        measure: Measure::Check,
     }
 }
 
@@ -37,6 +29,6 @@ pub fn springs() -> Scene {
             frames: 30,
             ..Model::default()
         },
-        measure: Measure::Motion,
+        measure: Measure::Check,
     }
 }

@@ -9,23 +9,13 @@ const EDGE: f64 = 0.0125;
 
 pub fn scene() -> Scene {
     let block = block([CELLS; 3], EDGE);
-    let mut model = Model {
-        pinned: nodes(&block.positions, |[_, y, _]| y < 0.5 * EDGE),
-        positions: block.positions,
-        tetrahedra: block.tetrahedra,
-        young: 1e4,
-        poisson: 0.3,
-        gravity: 9.81,
-        frames: 60,
-        ..Model::default()
-    };
-    model.fill(1000.0);
+    let held = nodes(&block.positions, |[_, y, _]| y < 0.5 * EDGE);
     Scene {
         name: "jelly",
         about: "a cube of 0.1 m, 8 x 8 x 8 cubes in five tetrahedra each, bonded to a floor, compressed by its weight: E = 10 kPa, \
                 nu = 0.3, 1000 kg/m³"
             .into(),
-        model,
+        model: Model::solid(block, held, 1e4, 1000.0),
         measure: Measure::Motion,
     }
 }

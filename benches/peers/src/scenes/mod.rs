@@ -13,6 +13,7 @@ mod sofa_beam;
 use crate::precision::model::Model;
 
 pub use cantilever::tip_ratio;
+pub use mesh::Block;
 pub use sofa_beam::{SofaBeam, sofa_beams};
 
 /// A model with its name and what is asked of its motion.
@@ -27,6 +28,8 @@ pub struct Scene {
 /// Where an error is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
+    /// At the end of each frame, of what a player must get right before it is timed.
+    Check,
     /// At the end of each frame.
     Motion,
     /// At the last frame, when a damped body rests.
@@ -35,9 +38,11 @@ pub enum Measure {
     Contact,
 }
 
-/// The scenes that are timed.
-pub fn timed() -> Vec<Scene> {
+/// All scenes, checks first.
+pub fn all() -> Vec<Scene> {
     vec![
+        free_fall::tetrahedra(),
+        free_fall::springs(),
         cantilever::released(),
         cantilever::at_rest(),
         jelly::scene(),
@@ -46,9 +51,4 @@ pub fn timed() -> Vec<Scene> {
         rope::scene(),
         draped_cloth::scene(),
     ]
-}
-
-/// What a player must get right before it is timed.
-pub fn checks() -> Vec<Scene> {
-    vec![free_fall::tetrahedra(), free_fall::springs()]
 }

@@ -9,25 +9,15 @@ const CELLS: [usize; 3] = [16, 8, 6];
 const LENGTH: f64 = 0.16;
 
 pub fn scene() -> Scene {
-    let block = block(CELLS, 1.0);
-    let positions: Vec<[f64; 3]> = block.positions.iter().map(|&place| shaped(place)).collect();
-    let mut model = Model {
-        pinned: nodes(&block.positions, |[x, _, _]| x < 1.5),
-        positions,
-        tetrahedra: block.tetrahedra,
-        young: 1e4,
-        poisson: 0.3,
-        gravity: 9.81,
-        frames: 60,
-        ..Model::default()
-    };
-    model.fill(1050.0);
+    let mut block = block(CELLS, 1.0);
+    let held = nodes(&block.positions, |[x, _, _]| x < 1.5);
+    block.positions.iter_mut().for_each(|place| *place = shaped(*place));
     Scene {
         name: "organ",
         about: "an organ-like body of 16 x 8 x 6 cells, rounded, tapered and bent, 0.16 m long, hung by one end and released: \
                 E = 10 kPa, nu = 0.3, 1050 kg/m³"
             .into(),
-        model,
+        model: Model::solid(block, held, 1e4, 1050.0),
         measure: Measure::Motion,
     }
 }

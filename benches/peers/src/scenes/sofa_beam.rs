@@ -21,20 +21,10 @@ pub fn sofa_beams() -> Vec<SofaBeam> {
 fn beam(counts: [usize; 3], published: f64) -> SofaBeam {
     let edge = 0.1 / (counts[1] - 1) as f64;
     let block = block(counts.map(|count| count - 1), edge);
-    let mut model = Model {
-        pinned: nodes(&block.positions, |[x, _, _]| x < 0.5 * edge),
-        positions: block.positions,
-        tetrahedra: block.tetrahedra,
-        young: 2e6,
-        poisson: 0.3,
-        gravity: 9.81,
-        frames: 60,
-        ..Model::default()
-    };
-    model.fill(1000.0);
+    let held = nodes(&block.positions, |[x, _, _]| x < 0.5 * edge);
     SofaBeam {
         nodes: counts,
-        model,
+        model: Model::solid(block, held, 2e6, 1000.0),
         published,
     }
 }
