@@ -3,7 +3,7 @@
 use glam::Vec3;
 use sinew::{BodyDefinition, Error, Shape, Solver, ToolDefinition, World, WorldDefinition};
 
-use crate::support::bodies::{FREE, Parts, Scene};
+use crate::support::bodies::{FREE, Parts, Scene, without_ids};
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -35,7 +35,7 @@ fn a_step_with_work_enough_is_a_step() {
         for _ in 0..20 {
             let report = plain.step(DT);
             let done = budgeted.world.step_with_budget(DT, 1_000_000).expect("a step");
-            assert_eq!((done.step, done.lag), (report, 0.0));
+            assert_eq!((without_ids(done.step), done.lag), (report, 0.0));
         }
         assert_eq!(plain.world.state_hash(), budgeted.world.state_hash(), "{solver:?}");
     }

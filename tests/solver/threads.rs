@@ -6,6 +6,8 @@ use glam::Vec3;
 use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, BodyId, Error, Pose, RunTasks, Shape, ToolDefinition, Values, World, WorldDefinition};
 
+use crate::support::bodies::without_ids;
+
 type Task<'a> = &'a (dyn Fn(u32) + Sync);
 type System = &'static (dyn for<'a> Fn(u32, Task<'a>) + Sync);
 
@@ -84,7 +86,7 @@ fn moved(definition: WorldDefinition) -> (u64, Vec<Vec<Vec3>>, String) {
     let mut world = scene(definition);
     let mut reports = String::new();
     for _ in 0..6 {
-        reports += &format!("{:?}", world.step(0.01));
+        reports += &format!("{:?}", world.step(0.01).map(without_ids));
     }
     let positions = world.bodies().map(|body| body.positions().to_vec()).collect();
     (world.state_hash(), positions, reports)
