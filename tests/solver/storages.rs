@@ -4,16 +4,11 @@ use std::collections::BTreeSet;
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use crate::support::reference::Reference;
+use crate::support::scene::STORAGES;
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, Error, Storage, StorageReport, Values, WorldDefinition};
 
-const ALL: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
 const OF_THE_PAPER: [Storage; 3] = [Storage::Efficient, Storage::FastLink, Storage::DynamicBulk];
 
 /// A scene with a body of these parts, kept like this.
@@ -90,7 +85,8 @@ fn edit_in_motion(parts: &Parts, seed: u64) {
     let mut random = Random::new(seed);
     let velocities: Vec<Vec3> = parts.positions.iter().map(|_| 0.05 * random.vector()).collect();
     let spare = width_with_spare(parts, 12);
-    let mut scenes = ALL.map(|storage| scene(parts, storage, if storage == Storage::FastLink { spare } else { 0 }));
+    let mut scenes =
+        STORAGES.map(|storage| scene(parts, storage, if storage == Storage::FastLink { spare } else { 0 }));
     let mut reference: Option<Reference> = (parts.spring_damping == 0.0).then(|| parts.reference(Vec3::ZERO));
     for scene in &mut scenes {
         scene.body_mut().set_velocities(&velocities).expect("velocities");
@@ -138,7 +134,7 @@ fn edit_in_motion(parts: &Parts, seed: u64) {
     let first = scenes[0].positions();
     let start: Vec<DVec3> = parts.positions.iter().map(|p| p.as_dvec3()).collect();
     assert!(largest_difference(&first, &start) > 1e-3, "nothing moved");
-    for (scene, storage) in scenes.iter().zip(ALL) {
+    for (scene, storage) in scenes.iter().zip(STORAGES) {
         assert_eq!(report(scene).spring_count, alive.len(), "{storage:?}");
         assert_eq!(pairs(scene), expected, "{storage:?}");
         let difference = largest_difference(&first, &scene.positions());
@@ -172,7 +168,7 @@ fn each_spring_has_its_own_damping() {
     let parts = swinging_sheet(9, &mut random);
     let dampings: Vec<f32> = parts.springs.iter().map(|_| 1e-3 + 1e-3 * random.signed()).collect();
     let velocities: Vec<Vec3> = parts.positions.iter().map(|_| 0.3 * random.vector()).collect();
-    let moved = ALL.map(|storage| {
+    let moved = STORAGES.map(|storage| {
         let mut world = sinew::World::new(FREE).expect("a world");
         let definition = BodyDefinition {
             storage,
@@ -190,7 +186,7 @@ fn each_spring_has_its_own_damping() {
     undamped.run(5e-4, 100);
     let effect = largest_difference(&moved[1], &undamped.positions());
     assert!(effect > 1e-4, "damping changes {effect} m");
-    for (positions, storage) in moved.iter().zip(ALL) {
+    for (positions, storage) in moved.iter().zip(STORAGES) {
         let difference = largest_difference(&moved[0], positions);
         assert!(difference < 2e-6, "{storage:?}: {difference} m");
     }
@@ -204,7 +200,7 @@ fn nodes_at_one_place_are_pushed_apart_alike() {
     parts.rest_lengths.push(0.01);
     for spring_damping in [0.0, 1e-3] {
         parts.spring_damping = spring_damping;
-        for storage in ALL {
+        for storage in STORAGES {
             let mut scene = scene(&parts, storage, 0);
             scene.step(1e-4);
             let velocities = scene.velocities();
@@ -364,7 +360,7 @@ fn a_definition_that_does_not_fit_is_refused() {
 #[test]
 fn pairs_are_joined_once_in_every_storage() {
     let parts = Parts::chain(3, Vec3::X, 0.1, 10.0);
-    for storage in ALL {
+    for storage in STORAGES {
         let mut scene = scene(&parts, storage, 2);
         let before = scene.world.state_hash();
         for (a, b) in [(0, 1), (1, 0)] {
@@ -383,7 +379,7 @@ fn pairs_are_joined_once_in_every_storage() {
 
 #[test]
 fn nodes_without_springs_fall_freely() {
-    for storage in ALL {
+    for storage in STORAGES {
         // Every third node has a spring to the next, and there is a tile in which none has any.
         let mut parts = Parts::nodes((0..2000).map(|i| Vec3::X * (0.01 * i as f32)).collect(), 1e-3);
         for node in (0..500).step_by(3) {
@@ -402,7 +398,7 @@ fn nodes_without_springs_fall_freely() {
 #[test]
 fn a_body_without_springs_takes_some() {
     let parts = Parts::nodes((0..3).map(|i| Vec3::X * i as f32).collect(), 0.5);
-    for storage in ALL {
+    for storage in STORAGES {
         let mut scene = scene(&parts, storage, 0);
         assert_eq!(report(&scene).spring_count, 0);
         scene.body_mut().add_spring(0, 2, 100.0, Some(1.5)).expect("room");

@@ -35,7 +35,7 @@ struct Model {
     std::vector<btVector3> positions;
     std::vector<double> masses;
     std::vector<int> pinned, tetrahedra, springs, triangles;
-    double ball[4] = {0, 0, 0, 0};
+    double ball[5] = {0, 0, 0, 0, 0};
 
     explicit Model(const char *path) {
         std::ifstream file(path);
@@ -70,6 +70,24 @@ struct Model {
         }
     }
     double operator[](const char *name) const { return numbers.at(name); }
+    double or_else(const char *name, double value) const { return numbers.count(name) ? numbers.at(name) : value; }
+    int bodies() const { return int(or_else("bodies", 1)); }
+
+    // One of several equal bodies alone.
+    Model body(int index) const {
+        Model part = *this;
+        const int count = bodies(), size = int(positions.size()) / count;
+        part.positions.assign(positions.begin() + index * size, positions.begin() + (index + 1) * size);
+        part.masses.assign(masses.begin() + index * size, masses.begin() + (index + 1) * size);
+        auto take = [&](std::vector<int> &to, const std::vector<int> &from) {
+            const std::size_t width = from.size() / count;
+            to.assign(from.begin() + index * width, from.begin() + (index + 1) * width);
+            for (int &node : to) node -= index * size;
+        };
+        take(part.tetrahedra, tetrahedra);
+        take(part.triangles, triangles);
+        return part;
+    }
 };
 
 double processor_seconds() {
@@ -118,11 +136,15 @@ btSoftBody *build(const Model &model, btSoftBodyWorldInfo &info, const std::stri
     for (std::size_t corner = 0; corner < model.triangles.size(); corner += 3)
         body->appendFace(model.triangles[corner], model.triangles[corner + 1], model.triangles[corner + 2]);
     body->getCollisionShape()->setMargin(btScalar(1e-3));
-    body->m_cfg.kDF = 0;
+    body->m_cfg.kDF = btScalar(model.or_else("friction", 0));
     body->m_cfg.kCHR = 1;
     body->m_cfg.collisions = model.triangles.empty() ? 0
                              : links                 ? btSoftBody::fCollision::SDF_RS
                                                      : btSoftBody::fCollision::SDF_RD | btSoftBody::fCollision::SDF_RDN;
+    if (model.bodies() > 1) {
+        body->m_cfg.collisions |= btSoftBody::fCollision::VF_DD;
+        body->initializeFaceTree();
+    }
     body->m_dampingCoefficient = 0;
     body->m_sleepingThreshold = 0;
     body->setActivationState(DISABLE_DEACTIVATION);
@@ -153,7 +175,7 @@ int main(int count, char **arguments) {
     std::unique_ptr<btSequentialImpulseConstraintSolver> solver;
     std::unique_ptr<btDiscreteDynamicsWorld> world;
     std::vector<std::unique_ptr<btDeformableLagrangianForce>> forces;
-    btSoftBody *body = nullptr;
+    std::vector<btSoftBody *> bodies;
     if (kind == "links") {
         solver = std::make_unique<btSequentialImpulseConstraintSolver>();
         auto owned = std::make_unique<btSoftRigidDynamicsWorld>(&dispatcher, &broadphase, solver.get(), &configuration);
@@ -164,8 +186,10 @@ int main(int count, char **arguments) {
         soft->getWorldInfo().air_density = 0;
         soft->getWorldInfo().m_sparsesdf.setDefaultVoxelsz(btScalar(0.01));
         soft->getWorldInfo().m_sparsesdf.Reset();
-        body = build(model, soft->getWorldInfo(), kind, iterations, step);
-        soft->addSoftBody(body);
+        for (int index = 0; index < model.bodies(); ++index) {
+            bodies.push_back(build(model.body(index), soft->getWorldInfo(), kind, iterations, step));
+            soft->addSoftBody(bodies.back());
+        }
     } else {
         deformable_solver = std::make_unique<Solver>(iterations);
         auto constraints = std::make_unique<btDeformableMultiBodyConstraintSolver>();
@@ -179,11 +203,13 @@ int main(int count, char **arguments) {
         soft->getWorldInfo().m_gravity = gravity;
         soft->getWorldInfo().m_sparsesdf.setDefaultVoxelsz(btScalar(0.01));
         soft->getWorldInfo().m_sparsesdf.Reset();
-        body = build(model, soft->getWorldInfo(), kind, iterations, step);
-        soft->addSoftBody(body);
+        for (int index = 0; index < model.bodies(); ++index) {
+            bodies.push_back(build(model.body(index), soft->getWorldInfo(), kind, iterations, step));
+            soft->addSoftBody(bodies.back());
+        }
         auto add = [&](btDeformableLagrangianForce *force) {
             forces.emplace_back(force);
-            soft->addForce(body, force);
+            for (btSoftBody *body : bodies) soft->addForce(body, force);
         };
         add(new btDeformableGravityForce(gravity));
         if (model.tetrahedra.empty()) {
@@ -199,12 +225,26 @@ int main(int count, char **arguments) {
         soft->setUseProjection(kind == "implicit");
     }
     btSphereShape sphere(btScalar(model.ball[3]));
-    std::unique_ptr<btRigidBody> ball;
+    std::unique_ptr<btRigidBody> ball, ground;
+    auto ball_after = [&](double frames) {
+        const double way = model.ball[4] * model["frame"] * std::fmin(frames, std::floor(2 * model["frames"] / 3));
+        return btTransform(btQuaternion::getIdentity(),
+                           btVector3(btScalar(model.ball[0]), btScalar(model.ball[1] - way), btScalar(model.ball[2])));
+    };
     if (model.ball[3] > 0) {
         ball = std::make_unique<btRigidBody>(0, nullptr, &sphere);
         ball->setFriction(0);
-        ball->setWorldTransform(btTransform(btQuaternion::getIdentity(), btVector3(btScalar(model.ball[0]), btScalar(model.ball[1]), btScalar(model.ball[2]))));
+        ball->setWorldTransform(ball_after(0));
+        ball->setCollisionFlags(ball->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+        ball->setActivationState(DISABLE_DEACTIVATION);
         world->addRigidBody(ball.get());
+    }
+    btBoxShape box(btVector3(10, 1, 10));
+    if (model.or_else("floor", 0) > 0) {
+        ground = std::make_unique<btRigidBody>(0, nullptr, &box);
+        ground->setFriction(btScalar(model["friction"]));
+        ground->setWorldTransform(btTransform(btQuaternion::getIdentity(), btVector3(0, -1, 0)));
+        world->addRigidBody(ground.get());
     }
     std::printf("version %d.%02d\n", btGetVersion() / 100, btGetVersion() % 100);
     std::fflush(stdout);
@@ -216,23 +256,30 @@ int main(int count, char **arguments) {
     for (int frame = 0; frame < int(model["frames"]); ++frame) {
         const double start = processor_seconds();
         for (int substep = 0; substep < substeps; ++substep) {
+            if (ball && model.ball[4] > 0) {
+                const btTransform from = ball->getWorldTransform(), to = ball_after(frame + double(substep + 1) / substeps);
+                ball->setLinearVelocity((to.getOrigin() - from.getOrigin()) / btScalar(step));
+                ball->setWorldTransform(to);
+            }
             world->stepSimulation(btScalar(step), 0);
             // What diverges takes Bullet ever longer: say so at once.
-            for (int node = 0; node < body->m_nodes.size(); ++node)
-                if (!(body->m_nodes[node].m_v.length2() < btScalar(1e6))) {
-                    std::printf("refused it diverges\n");
-                    std::fflush(stdout);
-                    std::_Exit(0);
+            for (btSoftBody *body : bodies)
+                for (int node = 0; node < body->m_nodes.size(); ++node) {
+                    if (!(body->m_nodes[node].m_v.length2() < btScalar(1e6))) {
+                        std::printf("refused it diverges\n");
+                        std::fflush(stdout);
+                        std::_Exit(0);
+                    }
+                    if (kept < 1) body->m_nodes[node].m_v *= kept;
                 }
-            if (kept < 1)
-                for (int node = 0; node < body->m_nodes.size(); ++node) body->m_nodes[node].m_v *= kept;
         }
         spent += processor_seconds() - start;
-        for (int node = 0; node < body->m_nodes.size(); ++node) {
-            const btVector3 &place = body->m_nodes[node].m_x;
-            const double numbers[3] = {place.x(), place.y(), place.z()};
-            std::fwrite(numbers, sizeof numbers, 1, file);
-        }
+        for (btSoftBody *body : bodies)
+            for (int node = 0; node < body->m_nodes.size(); ++node) {
+                const btVector3 &place = body->m_nodes[node].m_x;
+                const double numbers[3] = {place.x(), place.y(), place.z()};
+                std::fwrite(numbers, sizeof numbers, 1, file);
+            }
         std::fflush(file);
         std::printf("frame %.9g\n", spent);
         std::fflush(stdout);

@@ -28,7 +28,7 @@ def xml():
         dimension, elements = 1, model.springs
         law = f'<edge stiffness="{model.stiffness!r}" damping="0"/>'
     geometry, contact = "", 'contype="0" conaffinity="0"'
-    for x, y, z, radius in model.ball:
+    for x, y, z, radius, _ in model.ball:
         geometry = f'<geom type="sphere" size="{radius}" pos="{x} {y} {z}" condim="1"/>'
         contact = 'contype="1" conaffinity="1" condim="1"'
     elements = " ".join(map(str, elements.flatten().tolist()))

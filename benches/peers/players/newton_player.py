@@ -28,7 +28,7 @@ for corners in model.tetrahedra.tolist():
     builder.add_tetrahedron(*corners, k_mu=mu, k_lambda=lame_lambda, k_damp=0.0)
 for a, b in model.springs.tolist():
     builder.add_spring(a, b, model.stiffness, 0.0, 0)
-for *center, radius in model.ball:
+for *center, radius, _ in model.ball:
     builder.add_shape_sphere(-1, xform=wp.transform(wp.vec3(*center), wp.quat_identity()), radius=radius)
 if kind == "vbd":
     builder.color()

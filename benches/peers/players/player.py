@@ -12,7 +12,7 @@ os.dup2(2, 1)
 
 
 # Numbers in a line of each section.
-WIDTHS = {"nodes": 4, "pinned": 1, "tetrahedra": 4, "springs": 2, "triangles": 3, "ball": 4}
+WIDTHS = {"nodes": 4, "pinned": 1, "tetrahedra": 4, "springs": 2, "triangles": 3, "ball": 5}
 
 
 class Model:

@@ -14,6 +14,7 @@ mod sinew;
 use std::path::PathBuf;
 
 use crate::precision::law::Law;
+use crate::precision::model::Model;
 use crate::scenes::Scene;
 
 pub use process::{Played, Said, play};
@@ -68,6 +69,16 @@ pub fn all() -> Vec<Engine> {
         newton::engine(),
         pypbd::engine(),
     ]
+}
+
+/// Whether a player that knows one body beside a ball at most can have this.
+fn has_one_body(scene: &Scene) -> Result<(), String> {
+    let Model { has_floor, ball, .. } = scene.model;
+    let is_pressed = ball.is_some_and(|ball| ball.speed != 0.0);
+    match has_floor || is_pressed || scene.model.body_count() > 1 {
+        true => Err("this player sets up one body and a fixed ball alone".into()),
+        false => Ok(()),
+    }
 }
 
 /// This program, as one of the engines that are built in.

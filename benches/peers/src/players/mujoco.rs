@@ -9,7 +9,7 @@ pub fn engine() -> Engine {
         name: "MuJoCo",
         color: "#7b4fa3",
         program: || super::python::script("mujoco_player.py", "mujoco", "mujoco"),
-        lines: |scene| Ok(lines(scene)),
+        lines: |scene| super::has_one_body(scene).map(|()| lines(scene)),
         notes: "A flex of three sliding joints per node, in double precision, without contact or edge constraints. Tetrahedra are \
                 St Venant-Kirchhoff's, springs a flex of dimension 1 with the stiffness of its edges. `discrete` logs warnings that the inertia is nearly \
                 singular or that its solve did not converge: the notes of each scene have them.",

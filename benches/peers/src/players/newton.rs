@@ -9,7 +9,7 @@ pub fn engine() -> Engine {
         name: "Newton",
         color: "#c29a00",
         program: || super::python::script("newton_player.py", "newton", "newton"),
-        lines: |scene| Ok(lines(scene)),
+        lines: |scene| super::has_one_body(scene).map(|()| lines(scene)),
         notes: "On the processor, where its kernels use one thread. Compiling them is not counted. XPBD is left out where there are \
                 tetrahedra: its constraint on shape, the trace of F'F less 3, has no shear stiffness at small strains.",
     }

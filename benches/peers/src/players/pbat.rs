@@ -10,7 +10,7 @@ pub fn engine() -> Engine {
         program: || super::python::script("pbat_player.py", "pbatoolkit", "pbatoolkit==0.0.11"),
         lines: |scene| match scene.model.has(Law::Springs) {
             true => Err("it has tetrahedra and no springs".into()),
-            false => Ok(lines()),
+            false => super::has_one_body(scene).map(|()| lines()),
         },
         notes: "Version 0.0.11, in double precision, one thread. It has no Newton solver in Python: VBD and XPBD are what its package \
                 offers.",

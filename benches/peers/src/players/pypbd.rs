@@ -9,9 +9,9 @@ pub fn engine() -> Engine {
         name: "pyPBD",
         color: "#4d4d4d",
         program: || super::python::script("pypbd_player.py", "pypbd", "pypbd"),
-        lines: |scene| match scene.model.ball {
-            Some(_) => Err("this player has no contact".into()),
-            None => Ok(lines(scene)),
+        lines: |scene| match scene.model.has_contact() {
+            true => Err("this player has no contact".into()),
+            false => Ok(lines(scene)),
         },
         notes: "Springs are extended position-based distance constraints. Its finite elements are plain position-based constraints, \
                 whose stiffness depends on step and iterations: no setting makes them the material.",

@@ -8,7 +8,7 @@ use rapier3d::prelude::*;
 use super::serve::{Player, Settings};
 use super::{Engine, Line};
 use crate::precision::law::Law;
-use crate::precision::model::{Ball, FRAME, Model};
+use crate::precision::model::{Ball, FRAME, Model, SKIN};
 use crate::scenes::Scene;
 
 pub fn engine() -> Engine {
@@ -49,7 +49,16 @@ fn lines(scene: &Scene) -> Vec<Line> {
 
 pub struct RapierPlayer {
     world: PhysicsWorld,
-    body: SoftBodyHandle,
+    bodies: Vec<SoftBodyHandle>,
+    /// Nodes of each.
+    size: usize,
+    ball: Option<(RigidBodyHandle, Ball)>,
+    passed: usize,
+    frames: usize,
+}
+
+fn place(place: [f64; 3]) -> Vector {
+    Vector::from(place.map(|x| x as f32))
 }
 
 impl Player for RapierPlayer {
@@ -60,40 +69,38 @@ impl Player for RapierPlayer {
         let parameters = &mut world.integration_parameters;
         parameters.dt = FRAME as f32;
         parameters.num_solver_iterations = settings.number("substeps").unwrap_or(4.0) as usize;
-        parameters.soft_bodies.max_extra_substeps = 0;
-        parameters.soft_bodies.resweep_strain = f32::MAX;
+        if !model.has_contact() {
+            // Its own measures against fast and far stretched bodies would hide what the settings do.
+            parameters.soft_bodies.max_extra_substeps = 0;
+            parameters.soft_bodies.resweep_strain = f32::MAX;
+        }
         if let Some(iterations) = settings.number("iterations") {
             parameters.soft_bodies.fem.max_linear_iterations = iterations as usize;
         }
-        let position = |place: &[f64; 3]| Vector::from(place.map(|x| x as f32));
-        let mut builder = SoftBodyBuilder::new(model.positions.iter().map(position).collect())
-            .masses(model.masses.iter().map(|&mass| mass as f32).collect())
-            .pinned_particles(model.pinned.iter().map(|&node| node as u32))
-            .linear_damping(model.damping as f32)
-            .can_sleep(false);
-        builder = match model.ball {
-            Some(Ball { center, radius }) => {
-                let ball = ColliderBuilder::ball(radius as f32).friction(0.0);
-                let place = RigidBodyBuilder::fixed().translation(position(&center));
-                world.insert(place, ball);
-                let triangles = model.triangles.iter().map(|corners| corners.map(|node| node as u32));
-                let surface = builder.surface(triangles.collect()).particle_radius(1e-3);
-                surface.surface_collider(ColliderBuilder::default().friction(0.0))
-            }
-            None => builder.no_surface_collider(),
-        };
-        if let Some(sweeps) = settings.number("sweeps") {
-            builder = builder.additional_pgs_iterations(sweeps as usize - 1);
+        let friction = model.friction as f32;
+        let mut ball = None;
+        if let Some(given) = model.ball {
+            let shape = ColliderBuilder::ball(given.radius as f32).friction(friction);
+            let body = RigidBodyBuilder::kinematic_position_based().translation(place(given.center));
+            ball = Some((world.insert(body, shape).0, given));
         }
-        if settings.word("solver") == Some("fem") {
-            builder = builder.solver(SoftBodySolver::Fem);
+        if model.has_floor {
+            let ground = ColliderBuilder::cuboid(10.0, 1.0, 10.0).friction(friction);
+            world.insert(
+                RigidBodyBuilder::fixed().translation(Vector::new(0.0, -1.0, 0.0)),
+                ground,
+            );
         }
-        let builder = match model.tetrahedra.is_empty() {
-            true => with_springs(builder, model),
-            false => with_cells(builder, model),
-        };
-        let body = world.insert_soft_body(builder);
-        Ok(Self { world, body })
+        let bodies =
+            (0..model.body_count()).map(|index| world.insert_soft_body(soft_body(&model.body(index), settings)));
+        Ok(Self {
+            bodies: bodies.collect(),
+            size: model.positions.len() / model.body_count(),
+            world,
+            ball,
+            passed: 0,
+            frames: model.frames,
+        })
     }
 
     fn version() -> String {
@@ -101,13 +108,47 @@ impl Player for RapierPlayer {
     }
 
     fn frame(&mut self) -> Result<(), String> {
+        self.passed += 1;
+        if let Some((body, ball)) = &self.ball {
+            let body = self.world.bodies.get_mut(*body).expect("still there");
+            body.set_next_kinematic_translation(place(ball.center_after(self.passed, self.frames)));
+        }
         self.world.step();
         Ok(())
     }
 
     fn position(&self, node: usize) -> [f32; 3] {
-        let body = self.world.soft_bodies.get(self.body).expect("still there");
-        body.particle_position(node).into()
+        let body = self
+            .world
+            .soft_bodies
+            .get(self.bodies[node / self.size])
+            .expect("still there");
+        body.particle_position(node % self.size).into()
+    }
+}
+
+fn soft_body(model: &Model, settings: &Settings) -> SoftBodyBuilder {
+    let mut builder = SoftBodyBuilder::new(model.positions.iter().copied().map(place).collect())
+        .masses(model.masses.iter().map(|&mass| mass as f32).collect())
+        .pinned_particles(model.pinned.iter().map(|&node| node as u32))
+        .linear_damping(model.damping as f32)
+        .can_sleep(false);
+    builder = if model.has_contact() {
+        let triangles = model.triangles.iter().map(|corners| corners.map(|node| node as u32));
+        let surface = builder.surface(triangles.collect()).particle_radius(SKIN as f32);
+        surface.surface_collider(ColliderBuilder::default().friction(model.friction as f32))
+    } else {
+        builder.no_surface_collider()
+    };
+    if let Some(sweeps) = settings.number("sweeps") {
+        builder = builder.additional_pgs_iterations(sweeps as usize - 1);
+    }
+    if settings.word("solver") == Some("fem") {
+        builder = builder.solver(SoftBodySolver::Fem);
+    }
+    match model.tetrahedra.is_empty() {
+        true => with_springs(builder, model),
+        false => with_cells(builder, model),
     }
 }
 

@@ -2,14 +2,14 @@
 
 use glam::Vec3;
 use sinew::{
-    BodyDefinition, BodyId, ElementLaw, Material, Model as MaterialModel, Pose, Shape, Solver, ToolDefinition, Values,
-    World, WorldDefinition,
+    Body, BodyContact, BodyDefinition, BodyId, ElementLaw, Material, Model as MaterialModel, Shape, Solver,
+    ToolDefinition, ToolId, Values, World, WorldDefinition,
 };
 
 use super::serve::{Player, Settings};
 use super::{Engine, Line};
 use crate::precision::law::Law;
-use crate::precision::model::{Ball, FRAME, Model};
+use crate::precision::model::{Ball, FRAME, Model, SKIN};
 use crate::scenes::Scene;
 
 pub fn engine() -> Engine {
@@ -80,7 +80,10 @@ fn lines(scene: &Scene) -> Vec<Line> {
 
 pub struct SinewPlayer {
     world: World,
-    body: BodyId,
+    bodies: Vec<BodyId>,
+    ball: Option<(ToolId, Ball)>,
+    passed: usize,
+    frames: usize,
     /// Calls of `step` per frame.
     steps: u32,
     substeps: u32,
@@ -93,92 +96,115 @@ impl SinewPlayer {
         self.substeps = self.substeps.max(report.substeps);
         Ok(())
     }
+
+    fn first_body(&self) -> &Body {
+        self.world.body(self.bodies[0]).expect("still there")
+    }
+}
+
+fn place([x, y, z]: [f64; 3]) -> Vec3 {
+    Vec3::new(x as f32, y as f32, z as f32)
+}
+
+fn add_body(world: &mut World, model: &Model, settings: &Settings, solver: Solver) -> sinew::Result<BodyId> {
+    fn nodes<const N: usize>(elements: &[[usize; N]]) -> Vec<[u32; N]> {
+        elements.iter().map(|nodes| nodes.map(|node| node as u32)).collect()
+    }
+    let positions: Vec<Vec3> = model.positions.iter().copied().map(place).collect();
+    let masses: Vec<f32> = model.masses.iter().map(|&mass| mass as f32).collect();
+    let (springs, tetrahedra) = (nodes(&model.springs), nodes(&model.tetrahedra));
+    // A solid finds its surface itself.
+    let triangles = nodes(if tetrahedra.is_empty() { &model.triangles } else { &[] });
+    let mut definition = BodyDefinition {
+        positions: &positions,
+        masses: Values::Each(&masses),
+        damping_rate: model.damping as f32,
+        tetrahedra: &tetrahedra,
+        triangles: &triangles,
+        solver,
+        order: settings.number("order").unwrap_or(0.0) as u32,
+        iterations: settings.number("iterations").unwrap_or(0.0) as u32,
+        accuracy: settings.number("accuracy").unwrap_or(0.0),
+        ..BodyDefinition::default()
+    };
+    if model.has_floor {
+        definition.contact = BodyContact {
+            thickness: SKIN as f32,
+            friction: model.friction as f32,
+            with_bodies: true,
+            ..BodyContact::default()
+        };
+    }
+    if let Some(part) = settings.number("mass_scaling") {
+        definition.mass_scaling = part;
+    }
+    if tetrahedra.is_empty() {
+        definition.springs = Some(&springs);
+        definition.stiffnesses = Values::Uniform(model.stiffness as f32);
+    } else {
+        definition.material = Some(Material {
+            model: MaterialModel::Tetrahedra,
+            young_modulus: model.young as f32,
+            poisson_ratio: model.poisson as f32,
+            density: 0.0,
+            thickness: 0.0,
+        });
+        if settings.word("law") == Some("neo-hookean") {
+            definition.element_law = ElementLaw::NeoHookean;
+        }
+    }
+    let id = world.create_body(&definition)?;
+    let body = world.body_mut(id)?;
+    for &node in &model.pinned {
+        body.pin(node as u32)?;
+    }
+    Ok(id)
+}
+
+fn build(model: &Model, settings: &Settings) -> sinew::Result<SinewPlayer> {
+    let solver = match settings.word("solver") {
+        Some("verlet") => Solver::Verlet,
+        Some("implicit") => Solver::Implicit,
+        _ => Solver::Auto,
+    };
+    let cut = settings.number("substeps").unwrap_or(0.0) as u32;
+    let is_verlet = solver == Solver::Verlet;
+    let mut world = World::new(WorldDefinition {
+        gravity: Vec3::new(0.0, -model.gravity as f32, 0.0),
+        substeps: if is_verlet { cut } else { 0 },
+        max_substeps: 8192,
+        ..WorldDefinition::default()
+    })?;
+    let bodies = (0..model.body_count()).map(|index| add_body(&mut world, &model.body(index), settings, solver));
+    let bodies = bodies.collect::<sinew::Result<Vec<_>>>()?;
+    if model.has_floor {
+        world.create_tool(&ToolDefinition {
+            friction: model.friction as f32,
+            ..ToolDefinition::new(Shape::Plane)
+        })?;
+    }
+    let mut ball = None;
+    if let Some(given) = model.ball {
+        let mut definition = ToolDefinition::new(Shape::Sphere {
+            radius: given.radius as f32,
+        });
+        definition.pose.position = place(given.center);
+        ball = Some((world.create_tool(&definition)?, given));
+    }
+    Ok(SinewPlayer {
+        world,
+        bodies,
+        ball,
+        passed: 0,
+        frames: model.frames,
+        steps: if is_verlet { 1 } else { cut.max(1) },
+        substeps: 0,
+    })
 }
 
 impl Player for SinewPlayer {
     fn build(model: &Model, settings: &Settings) -> Result<Self, String> {
-        let solver = match settings.word("solver") {
-            Some("verlet") => Solver::Verlet,
-            Some("implicit") => Solver::Implicit,
-            _ => Solver::Auto,
-        };
-        let cut = settings.number("substeps").unwrap_or(0.0) as u32;
-        let is_verlet = solver == Solver::Verlet;
-        let mut world = World::new(WorldDefinition {
-            gravity: Vec3::new(0.0, -model.gravity as f32, 0.0),
-            substeps: if is_verlet { cut } else { 0 },
-            max_substeps: 8192,
-            ..WorldDefinition::default()
-        })
-        .map_err(|error| error.to_string())?;
-        let positions: Vec<Vec3> = model
-            .positions
-            .iter()
-            .map(|place| Vec3::from(place.map(|x| x as f32)))
-            .collect();
-        let masses: Vec<f32> = model.masses.iter().map(|&mass| mass as f32).collect();
-        let springs: Vec<[u32; 2]> = model.springs.iter().map(|ends| ends.map(|node| node as u32)).collect();
-        let tetrahedra: Vec<[u32; 4]> = model
-            .tetrahedra
-            .iter()
-            .map(|ends| ends.map(|node| node as u32))
-            .collect();
-        let triangles: Vec<[u32; 3]> = model
-            .triangles
-            .iter()
-            .map(|corners| corners.map(|node| node as u32))
-            .collect();
-        let mut definition = BodyDefinition {
-            positions: &positions,
-            masses: Values::Each(&masses),
-            damping_rate: model.damping as f32,
-            tetrahedra: &tetrahedra,
-            triangles: &triangles,
-            solver,
-            order: settings.number("order").unwrap_or(0.0) as u32,
-            iterations: settings.number("iterations").unwrap_or(0.0) as u32,
-            accuracy: settings.number("accuracy").unwrap_or(0.0),
-            ..BodyDefinition::default()
-        };
-        if let Some(part) = settings.number("mass_scaling") {
-            definition.mass_scaling = part;
-        }
-        if tetrahedra.is_empty() {
-            definition.springs = Some(&springs);
-            definition.stiffnesses = Values::Uniform(model.stiffness as f32);
-        } else {
-            definition.material = Some(Material {
-                model: MaterialModel::Tetrahedra,
-                young_modulus: model.young as f32,
-                poisson_ratio: model.poisson as f32,
-                density: 0.0,
-                thickness: 0.0,
-            });
-            if settings.word("law") == Some("neo-hookean") {
-                definition.element_law = ElementLaw::NeoHookean;
-            }
-        }
-        let body = world.create_body(&definition).map_err(|error| error.to_string())?;
-        let pinned = world.body_mut(body).map_err(|error| error.to_string())?;
-        for &node in &model.pinned {
-            pinned.pin(node as u32).map_err(|error| error.to_string())?;
-        }
-        if let Some(Ball { center, radius }) = model.ball {
-            let mut pose = Pose::IDENTITY;
-            pose.position = Vec3::from(center.map(|x| x as f32));
-            let shape = Shape::Sphere { radius: radius as f32 };
-            let ball = ToolDefinition {
-                pose,
-                ..ToolDefinition::new(shape)
-            };
-            world.create_tool(&ball).map_err(|error| error.to_string())?;
-        }
-        Ok(Self {
-            world,
-            body,
-            steps: if is_verlet { 1 } else { cut.max(1) },
-            substeps: 0,
-        })
+        build(model, settings).map_err(|error| error.to_string())
     }
 
     fn version() -> String {
@@ -187,15 +213,28 @@ impl Player for SinewPlayer {
 
     fn frame(&mut self) -> Result<(), String> {
         let step = (FRAME / f64::from(self.steps)) as f32;
-        (0..self.steps).try_for_each(|_| self.step(step))
+        let before = self.passed;
+        self.passed += 1;
+        for part in 1..=self.steps {
+            if let Some((tool, ball)) = &self.ball {
+                let ends = [before, self.passed].map(|passed| place(ball.center_after(passed, self.frames)));
+                let center = ends[0].lerp(ends[1], part as f32 / self.steps as f32);
+                let moved = self.world.set_pose(*tool, center, None);
+                moved.map_err(|error| error.to_string())?;
+            }
+            self.step(step)?;
+        }
+        Ok(())
     }
 
     fn position(&self, node: usize) -> [f32; 3] {
-        self.world.body(self.body).expect("still there").positions()[node].to_array()
+        let size = self.first_body().positions().len();
+        let body = self.world.body(self.bodies[node / size]).expect("still there");
+        body.positions()[node % size].to_array()
     }
 
     fn note(&self) -> Option<String> {
-        let choice = self.world.body(self.body).expect("still there").solver_choice();
+        let choice = self.first_body().solver_choice();
         Some(format!(
             "{:?}, at most {} substeps a step",
             choice.solver, self.substeps

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::motion::Motion;
-use super::{DIVERGES, End, LineOutcome, Point, model};
+use super::{DIVERGES, End, LineOutcome, Point, contact, model};
 use crate::players::{self, Line, Played, Said};
-use crate::scenes::Scene;
+use crate::scenes::{Measure, Scene};
 
 /// A line ends once a point is as near to the reference as this: well below the finest target.
 const FINE_ENOUGH: f64 = 3e-4;
@@ -55,6 +55,13 @@ pub fn follow(
                     seconds,
                     error,
                     height: motion.height(),
+                    speed: motion.speed_at_end(),
+                    gain: match scene.measure {
+                        Measure::Contact { .. } if scene.model.ball.is_none_or(|ball| ball.speed == 0.0) => {
+                            contact::energy_gain(&scene.model, &motion)
+                        }
+                        _ => 0.0,
+                    },
                 });
             }
             Played::Cut { expected } => {

@@ -1,5 +1,6 @@
 //! Error against time of every engine in every scene, at 60 frames a second.
 
+mod contact;
 mod follow;
 mod implicit_euler;
 pub mod law;
@@ -80,6 +81,10 @@ pub struct Point {
     pub error: f64,
     /// Of the nodes at the last frame, on the mean, m.
     pub height: f64,
+    /// See [`Motion::speed_at_end`], m/s.
+    pub speed: f64,
+    /// See [`contact::energy_gain`]; 0 where a ball does work or there is nothing to meet.
+    pub gain: f64,
 }
 
 /// Why a line has no further points.
@@ -163,8 +168,8 @@ fn simulate(scene: Scene, programs: &[(Engine, Result<Vec<PathBuf>, String>)], l
         outcome.lines = program.clone().and_then(|program| {
             let lines = (engine.lines)(&scene)?;
             let play = |line: &Line| {
-                if let Some(ball) = scene.model.ball {
-                    let deepest = |motion: &Motion| motion.deepest(&ball).max(0.0) / ball.radius;
+                if let Measure::Contact { size } = scene.measure {
+                    let deepest = |motion: &Motion| contact::deepest(&scene.model, motion) / size;
                     return follow(&scene, engine.name, &program, line, &deepest, limit);
                 }
                 let reference = references.entry(line.law).or_insert_with(|| {

@@ -9,17 +9,24 @@ use crate::scenes::Block;
 /// Frames are of this length, s.
 pub const FRAME: f64 = 1.0 / 60.0;
 
-/// A rigid ball that stays where it is, without friction.
+/// The skin of bodies that meet others, m.
+pub const SKIN: f64 = 1e-3;
+
+/// A rigid ball without friction that goes down and then stays where it is.
 #[derive(Clone, Copy, Debug)]
 pub struct Ball {
+    /// As it begins.
     pub center: [f64; 3],
     pub radius: f64,
+    /// m/s along -y, over the first two thirds of the frames.
+    pub speed: f64,
 }
 
 impl Ball {
-    /// How deep a point is inside, m; below 0 outside.
-    pub fn depth(&self, point: [f64; 3]) -> f64 {
-        self.radius - glam::DVec3::from(point).distance(self.center.into())
+    /// Its centre once so many of `frames` frames have passed.
+    pub fn center_after(&self, passed: usize, frames: usize) -> [f64; 3] {
+        let [x, y, z] = self.center;
+        [x, y - self.speed * FRAME * passed.min(2 * frames / 3) as f64, z]
     }
 }
 
@@ -34,10 +41,16 @@ pub struct Model {
     pub pinned: Vec<usize>,
     pub tetrahedra: Vec<[usize; 4]>,
     pub springs: Vec<[usize; 2]>,
-    /// The surface of what meets the ball.
+    /// The surface of what meets something.
     pub triangles: Vec<[usize; 3]>,
+    /// All of the above is of so many equal bodies, one after the other; 0 is 1. They meet each other.
+    pub bodies: usize,
     /// What stands in the way.
     pub ball: Option<Ball>,
+    /// Whether the ground y = 0 does too.
+    pub has_floor: bool,
+    /// Of bodies with each other and with the ground.
+    pub friction: f64,
     /// N/m, of every spring. Springs are at rest where they begin.
     pub stiffness: f64,
     /// Pa.
@@ -88,6 +101,57 @@ impl Model {
         }
     }
 
+    /// The same body once for each of these places.
+    pub fn copied(self, places: &[[f64; 3]]) -> Self {
+        let count = self.positions.len();
+        let moved = |place: &[f64; 3]| {
+            let place = *place;
+            let positions = self.positions.iter();
+            positions.map(move |start| std::array::from_fn(|axis| start[axis] + place[axis]))
+        };
+        fn shifted<const N: usize>(elements: &[[usize; N]], count: usize, bodies: usize) -> Vec<[usize; N]> {
+            let of_body = |body| elements.iter().map(move |nodes| nodes.map(|node| node + body * count));
+            (0..bodies).flat_map(of_body).collect()
+        }
+        Self {
+            positions: places.iter().flat_map(moved).collect(),
+            masses: self.masses.repeat(places.len()),
+            tetrahedra: shifted(&self.tetrahedra, count, places.len()),
+            triangles: shifted(&self.triangles, count, places.len()),
+            bodies: places.len(),
+            ..self
+        }
+    }
+
+    /// How many bodies there are.
+    pub fn body_count(&self) -> usize {
+        self.bodies.max(1)
+    }
+
+    /// One of its bodies alone.
+    pub fn body(&self, index: usize) -> Self {
+        fn part<T>(all: &[T], index: usize, count: usize) -> &[T] {
+            let size = all.len() / count;
+            &all[index * size..(index + 1) * size]
+        }
+        let count = self.body_count();
+        let first = index * self.positions.len() / count;
+        Self {
+            positions: part(&self.positions, index, count).to_vec(),
+            masses: part(&self.masses, index, count).to_vec(),
+            tetrahedra: part(&self.tetrahedra, index, count)
+                .iter()
+                .map(|nodes| nodes.map(|node| node - first))
+                .collect(),
+            triangles: part(&self.triangles, index, count)
+                .iter()
+                .map(|nodes| nodes.map(|node| node - first))
+                .collect(),
+            bodies: 1,
+            ..self.clone()
+        }
+    }
+
     /// The file: words and numbers, each section with its name and count first.
     pub fn text(&self) -> String {
         let mut text = String::new();
@@ -112,16 +176,23 @@ impl Model {
         for [a, b] in &self.springs {
             let _ = writeln!(text, "{a} {b}");
         }
-        if let Some(Ball {
-            center: [x, y, z],
-            radius,
-        }) = self.ball
-        {
+        if self.has_contact() {
             let _ = writeln!(text, "triangles {}", self.triangles.len());
             for [a, b, c] in &self.triangles {
                 let _ = writeln!(text, "{a} {b} {c}");
             }
-            let _ = writeln!(text, "ball 1\n{x} {y} {z} {radius}");
+            let _ = writeln!(text, "friction {} bodies {}", self.friction, self.body_count());
+        }
+        if self.has_floor {
+            text += "floor 1\n";
+        }
+        if let Some(Ball {
+            center: [x, y, z],
+            radius,
+            speed,
+        }) = self.ball
+        {
+            let _ = writeln!(text, "ball 1\n{x} {y} {z} {radius} {speed}");
         }
         text
     }
@@ -175,13 +246,22 @@ impl Model {
                     model.ball = Some(Ball {
                         center: [number(), number(), number()],
                         radius: number(),
+                        speed: number(),
                     });
                 }
+                "floor" => model.has_floor = true,
+                "friction" => model.friction = value,
+                "bodies" => model.bodies = count,
                 "springs" => model.springs = (0..count).map(|_| [number() as usize, number() as usize]).collect(),
                 other => panic!("{other} is no section of a model"),
             }
         }
         model
+    }
+
+    /// Whether there is anything to meet.
+    pub fn has_contact(&self) -> bool {
+        self.ball.is_some() || self.has_floor || self.body_count() > 1
     }
 
     /// Whether a law is one that this model can have.

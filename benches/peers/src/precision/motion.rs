@@ -1,6 +1,6 @@
 //! Where nodes are at the end of each frame, and how far two motions are apart.
 
-use crate::precision::model::{Ball, Model};
+use crate::precision::model::{FRAME, Model};
 
 /// The nodes' positions at the start and at the end of each frame.
 #[derive(Clone)]
@@ -27,10 +27,10 @@ impl Motion {
         Self::new(self.start.clone(), last.into_iter().collect())
     }
 
-    /// How deep any node is in a ball at the end of any frame, m; below 0 where none is.
-    pub fn deepest(&self, ball: &Ball) -> f64 {
-        let depths = self.frames.iter().flatten().map(|&place| ball.depth(place));
-        depths.fold(f64::NEG_INFINITY, f64::max)
+    /// How fast nodes go over the last ten frames, m/s, RMS.
+    pub fn speed_at_end(&self) -> f64 {
+        let last = &self.frames[self.frames.len().saturating_sub(11)..];
+        rms(last.iter().skip(1).zip(last)) / FRAME
     }
 
     /// The mean height of the nodes at the last frame, m.

@@ -34,7 +34,7 @@ pub fn markdown(outcomes: &[Outcome], notes: &[(&str, &str)], beams: &[sofa::Row
     }
     for outcome in outcomes
         .iter()
-        .filter(|outcome| outcome.scene.measure == Measure::Contact)
+        .filter(|outcome| matches!(outcome.scene.measure, Measure::Contact { .. }))
     {
         text += &contact(outcome);
     }
@@ -177,29 +177,40 @@ fn scene(outcome: &Outcome) -> String {
 
 /// Time beside penetration.
 fn contact(outcome: &Outcome) -> String {
-    let radius = outcome.scene.model.ball.map_or(1.0, |ball| ball.radius);
+    let Measure::Contact { size } = outcome.scene.measure else {
+        return String::new();
+    };
     let mut text = format!(
-        "## {}\n\n{}. A line ends where no node is inside at the end of any frame; the mean height at the end tells whether all \
-         fell alike.\n\n| engine | line | settings | s | deepest, mm | height, mm |\n|---|---|---|---|---|---|\n",
+        "## {}\n\n{}. A line ends where no node is inside anything at the end of any frame. Energy: at least so much more than at the start, \
+         in parts of what is lost. Speed: of the last ten frames. The mean height at the end tells whether all \
+         fell alike.\n\n| engine | line | settings | s | deepest, mm | energy, % | speed, mm/s | height, mm |\n|---|---|---|---|---|---|---|---|\n",
         outcome.scene.name, outcome.scene.about
     );
     for engine in &outcome.engines {
         if let Err(reason) = &engine.lines {
-            let _ = writeln!(text, "| {} | | not simulated: {reason} | | | |", engine.name);
+            let _ = writeln!(text, "| {} | | not simulated: {reason} | | | | | |", engine.name);
         }
         for line in engine.lines.iter().flatten() {
             if line.points.is_empty() {
-                let _ = writeln!(text, "| {} | {} | {} | | | |", engine.name, line.name, end(&line.end));
+                let _ = writeln!(
+                    text,
+                    "| {} | {} | {} | | | | | |",
+                    engine.name,
+                    line.name,
+                    end(&line.end)
+                );
             }
             for point in &line.points {
                 let _ = writeln!(
                     text,
-                    "| {} | {} | {} | {} | {:.3} | {:.1} |",
+                    "| {} | {} | {} | {} | {:.3} | {:.1} | {:.1} | {:.1} |",
                     engine.name,
                     line.name,
                     point.settings,
                     number(point.seconds),
-                    1e3 * radius * point.error,
+                    1e3 * size * point.error,
+                    1e2 * point.gain,
+                    1e3 * point.speed,
                     1e3 * point.height
                 );
             }

@@ -1,5 +1,7 @@
 //! Blocks of cubes that are cut in five tetrahedra each.
 
+use std::collections::HashMap;
+
 /// Positions and tetrahedra of a block.
 pub struct Block {
     pub positions: Vec<[f64; 3]>,
@@ -36,6 +38,21 @@ pub fn block(cells: [usize; 3], edge: f64) -> Block {
         }
     }
     Block { positions, tetrahedra }
+}
+
+/// The faces of tetrahedra that no other shares, their fronts outside.
+pub fn surface(tetrahedra: &[[usize; 4]]) -> Vec<[usize; 3]> {
+    let faces = |&[a, b, c, d]: &[usize; 4]| [[a, c, b], [a, b, d], [b, c, d], [a, d, c]];
+    let sorted = |mut face: [usize; 3]| {
+        face.sort_unstable();
+        face
+    };
+    let mut uses: HashMap<[usize; 3], usize> = HashMap::new();
+    for face in tetrahedra.iter().flat_map(faces) {
+        *uses.entry(sorted(face)).or_default() += 1;
+    }
+    let all = tetrahedra.iter().flat_map(faces);
+    all.filter(|&face| uses[&sorted(face)] == 1).collect()
 }
 
 /// The nodes of which something is true.

@@ -7,8 +7,10 @@ mod free_fall;
 mod jelly;
 mod mesh;
 mod organ;
+mod pressed_cloth;
 mod rope;
 mod sofa_beam;
+mod stacked_blocks;
 
 use crate::precision::model::Model;
 
@@ -26,7 +28,7 @@ pub struct Scene {
 }
 
 /// Where an error is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measure {
     /// At the end of each frame, of what a player must get right before it is timed.
     Check,
@@ -34,8 +36,8 @@ pub enum Measure {
     Motion,
     /// At the last frame, when a damped body rests.
     Rest,
-    /// How deep nodes are in the ball at the end of frames, in parts of its radius. There is no reference.
-    Contact,
+    /// How deep nodes are in what they meet at the end of frames, in parts of this size, m. There is no reference.
+    Contact { size: f64 },
 }
 
 /// All scenes, checks first.
@@ -50,5 +52,8 @@ pub fn all() -> Vec<Scene> {
         cloth::scene(),
         rope::scene(),
         draped_cloth::scene(),
+        pressed_cloth::scene(),
+        stacked_blocks::two(),
+        stacked_blocks::heap(),
     ]
 }

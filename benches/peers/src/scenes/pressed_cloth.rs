@@ -1,0 +1,45 @@
+//! A ball that is pressed into a net of springs held at its rim.
+
+use super::draped_cloth::faces;
+use super::{Measure, Scene};
+use crate::cloth::Cloth;
+use crate::precision::model::{Ball, FRAME, Model};
+
+const SIDE: u32 = 41;
+const RADIUS: f64 = 0.015;
+const FRAMES: usize = 60;
+
+pub fn scene() -> Scene {
+    let mut cloth = Cloth::new(SIDE);
+    cloth.spacing = 0.005;
+    let side = SIDE as usize;
+    let is_rim = |node: usize| {
+        [node % side, node / side]
+            .iter()
+            .any(|&place| place == 0 || place + 1 == side)
+    };
+    let nodes = side * side;
+    Scene {
+        name: "ball pressed into a cloth",
+        about: "a ball of 30 mm goes 40 mm down into a cloth of 200 mm, 41 x 41 nodes, held at its rim, without weight: springs of \
+                100 N/m, 0.1 kg, damping 2 /s, no friction"
+            .into(),
+        model: Model {
+            positions: cloth.positions().map(|place| place.map(f64::from)).collect(),
+            masses: vec![0.1 / nodes as f64; nodes],
+            pinned: (0..nodes).filter(|&node| is_rim(node)).collect(),
+            springs: cloth.springs().map(|ends| ends.map(|end| end as usize)).collect(),
+            triangles: faces(side),
+            stiffness: 100.0,
+            ball: Some(Ball {
+                center: [0.1, RADIUS + 1e-3, 0.1],
+                radius: RADIUS,
+                speed: 0.041 / (FRAME * (2 * FRAMES / 3) as f64),
+            }),
+            damping: 2.0,
+            frames: FRAMES,
+            ..Model::default()
+        },
+        measure: Measure::Contact { size: RADIUS },
+    }
+}
