@@ -196,12 +196,10 @@ fn block(side: u32, has_elements: bool, solver: Solver) -> (World, BodyId) {
     })
     .expect("a world");
     let definition = BodyDefinition {
-        positions: &mesh.positions,
         masses: Values::Uniform(1e-3),
-        tetrahedra: &mesh.tetrahedra,
         spare_nodes: 20_000,
         solver,
-        ..Default::default()
+        ..BodyDefinition::of(&mesh)
     };
     let material = Material {
         model: Model::Tetrahedra,

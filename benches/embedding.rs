@@ -45,11 +45,9 @@ fn bound(organ: &Mesh, drawn: &Mesh) -> (World, BodyId, Embedding) {
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let body = world
         .create_body(&BodyDefinition {
-            positions: &organ.positions,
-            tetrahedra: &organ.tetrahedra,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(50.0),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(organ)
         })
         .expect("a body");
     let definition = EmbeddingDefinition {

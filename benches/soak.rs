@@ -137,9 +137,6 @@ impl Play {
         let dice = &mut self.dice;
         mesh.positions.iter_mut().for_each(|place| *place += shift);
         let created = self.world.create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
-            tetrahedra: &mesh.tetrahedra,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(30.0),
             node_dampings: Values::Uniform(2e-3),
@@ -155,7 +152,7 @@ impl Play {
                 with_bodies: dice.below(2) == 0,
                 ..BodyContact::default()
             },
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         });
         let id = created.expect("a body");
         for _ in 0..2 {

@@ -252,12 +252,10 @@ fn tools(criterion: &mut Criterion) {
     ] {
         let mut world = world();
         let body = BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Each(&masses),
             stiffnesses: Values::Uniform(10.0),
             node_dampings: Values::Uniform(1e-3),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         let id = world.create_body(&body).expect("a valid body");
         world.set_gravity(Vec3::ZERO).expect("a finite vector");
@@ -292,12 +290,10 @@ fn haptics(criterion: &mut Criterion) {
         // As many substeps as it needs: a step is that of a tick.
         let mut world = World::new(WorldDefinition::default()).expect("a valid definition");
         let body = BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Each(&masses),
             stiffnesses: Values::Uniform(10.0),
             node_dampings: Values::Uniform(1e-3),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         world.create_body(&body).expect("a valid body");
         world.set_gravity(Vec3::ZERO).expect("a finite vector");

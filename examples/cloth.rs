@@ -24,8 +24,6 @@ fn main() -> Result<()> {
     let mut world = World::new(WorldDefinition::default())?;
     let mesh = Mesh::cloth([0.3, 0.3], [30, 30])?;
     let cloth = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
         masses: Values::Uniform(2e-5),
         stiffnesses: Values::Uniform(20.0),
         node_dampings: Values::Uniform(5e-5),
@@ -36,7 +34,7 @@ fn main() -> Result<()> {
             with_itself: true,
             ..BodyContact::default()
         },
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     })?;
     let mut ball = ToolDefinition::new(Shape::Sphere { radius: RADIUS });
     ball.pose.position = (RADIUS + 0.01) * Vec3::NEG_Y;

@@ -28,15 +28,13 @@ fn main() -> Result<()> {
     })?;
     let mesh = Mesh::cloth([SIZE, SIZE], [20, 20])?;
     let sheet = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
         masses: Values::Uniform(1e-5),
         stiffnesses: Values::Uniform(20.0),
         node_dampings: Values::Uniform(1e-5),
         // Room for the nodes that the cut adds, and the toughness [J/m] that resists it.
         spare_nodes: 1000,
         toughness: 0.01,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     })?;
     // It is held at its left and its right side.
     let [low, high] = [vec3(-1.0, -1.0, -1.0), vec3(1.0, 1.0, 1.0)];

@@ -28,8 +28,6 @@ fn main() -> Result<()> {
     })?;
     let mesh = Mesh::block([0.08, HEIGHT, 0.08], [8, 4, 8])?;
     let body = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(Material {
             model: Model::Tetrahedra,
             young_modulus: 5000.0,
@@ -37,7 +35,7 @@ fn main() -> Result<()> {
             density: 1000.0,
             thickness: 0.0,
         }),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     })?;
     // The lower side lies on a table.
     let low = Vec3::new(-1.0, -1.0, -1.0);

@@ -60,11 +60,9 @@ fn a_step_on_two_threads_allocates_nothing() {
     for quads in [30, 100, 40] {
         let mesh = Mesh::cloth([0.3, 0.3], [quads, quads]).expect("a cloth");
         let cloth = BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(20.0),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         let cloth = world.create_body(&cloth).expect("a body");
         world.body_mut(cloth).and_then(|body| body.pin(0)).expect("a node");
@@ -85,12 +83,10 @@ fn a_step_on_two_threads_allocates_nothing() {
 fn fresh_worlds_allocate_nothing(cells: [u32; 3], rounds: u32) {
     let block = Mesh::block([0.06, 0.04, 0.06], cells).expect("a block");
     let springs = BodyDefinition {
-        positions: &block.positions,
-        tetrahedra: &block.tetrahedra,
         masses: Values::Uniform(1e-4),
         stiffnesses: Values::Uniform(50.0),
         spring_dampings: Values::Uniform(1e-3),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&block)
     };
     let elements = BodyDefinition {
         material: Some(Material {

@@ -50,13 +50,11 @@ fn run(scene: &Scene, substeps: u32, touches: bool) -> Run {
     .expect("a world");
     let body = world
         .create_body(&BodyDefinition {
-            positions: &scene.mesh.positions,
-            tetrahedra: &scene.mesh.tetrahedra,
             springs: Some(&scene.edges),
             masses: Values::Uniform(scene.mass as f32),
             stiffnesses: Values::Uniform(scene.stiffness as f32),
             node_dampings: Values::Uniform((scene.damping * scene.mass) as f32),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&scene.mesh)
         })
         .expect("a body");
     for node in 0..scene.mesh.positions.len() {

@@ -60,10 +60,8 @@ fn organ() -> Mesh {
 fn surface(mesh: &Mesh) -> Vec<[u32; 3]> {
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let body = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         masses: Values::Uniform(1.0),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(mesh)
     });
     let body = world.body(body.expect("a body")).expect("the body");
     body.surface().to_vec()
@@ -222,10 +220,8 @@ fn main() -> ExitCode {
     };
     let surface = surface(&mesh);
     let plain = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         triangles: &surface,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let springs = BodyDefinition {
         masses: Values::Uniform(1e-5),

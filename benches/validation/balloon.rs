@@ -50,13 +50,11 @@ fn found(law: ElementLaw, cells: u32) -> f64 {
     let mesh = hollow(cells);
     let mut world = World::new(FREE).expect("a world");
     let id = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(tissue(NU)),
         element_law: law,
         pressure: PRESSURE as f32,
         solver: Solver::Newton,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     });
     let id = id.expect("a body");
     let body = world.body_mut(id).expect("the body");

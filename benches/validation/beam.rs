@@ -148,8 +148,6 @@ impl Beam {
         }
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let id = world.create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             masses: Values::Each(&masses),
             material: Some(Material {
                 model: Model::Tetrahedra,
@@ -163,7 +161,7 @@ impl Beam {
             },
             solver: Solver::Implicit,
             accuracy: 1e-4,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         });
         let id = id.expect("a body");
         let body = world.body_mut(id).expect("the body");

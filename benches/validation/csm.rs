@@ -59,8 +59,6 @@ impl Bar {
         })
         .expect("a world");
         let id = world.create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             material: Some(Material {
                 model: Model::Tetrahedra,
                 young_modulus: 2.0 * shear_modulus * (1.0 + NU),
@@ -70,7 +68,7 @@ impl Bar {
             }),
             solver: Solver::Verlet,
             mass_scaling: 0.0,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         });
         let id = id.expect("a body");
         let body = world.body_mut(id).expect("the body");

@@ -81,13 +81,10 @@ impl Subject {
         let mut world = World::new(WorldDefinition::default())?;
         let is_solid = !self.mesh.tetrahedra.is_empty() || !self.mesh.cells.is_empty();
         let mut definition = BodyDefinition {
-            positions: &self.mesh.positions,
             triangles: if is_solid { &[] } else { &self.mesh.triangles },
-            tetrahedra: &self.mesh.tetrahedra,
-            cells: &self.mesh.cells,
             material: Some(material),
             element_law,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&self.mesh)
         };
         if is_reference {
             definition.solver = Solver::Verlet;

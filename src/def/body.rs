@@ -9,6 +9,7 @@ use super::SpringLaw;
 use super::Tearing;
 use super::{Material, Model, Viscosity, Yielding};
 use crate::base::{Error, Result, finite, memory, not_negative};
+use crate::mesh::Mesh;
 
 /// One value for all, or one for each.
 ///
@@ -17,7 +18,7 @@ use crate::base::{Error, Result, finite, memory, not_negative};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let mut masses = vec![1e-4; mesh.positions.len()];
 /// // The first node is pinned for good.
 /// masses[0] = 0.0;
@@ -68,7 +69,7 @@ impl Values<'_> {
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let packed = world.create_body(&BodyDefinition { storage: Storage::Packed, ..cloth })?;
 /// let linked = world.create_body(&BodyDefinition { storage: Storage::Efficient, ..cloth })?;
 /// let bytes = |body| world.body(body).map(|body| body.storage_report().bytes_used);
@@ -95,7 +96,7 @@ pub enum Storage {
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let stiff = BodyDefinition { stiffnesses: Values::Uniform(1e5), solver: Solver::Implicit, ..cloth };
 /// # world.create_body(&stiff)?;
 /// let report = world.step(1.0 / 60.0)?;
@@ -131,11 +132,9 @@ pub(crate) const MOST_ITERATIONS: u32 = 1_000_000;
 /// use sinew::{BodyDefinition, Values, World, WorldDefinition};
 /// let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// let cloth = BodyDefinition {
-///     positions: &mesh.positions,
-///     triangles: &mesh.triangles,
 ///     masses: Values::Uniform(1e-4),
 ///     stiffnesses: Values::Uniform(20.0),
-///     ..BodyDefinition::default()
+///     ..BodyDefinition::of(&mesh)
 /// };
 /// let mut world = World::new(WorldDefinition::default())?;
 /// let body = world.create_body(&cloth)?;
@@ -271,6 +270,19 @@ pub struct BodyDefinition<'a> {
     /// fracture toughness of the material, J/m², times the thickness of the surface; of tetrahedra that itself, for each m² of their faces that opens.
     /// Springs alone have none. At least 0; 0: it is cut for nothing. Above 0 it needs `spare_nodes`.
     pub toughness: f32,
+}
+
+impl<'a> BodyDefinition<'a> {
+    /// The default with the nodes of a mesh and all that they make.
+    pub fn of(mesh: &'a Mesh) -> Self {
+        Self {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            tetrahedra: &mesh.tetrahedra,
+            cells: &mesh.cells,
+            ..Self::default()
+        }
+    }
 }
 
 impl Default for BodyDefinition<'_> {

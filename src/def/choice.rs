@@ -10,7 +10,7 @@ use crate::codec::{saved, saved_enum};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let body = world.create_body(&BodyDefinition { solver: Solver::Implicit, ..cloth })?;
 /// assert_eq!(world.body(body)?.solver_choice().reason, ChoiceReason::Given);
 /// # Ok::<(), sinew::Error>(())
@@ -35,7 +35,7 @@ saved_enum!(ChoiceReason { 0 => Given, 1 => FewSubsteps, 2 => ManySubsteps });
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let body = world.create_body(&BodyDefinition { solver: Solver::Auto, ..cloth })?;
 /// let choice = world.body(body)?.solver_choice();
 /// assert_eq!((choice.solver, choice.reason), (Solver::Verlet, ChoiceReason::FewSubsteps));

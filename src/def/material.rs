@@ -10,7 +10,7 @@ use crate::base::{Error, Result, above_zero, not_negative};
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
 /// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
+/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// # let material = material.expect("the block has one");
 /// let mut with = |model| world.create_body(&BodyDefinition { material: Some(Material { model, ..material }), ..block });
 /// // Poisson's ratio is 0.45: elements can have it, springs cannot.
@@ -57,7 +57,7 @@ pub enum Model {
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
 /// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { positions: &mesh.positions, tetrahedra: &mesh.tetrahedra, material, ..BodyDefinition::default() };
+/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// let material = Material {
 ///     model: Model::Tetrahedra,
 ///     young_modulus: 5000.0,

@@ -73,8 +73,6 @@ mod tests {
         let mesh = Mesh::organ(0.15, 0.15 / 8.0).expect("a mesh");
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let id = world.create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             material: Some(Material {
                 model: Model::Tetrahedra,
                 poisson_ratio,
@@ -82,7 +80,7 @@ mod tests {
                 density: 1060.0,
                 ..Material::default()
             }),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         });
         let mut random = Random(7);
         let id = id.expect("a body");

@@ -35,7 +35,7 @@ type CRun = unsafe extern "C" fn(context: *mut c_void, task: Option<CTask>, task
 /// let mut world = World::new(WorldDefinition { thread_count: 2, tasks, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// world.step(1.0 / 60.0)?;
 /// assert!(world.body(body)?.bounds()[1].y < 0.0);

@@ -391,17 +391,14 @@ pub(super) mod tests {
     /// A body of springs that meets itself, with room for cuts.
     pub fn meets_itself(mesh: &Mesh) -> BodyDefinition<'_> {
         BodyDefinition {
-            positions: &mesh.positions,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(10.0),
-            triangles: &mesh.triangles,
-            tetrahedra: &mesh.tetrahedra,
             spare_nodes: 20_000,
             contact: BodyContact {
                 with_itself: true,
                 ..BodyContact::NOTHING
             },
-            ..Default::default()
+            ..BodyDefinition::of(mesh)
         }
     }
 

@@ -14,7 +14,7 @@ use crate::tissue::{Thread, distance};
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let [left, right] = [0, 1].map(|_| world.create_body(&cloth));
 /// # let (left, right) = (left?, right?);
 /// # world.body_mut(right)?.transform(0.11 * Vec3::X, Quat::IDENTITY, None)?;
@@ -54,7 +54,7 @@ impl Default for SutureDefinition {
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
 /// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
 /// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { positions: &mesh.positions, triangles: &mesh.triangles, masses, stiffnesses, ..BodyDefinition::default() };
+/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let [left, right] = [0, 1].map(|_| world.create_body(&cloth));
 /// # let (left, right) = (left?, right?);
 /// # world.body_mut(right)?.transform(0.11 * Vec3::X, Quat::IDENTITY, None)?;

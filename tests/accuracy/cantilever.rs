@@ -60,8 +60,6 @@ impl Cantilever {
     pub fn found(&self) -> f64 {
         let mut world = World::new(FREE).expect("a world");
         let id = world.create_body(&BodyDefinition {
-            positions: &self.mesh.positions,
-            tetrahedra: &self.mesh.tetrahedra,
             material: Some(Material {
                 model: Model::Tetrahedra,
                 young_modulus: YOUNG_MODULUS,
@@ -69,7 +67,7 @@ impl Cantilever {
                 density: 1000.0,
                 ..Material::default()
             }),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&self.mesh)
         });
         let id = id.expect("a body");
         let body = world.body_mut(id).expect("the body");

@@ -105,8 +105,6 @@ impl Layer {
             .collect();
         let mut world = World::new(FREE).expect("a world");
         let id = world.create_body(&BodyDefinition {
-            positions: &self.mesh.positions,
-            tetrahedra: &self.mesh.tetrahedra,
             node_dampings: Values::Each(&dampings),
             material: Some(Material {
                 model: Model::Tetrahedra,
@@ -116,7 +114,7 @@ impl Layer {
                 ..Material::default()
             }),
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&self.mesh)
         });
         let body = world.body_mut(id.expect("a body")).expect("the body");
         for (node, _) in (0..).zip(self.is_held()).filter(|(_, is_held)| *is_held) {

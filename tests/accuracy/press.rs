@@ -44,8 +44,6 @@ impl Block {
 
     fn body(&self, world: &mut World, solver: Solver) -> BodyId {
         let definition = BodyDefinition {
-            positions: &self.mesh.positions,
-            tetrahedra: &self.mesh.tetrahedra,
             node_dampings: Values::Uniform(0.01),
             material: Some(Material {
                 model: Model::Tetrahedra,
@@ -55,7 +53,7 @@ impl Block {
                 ..Material::default()
             }),
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&self.mesh)
         };
         world.create_body(&definition).expect("a body")
     }

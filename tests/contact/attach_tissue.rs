@@ -260,13 +260,11 @@ fn put_cloth(world: &mut World, mesh: &Mesh, solver: Solver) -> BodyId {
     let node_mass = 0.05 / mesh.positions.len() as f32;
     world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
             masses: Values::Uniform(node_mass),
             stiffnesses: Values::Uniform(50.0),
             spring_dampings: Values::Uniform(0.05),
-            triangles: &mesh.triangles,
             solver,
-            ..Default::default()
+            ..BodyDefinition::of(mesh)
         })
         .expect("a cloth")
 }

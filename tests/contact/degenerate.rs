@@ -105,8 +105,6 @@ fn cases() -> [Case; 11] {
 fn put(world: &mut World, mesh: &Mesh, solver: Solver) -> BodyId {
     world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             material: Some(Material {
                 model: Model::Tetrahedra,
                 young_modulus: 1e5,
@@ -122,7 +120,7 @@ fn put(world: &mut World, mesh: &Mesh, solver: Solver) -> BodyId {
                 ..BodyContact::NOTHING
             },
             solver,
-            ..Default::default()
+            ..BodyDefinition::of(mesh)
         })
         .expect("a body")
 }

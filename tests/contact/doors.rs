@@ -38,12 +38,10 @@ fn put(world: &mut World, shape: Shape, position: Vec3) -> Result<ToolId> {
 fn cloth_of(world: &mut World, contact: BodyContact) -> Result<BodyId> {
     let mesh = square(0.1, 5);
     world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
         masses: Values::Uniform(1e-3),
         stiffnesses: Values::Uniform(30.0),
-        triangles: &mesh.triangles,
         contact,
-        ..Default::default()
+        ..BodyDefinition::of(&mesh)
     })
 }
 

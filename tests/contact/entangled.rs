@@ -19,8 +19,6 @@ fn ribbons(world: &mut World, thickness: f32, solver: Solver) -> [BodyId; 2] {
     }
     let ids = [&lying, &standing].map(|mesh| {
         let definition = BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(3e-4),
             stiffnesses: Values::Uniform(40.0),
             spring_dampings: Values::Uniform(0.02),
@@ -31,7 +29,7 @@ fn ribbons(world: &mut World, thickness: f32, solver: Solver) -> [BodyId; 2] {
                 with_bodies: true,
                 ..BodyContact::NOTHING
             },
-            ..Default::default()
+            ..BodyDefinition::of(mesh)
         };
         world.create_body(&definition).expect("a body")
     });

@@ -36,8 +36,6 @@ fn block(world: &mut World, solver: Solver, height: f32, mirrored: bool, damping
     let node_mass = DENSITY * SIZE.iter().product::<f32>() / mesh.positions.len() as f32;
     let id = world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             masses: Values::Uniform(node_mass),
             node_dampings: Values::Uniform(damping * node_mass),
             material: Some(Material {
@@ -48,7 +46,7 @@ fn block(world: &mut World, solver: Solver, height: f32, mirrored: bool, damping
             }),
             solver,
             contact: MEETS,
-            ..Default::default()
+            ..BodyDefinition::of(&mesh)
         })
         .expect("a body");
     (id, mesh)
@@ -167,8 +165,6 @@ fn a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble() {
         ..MEETS
     };
     let below = BodyDefinition {
-        positions: &block.positions,
-        tetrahedra: &block.tetrahedra,
         masses: Values::Uniform(0.1),
         node_dampings: Values::Uniform(0.5),
         material: Some(Material {
@@ -179,17 +175,15 @@ fn a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble() {
         }),
         solver: Solver::Implicit,
         contact: contact(0.08),
-        ..Default::default()
+        ..BodyDefinition::of(&block)
     };
     let above = BodyDefinition {
-        positions: &cloth.positions,
-        triangles: &cloth.triangles,
         masses: Values::Uniform(0.02),
         node_dampings: Values::Uniform(0.1),
         stiffnesses: Values::Uniform(355.0),
         spring_dampings: Values::Uniform(3.8),
         contact: contact(0.05),
-        ..Default::default()
+        ..BodyDefinition::of(&cloth)
     };
     let ids = [below, above].map(|definition| world.create_body(&definition).expect("a body"));
     let places = |world: &World, id| body(world, id).positions().to_vec();

@@ -22,14 +22,11 @@ fn press(solver: Solver, speed: f32, dt: f32, drag: f32) -> (f32, f32, f32) {
     let node_mass = 1000.0 * size.iter().product::<f32>() / mesh.positions.len() as f32;
     let block = world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
             masses: Values::Uniform(node_mass),
             node_dampings: Values::Uniform(drag * node_mass),
             stiffnesses: Values::Uniform(100.0),
-            triangles: &mesh.triangles,
-            tetrahedra: &mesh.tetrahedra,
             solver,
-            ..Default::default()
+            ..BodyDefinition::of(&mesh)
         })
         .expect("a body");
     let below = nodes_at(&mesh, |position| position.y < -0.0199);

@@ -34,18 +34,16 @@ impl Drape {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let mass = MASS / cloth.positions.len() as f32;
         let body = BodyDefinition {
-            positions: &cloth.positions,
             masses: Values::Uniform(mass),
             node_dampings: Values::Uniform(30.0 * mass),
             stiffnesses: Values::Uniform(30.0),
             spring_dampings: Values::Uniform(0.01),
-            triangles: &cloth.triangles,
             contact: BodyContact {
                 thickness: THICKNESS,
                 ..Default::default()
             },
             solver,
-            ..Default::default()
+            ..BodyDefinition::of(&cloth)
         };
         let cloth = world.create_body(&body).expect("a cloth");
         let tool = ToolDefinition {

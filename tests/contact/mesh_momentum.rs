@@ -69,13 +69,10 @@ impl Thrown {
         let node_mass = MASS / mesh.positions.len() as f32;
         let block = world
             .create_body(&BodyDefinition {
-                positions: &mesh.positions,
                 masses: Values::Uniform(node_mass),
                 node_dampings: Values::Uniform(setup.drag * node_mass),
                 stiffnesses: Values::Uniform(100.0),
                 spring_dampings: Values::Uniform(0.02),
-                triangles: &mesh.triangles,
-                tetrahedra: &mesh.tetrahedra,
                 contact: BodyContact {
                     thickness: 0.5e-3,
                     ..Default::default()
@@ -85,7 +82,7 @@ impl Thrown {
                 accuracy: 1e-6,
                 // A step that tools cut into many parts has no less for each.
                 iterations: 100_000,
-                ..Default::default()
+                ..BodyDefinition::of(&mesh)
             })
             .expect("a body");
         let thrown: Vec<Vec3> = mesh
@@ -166,19 +163,16 @@ fn a_block_at_rest_presses_with_its_weight() {
             let placed = moved(mesh.clone(), Vec3::new(0.003, 0.026, -0.002));
             let block = world
                 .create_body(&BodyDefinition {
-                    positions: &placed.positions,
                     masses: Values::Uniform(node_mass),
                     node_dampings: Values::Uniform(20.0 * node_mass),
                     stiffnesses: Values::Uniform(200.0),
                     spring_dampings: Values::Uniform(0.05),
-                    triangles: &placed.triangles,
-                    tetrahedra: &placed.tetrahedra,
                     contact: BodyContact {
                         thickness: 0.2e-3,
                         ..Default::default()
                     },
                     solver,
-                    ..Default::default()
+                    ..BodyDefinition::of(&placed)
                 })
                 .expect("a body");
             let count = mesh.positions.len();

@@ -256,14 +256,12 @@ fn put(world: &mut World, mesh: &Mesh, solver: Solver) -> BodyId {
     let node_mass = TISSUE.node_mass(mesh);
     world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
             masses: Values::Uniform(node_mass),
             node_dampings: Values::Uniform(TISSUE.drag * node_mass),
             stiffnesses: Values::Uniform(TISSUE.stiffness),
             spring_dampings: Values::Uniform(TISSUE.spring_damping),
-            triangles: &mesh.triangles,
             solver,
-            ..Default::default()
+            ..BodyDefinition::of(mesh)
         })
         .expect("a body")
 }

@@ -24,12 +24,10 @@ fn scene(
     let mesh = Mesh::cloth([0.9; 2], [9; 2]).expect("a cloth");
     let body = world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-4),
             stiffnesses: Values::Uniform(STIFFNESS),
             solver,
-            ..Default::default()
+            ..BodyDefinition::of(&mesh)
         })
         .expect("a body");
     for node in 0..mesh.positions.len() as u32 {

@@ -306,13 +306,11 @@ fn queries_answer_as_if_each_triangle_was_looked_at() {
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let cloth = Mesh::cloth([0.2, 0.2], [24, 24]).expect("a cloth");
     let sheet = BodyDefinition {
-        positions: &cloth.positions,
-        triangles: &cloth.triangles,
         masses: sinew::Values::Uniform(1e-4),
         stiffnesses: sinew::Values::Uniform(20.0),
         node_dampings: sinew::Values::Uniform(1e-4),
         spare_nodes: 2000,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&cloth)
     };
     let sheet = world.create_body(&sheet).expect("a body");
     let corners = [0, 24, 24 * 25, 25 * 25 - 1];

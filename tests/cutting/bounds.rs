@@ -13,9 +13,6 @@ fn world(mesh: &Mesh, spare_nodes: u32) -> (World, BodyId) {
     let mut world = World::new(WorldDefinition::default()).unwrap();
     let is_solid = !mesh.tetrahedra.is_empty();
     let body = BodyDefinition {
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
-        tetrahedra: &mesh.tetrahedra,
         masses: Values::Uniform(1e-3),
         stiffnesses: if is_solid {
             Values::Uniform(0.0)
@@ -29,7 +26,7 @@ fn world(mesh: &Mesh, spare_nodes: u32) -> (World, BodyId) {
             ..Material::default()
         }),
         spare_nodes,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(mesh)
     };
     let body = world.create_body(&body).unwrap();
     (world, body)

@@ -151,11 +151,8 @@ fn made(kind: Kind, random: &mut Random) -> (World, BodyId, Vec<Vec3>) {
     };
     let body = world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
             masses: Values::Uniform(2e-4),
             node_dampings: Values::Uniform(0.0),
-            triangles: &mesh.triangles,
-            tetrahedra: &mesh.tetrahedra,
             stiffnesses: Values::Uniform(if kind.has_elements { 0.0 } else { 20.0 }),
             material: kind.has_elements.then_some(elements),
             springs_per_node: if kind.storage == Storage::FastLink { 48 } else { 0 },
@@ -169,7 +166,7 @@ fn made(kind: Kind, random: &mut Random) -> (World, BodyId, Vec<Vec3>) {
             },
             solver: kind.solver,
             storage: kind.storage,
-            ..Default::default()
+            ..BodyDefinition::of(&mesh)
         })
         .unwrap();
     let (push, turn) = (random.within(0.3), random.within(6.0));

@@ -63,11 +63,8 @@ impl Matter {
         let is_elements = self.young > 0.0;
         world
             .create_body(&BodyDefinition {
-                positions: &mesh.positions,
                 masses: Values::Uniform(mass),
                 node_dampings: Values::Uniform(self.drag * mass),
-                triangles: &mesh.triangles,
-                tetrahedra: &mesh.tetrahedra,
                 stiffnesses: Values::Uniform(if is_elements { 0.0 } else { self.stiffness }),
                 spring_dampings: Values::Uniform(if is_elements { 0.0 } else { self.damping }),
                 material: is_elements.then_some(elements),
@@ -75,7 +72,7 @@ impl Matter {
                 contact: self.contact,
                 spare_nodes: self.spare,
                 mass_scaling: 0.0,
-                ..Default::default()
+                ..BodyDefinition::of(mesh)
             })
             .unwrap()
     }

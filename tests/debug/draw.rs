@@ -60,13 +60,11 @@ fn block(world: &mut World, sleep: Sleep) -> (BodyId, Mesh) {
     let mesh = Mesh::block([0.1, 0.02, 0.1], [8, 2, 8]).expect("a block");
     let body = world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             masses: Values::Uniform(1e-4),
             stiffnesses: Values::Uniform(50.0),
             node_dampings: Values::Uniform(1e-3),
             sleep,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         })
         .expect("a body");
     (body, mesh)

@@ -19,8 +19,6 @@ fn pressed(solver: Solver, thread_count: u32) -> (World, ToolId) {
     .expect("a world");
     let body = world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             material: Some(Material {
                 young_modulus: 5000.0,
                 poisson_ratio: 0.25,
@@ -29,7 +27,7 @@ fn pressed(solver: Solver, thread_count: u32) -> (World, ToolId) {
             }),
             node_dampings: Values::Uniform(5e-3),
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         })
         .expect("a body");
     let low = mesh.positions.iter().fold(f32::INFINITY, |low, place| low.min(place.y));

@@ -75,13 +75,11 @@ impl Bench {
         };
         let body = world
             .create_body(&BodyDefinition {
-                positions: &mesh.positions,
-                tetrahedra: &mesh.tetrahedra,
                 material: Some(material),
                 solver,
                 spare_nodes: 2000,
                 node_dampings: Values::Uniform(20.0 * 0.4 / count),
-                ..Default::default()
+                ..BodyDefinition::of(&mesh)
             })
             .unwrap();
         for (node, position) in mesh.positions.iter().enumerate() {

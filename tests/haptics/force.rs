@@ -160,8 +160,6 @@ fn what_a_tool_holds_comes_to_rest_with_the_device() {
         .unwrap();
         let mesh = Mesh::block([0.06, 0.03, 0.06], [8, 4, 8]).unwrap();
         let definition = BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             material: Some(Material {
                 model: Model::Springs,
                 young_modulus,
@@ -169,7 +167,7 @@ fn what_a_tool_holds_comes_to_rest_with_the_device() {
                 ..Material::default()
             }),
             damping_rate: 5.0,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         let body = world.create_body(&definition).unwrap();
         let mut pose = Pose {

@@ -35,13 +35,11 @@ pub fn block() -> Mesh {
 
 pub fn scene(mesh: &Mesh, world: WorldDefinition, law: ElementLaw, nu: f32, solver: Solver) -> Scene {
     let definition = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(tissue(nu)),
         element_law: law,
         mass_scaling: 0.0,
         solver,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(mesh)
     };
     Scene::new(world, &definition)
 }
@@ -295,13 +293,11 @@ fn every_solver_comes_to_the_same_rest() {
         let mut expected = None;
         for solver in SOLVERS.into_iter().rev() {
             let definition = BodyDefinition {
-                positions: &mesh.positions,
-                tetrahedra: &mesh.tetrahedra,
                 material: Some(tissue(nu)),
                 element_law: law,
                 node_dampings: Values::Uniform(0.002),
                 solver,
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&mesh)
             };
             let mut scene = Scene::new(WorldDefinition { gravity, ..FREE }, &definition);
             for (node, rest) in mesh.positions.iter().enumerate() {
@@ -330,11 +326,9 @@ fn every_solver_comes_to_the_same_rest() {
 fn what_a_law_cannot_have_is_refused() {
     let mesh = block();
     let plain = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(tissue(0.3)),
         element_law: ElementLaw::NeoHookean,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let says = |definition: BodyDefinition, words: &[&str]| {
         let mut world = World::new(FREE).expect("a world");

@@ -166,8 +166,6 @@ fn organs_of_springs_that_keep_their_volume_come_back_of(is_tried: fn(usize) -> 
     for (way, (solver, step)) in (0..).zip([(Solver::Implicit, 1.0 / 60.0), (Solver::Verlet, 1e-3)]) {
         for (_, (name, start)) in (way..).zip(starts(&mesh)).filter(|start| is_tried(start.0)) {
             let definition = BodyDefinition {
-                positions: &mesh.positions,
-                tetrahedra: &mesh.tetrahedra,
                 material: Some(Material {
                     young_modulus: 5000.0,
                     density: 1060.0,
@@ -177,7 +175,7 @@ fn organs_of_springs_that_keep_their_volume_come_back_of(is_tried: fn(usize) -> 
                 volume_stiffness: 2000.0,
                 node_dampings: Values::Uniform(0.02),
                 solver,
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&mesh)
             };
             come_back(
                 &mesh,

@@ -73,10 +73,8 @@ impl Block {
             .for_each(|place| *place += 1e-3 * random.vector());
         let mut world = World::new(FREE).expect("a world");
         let body = world.create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             masses: Values::Uniform(MASS),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         });
         let body = world.body(body.expect("a body")).expect("the body");
         Self {

@@ -31,12 +31,8 @@ const SHEET: Material = Material {
 
 fn definition(mesh: &Mesh, material: Material) -> BodyDefinition<'_> {
     BodyDefinition {
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
-        tetrahedra: &mesh.tetrahedra,
-        cells: &mesh.cells,
         material: Some(material),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(mesh)
     }
 }
 

@@ -314,13 +314,11 @@ fn fibres_resist_a_pull_along_them_and_nothing_else() {
     ] {
         let directions = vec![direction; mesh.tetrahedra.len()];
         let definition = BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             material: Some(tissue),
             fibre_directions: &directions,
             fibre_stiffnesses: Values::Uniform(FIBRE as f32),
             solver: Solver::Newton,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         let mut scene = hung(Vec3::ZERO, &definition);
         let strain = 0.002 * pull;

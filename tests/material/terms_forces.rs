@@ -73,10 +73,8 @@ impl Tissue {
         }
         let mut world = World::new(FREE).expect("a world");
         let body = world.create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             masses: Values::Uniform(MASS),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         });
         let body = world.body(body.expect("a body")).expect("the body");
         let directions = mesh.tetrahedra.iter().enumerate().map(|(index, _)| {
@@ -96,18 +94,16 @@ impl Tissue {
 
     fn definition(&self, asked: Asked) -> BodyDefinition<'_> {
         BodyDefinition {
-            positions: &self.mesh.positions,
             masses: Values::Uniform(MASS),
             springs: Some(&self.springs),
             stiffnesses: Values::Uniform(STIFFNESS as f32),
-            tetrahedra: &self.mesh.tetrahedra,
             triangles: &self.surface,
             home_stiffnesses: Values::Uniform(if asked.home { HOME as f32 } else { 0.0 }),
             bending_stiffness: if asked.bending { RIGIDITY as f32 } else { 0.0 },
             spring_law: asked.law,
             fibre_directions: if asked.fibres { &self.directions } else { &[] },
             fibre_stiffnesses: Values::Uniform(if asked.fibres { FIBRE as f32 } else { 0.0 }),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&self.mesh)
         }
     }
 

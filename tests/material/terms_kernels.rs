@@ -13,11 +13,9 @@ const STEPS: u32 = 8;
 /// Bodies that have each of these terms in several tiles.
 fn bodies(mesh: &Mesh) -> [BodyDefinition<'_>; 3] {
     let springs = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         masses: Values::Uniform(1e-4),
         stiffnesses: Values::Uniform(20.0),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(mesh)
     };
     let viscosity = Viscosity {
         retardation_time: 0.004,

@@ -230,15 +230,13 @@ fn a_block_that_was_bent_stays_bent() {
         let mut ends = Vec::new();
         for yield_strain in [0.0, 0.02] {
             let definition = BodyDefinition {
-                positions: &mesh.positions,
-                tetrahedra: &mesh.tetrahedra,
                 masses: Values::Uniform(1e-4),
                 node_dampings: Values::Uniform(2.5e-3),
                 stiffnesses: Values::Uniform(20.0),
                 yielding: yielding(yield_strain),
                 solver,
                 storage,
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&mesh)
             };
             let mut scene = Scene::new(FREE, &definition);
             for (node, p) in (0..).zip(&mesh.positions) {
@@ -290,8 +288,6 @@ fn tetrahedra_yield_at_the_stress_of_von_mises() {
     for (solver, storage) in SOLVERS.into_iter().zip(STORAGES) {
         for nu in [0.0, 0.3, 0.45] {
             let definition = BodyDefinition {
-                positions: &mesh.positions,
-                tetrahedra: &mesh.tetrahedra,
                 masses: Values::Each(&masses),
                 material: Some(Material {
                     model: Model::Tetrahedra,
@@ -302,7 +298,7 @@ fn tetrahedra_yield_at_the_stress_of_von_mises() {
                 yielding: yielding(YIELD as f32),
                 solver,
                 storage,
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&mesh)
             };
             let mut scene = Scene::new(FREE, &definition);
             // The shear stress on the upper side, in steps so small that the side does not turn.
@@ -499,13 +495,11 @@ fn energy_is_kept_at_the_limit() {
 fn a_refused_step_and_threads_change_nothing() {
     let mesh = Mesh::block([0.04, 0.02, 0.02], [4, 2, 2]).expect("a block");
     let definition = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         masses: Values::Uniform(1e-4),
         stiffnesses: Values::Uniform(20.0),
         yielding: yielding(0.02),
         strain_limit: 0.1,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let thrown: Vec<Vec3> = mesh.positions.iter().map(|p| *p * 60.0).collect();
     let hashes = [1, 2, 5].map(|thread_count| {

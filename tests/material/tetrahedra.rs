@@ -490,10 +490,8 @@ fn a_plate_feels_the_same_whatever_the_solver() {
 fn what_tetrahedra_cannot_be_is_refused() {
     let mesh = block([0.06, 0.04, 0.04], [3, 2, 2], 1);
     let definition = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(tissue(0.3)),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let mut flat = mesh.positions.clone();
     let corners = mesh.tetrahedra[5].map(|node| node as usize);
@@ -556,10 +554,8 @@ fn what_tetrahedra_cannot_be_is_refused() {
 fn what_only_springs_have_is_theirs_or_refused() {
     let mesh = Mesh::block([0.04; 3], [2; 3]).expect("a block");
     let elements = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(tissue(0.3)),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let refused = |definition: &BodyDefinition, name: &str| {
         let mut world = World::new(FREE).expect("a world");

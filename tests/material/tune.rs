@@ -409,14 +409,12 @@ fn terms_and_elements_see_that_springs_became_stiffer() {
     for (spring_law, volume_stiffness) in [(steep, 0.0), (SpringLaw::Linear, 1000.0), (steep, 1000.0)] {
         let mut world = sinew::World::new(FREE).expect("a world");
         let id = world.create_body(&sinew::BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             masses: Values::Uniform(1e-4),
             stiffnesses: Values::Uniform(4.0),
             spring_law,
             volume_stiffness,
             solver: Solver::Verlet,
-            ..Default::default()
+            ..sinew::BodyDefinition::of(&mesh)
         });
         let mut scene = Scene {
             id: id.expect("a body"),

@@ -126,8 +126,6 @@ fn tetrahedra_relax_along_the_curve_whatever_their_poisson_ratio() {
     for (solver, storage) in SOLVERS.into_iter().zip(STORAGES) {
         for nu in [0.0, 0.3, 0.45] {
             let definition = BodyDefinition {
-                positions: &mesh.positions,
-                tetrahedra: &mesh.tetrahedra,
                 masses: Values::Each(&masses),
                 material: Some(Material {
                     density: 0.0,
@@ -136,7 +134,7 @@ fn tetrahedra_relax_along_the_curve_whatever_their_poisson_ratio() {
                 viscosity: SOLID,
                 solver,
                 storage,
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&mesh)
             };
             let mut scene = Scene::new(FREE, &definition);
             let side = nodes_at(&mesh, |p| p.x > 0.019);
@@ -260,12 +258,10 @@ fn block(nu: Option<f32>) -> (Mesh, Material) {
 fn swinging(nu: Option<f32>, viscosity: Viscosity, solver: Solver, world: WorldDefinition) -> Scene {
     let (mesh, material) = block(nu);
     let definition = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(material),
         viscosity,
         solver,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let mut scene = Scene::new(world, &definition);
     for (node, p) in (0..).zip(&mesh.positions) {
@@ -444,8 +440,6 @@ fn threads_change_no_bit() {
             let hashes = [1, 2, 5].map(|thread_count| {
                 let world = WorldDefinition { thread_count, ..FREE };
                 let definition = BodyDefinition {
-                    positions: &mesh.positions,
-                    tetrahedra: &mesh.tetrahedra,
                     material: Some(nu.map_or(springs(), tissue)),
                     viscosity: SOLID,
                     yielding: Yielding {
@@ -453,7 +447,7 @@ fn threads_change_no_bit() {
                         ..Yielding::default()
                     },
                     solver,
-                    ..BodyDefinition::default()
+                    ..BodyDefinition::of(&mesh)
                 };
                 let mut scene = Scene::new(world, &definition);
                 scene.body_mut().set_velocities(&thrown).expect("velocities");
@@ -526,12 +520,10 @@ fn newton_finds_that_what_rests_rests() {
         ] {
             let (mesh, material) = block(nu);
             let definition = BodyDefinition {
-                positions: &mesh.positions,
-                tetrahedra: &mesh.tetrahedra,
                 material: Some(material),
                 viscosity,
                 solver: Solver::Newton,
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&mesh)
             };
             let mut scene = Scene::new(FREE, &definition);
             for _ in 0..5 {

@@ -56,14 +56,12 @@ fn a_blade_that_cuts_nothing_allocates_nothing() {
             .expect("a blade");
         // It comes later than the blade.
         let cloth = BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(2e-4),
             stiffnesses: Values::Uniform(50.0),
             spare_nodes: 100,
             toughness: 1.0,
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         let body = world.create_body(&cloth).expect("a body");
         let mut feels = 0;
@@ -95,8 +93,6 @@ fn tissue_against_tissue_allocates_nothing() {
         let mut first = None;
         for (mesh, pinned) in [(&upper, 0..0), (&lower, 0..100)] {
             let cloth = BodyDefinition {
-                positions: &mesh.positions,
-                triangles: &mesh.triangles,
                 masses: Values::Uniform(2e-4),
                 stiffnesses: Values::Uniform(50.0),
                 contact: BodyContact {
@@ -106,7 +102,7 @@ fn tissue_against_tissue_allocates_nothing() {
                     detection,
                     ..BodyContact::NOTHING
                 },
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(mesh)
             };
             let cloth = world.create_body(&cloth).expect("a body");
             first.get_or_insert(cloth);
@@ -139,11 +135,9 @@ fn debug_drawing_allocates_nothing() {
     let mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let cloth = BodyDefinition {
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
         masses: Values::Uniform(2e-4),
         stiffnesses: Values::Uniform(50.0),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let cloth = world.create_body(&cloth).expect("a body");
     world.body_mut(cloth).and_then(|body| body.pin(0)).expect("a node");
@@ -211,12 +205,10 @@ fn a_step_that_readers_see_allocates_nothing() {
     let mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let cloth = BodyDefinition {
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
         masses: Values::Uniform(2e-4),
         stiffnesses: Values::Uniform(50.0),
         spare_nodes: 300,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let cloth = world.create_body(&cloth).expect("a body");
     let mut readers = [(), (), ()].map(|()| world.create_reader(cloth).expect("a reader"));
@@ -252,11 +244,9 @@ fn a_hand_at_a_kilohertz_allocates_nothing() {
         .map(|place| if rim(place) { 0.0 } else { 2e-4 })
         .collect();
     let cloth = BodyDefinition {
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
         masses: Values::Each(&masses),
         stiffnesses: Values::Uniform(50.0),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     world.create_body(&cloth).expect("a body");
     let mut handles = [-0.02, 0.02].map(|x| {
@@ -350,15 +340,13 @@ fn steps_allocate_nothing(storage: Storage, solver: Solver, tolerances: &[f32]) 
         };
         let mut world = World::new(definition).expect("a world");
         let cloth = BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(2e-4),
             stiffnesses: Values::Uniform(50.0),
             node_dampings: Values::Uniform(1e-3),
             spring_dampings: Values::Uniform(1e-3),
             storage,
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         let cloth = world.create_body(&cloth).expect("a body");
         world.body_mut(cloth).and_then(|body| body.pin(0)).expect("a node");
@@ -453,14 +441,12 @@ fn nor_does_one_of_what_is_under_pressure() {
     for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let body = BodyDefinition {
-            positions: &block.positions,
-            tetrahedra: &block.tetrahedra,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(50.0),
             enclosed_stiffness: 1000.0,
             pressure: 100.0,
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&block)
         };
         let body = world.create_body(&body).expect("a body");
         for step in 0..4 {
@@ -476,8 +462,6 @@ fn nor_does_one_of_what_is_under_pressure() {
 fn nor_does_one_of_tissue_that_remembers() {
     let block = Mesh::block([0.05; 3], [3; 3]).expect("a block");
     let plain = BodyDefinition {
-        positions: &block.positions,
-        tetrahedra: &block.tetrahedra,
         viscosity: Viscosity {
             retardation_time: 0.02,
             relaxation_time: 0.01,
@@ -486,7 +470,7 @@ fn nor_does_one_of_tissue_that_remembers() {
             strain: 1e-3,
             ..Yielding::default()
         },
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&block)
     };
     let springs = BodyDefinition {
         masses: Values::Uniform(1e-3),
@@ -573,13 +557,11 @@ fn nor_does_one_of_what_tools_hold_and_lose() {
     for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let cloth = BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(2e-4),
             stiffnesses: Values::Uniform(50.0),
             node_dampings: Values::Uniform(1e-3),
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         let cloth = world.create_body(&cloth).expect("a body");
         let tool = ToolDefinition::new(Shape::Sphere { radius: 0.02 });

@@ -92,15 +92,13 @@ fn held_by_a_small_one(solver: Solver) -> usize {
     let before = allocator::held();
     world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            cells: &mesh.cells,
             material: Some(Material {
                 young_modulus: 5e4,
                 density: 500.0,
                 ..Material::default()
             }),
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         })
         .expect("a body");
     (allocator::held() - before) as usize

@@ -163,12 +163,10 @@ fn what_is_filled_can_be_cut_at_each_spacing() {
             let filled = Mesh::filled(&surface, spacing).expect("tetrahedra");
             check(&filled);
             let body = world.create_body(&BodyDefinition {
-                positions: &filled.positions,
-                tetrahedra: &filled.tetrahedra,
                 masses: Values::Uniform(1e-3),
                 stiffnesses: Values::Uniform(20.0),
                 spare_nodes: 10,
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&filled)
             });
             let body = body.unwrap_or_else(|error| panic!("{spacing} m: {error}"));
             world.destroy_body(body).expect("a body");

@@ -33,13 +33,11 @@ fn a_hand_and_its_world_never_block() {
             .map(|place| if place.y < -0.019 { 0.0 } else { 6e-4 })
             .collect();
         let block = BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             masses: Values::Each(&masses),
             stiffnesses: Values::Uniform(20.0),
             node_dampings: Values::Uniform(0.02),
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         let body = world.create_body(&block).expect("a body");
         let mut pose = Pose {

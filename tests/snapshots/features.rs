@@ -136,14 +136,11 @@ impl Scene {
         .expect("a mesh");
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let mut definition = BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
-            tetrahedra: &mesh.tetrahedra,
             material: is_block.then_some(SPRINGS),
             node_dampings: Values::Uniform(5e-3),
             spare_nodes: room,
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         if !is_block {
             definition.masses = Values::Uniform(1e-3);

@@ -23,12 +23,10 @@ fn hanging() -> World {
     let mesh = Mesh::cloth([0.1; 2], [6, 6]).expect("a cloth");
     let body = world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-4),
             stiffnesses: Values::Uniform(20.0),
             node_dampings: Values::Uniform(1e-4),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         })
         .expect("a body");
     for node in [0, 6] {
@@ -131,12 +129,10 @@ fn what_is_called_between_steps_of_a_solved_body_is_replayed() {
     let mesh = Mesh::cloth([0.1; 2], [6, 6]).expect("a cloth");
     world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-4),
             stiffnesses: Values::Uniform(20.0),
             solver: Solver::Implicit,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         })
         .expect("a body");
     world.start_recording(&path).expect("a file");

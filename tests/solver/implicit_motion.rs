@@ -360,8 +360,6 @@ fn a_free_body_spins_on() {
                     let (parts, mut scene) = if is_solid {
                         let mut world = World::new(under(gravity)).expect("a world");
                         let definition = BodyDefinition {
-                            positions: &mesh.positions,
-                            tetrahedra: &mesh.tetrahedra,
                             material: Some(Material {
                                 model: Model::Tetrahedra,
                                 young_modulus: 3e6,
@@ -371,7 +369,7 @@ fn a_free_body_spins_on() {
                             }),
                             solver,
                             order,
-                            ..Default::default()
+                            ..BodyDefinition::of(&mesh)
                         };
                         let id = world.create_body(&definition).expect("a body");
                         (solid.clone(), Scene { world, id })

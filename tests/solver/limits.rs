@@ -38,11 +38,9 @@ fn a_tool_far_away_changes_no_bit_of_a_moving_cloth() {
     let moved = |with_tool: bool| {
         let mut world = world();
         let definition = BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(200.0),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         let cloth = world.create_body(&definition).expect("a cloth");
         if with_tool {
@@ -96,8 +94,6 @@ fn a_step_near_something_takes_no_more_than_so_many_parts() {
     let mesh = Mesh::cloth([0.1, 0.1], [2, 2]).expect("a cloth");
     for solver in [Solver::Implicit, Solver::Newton] {
         let cloth = |with_bodies| BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(20.0),
             node_dampings: Values::Uniform(1e-2),
@@ -106,7 +102,7 @@ fn a_step_near_something_takes_no_more_than_so_many_parts() {
                 ..BodyContact::default()
             },
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         };
         let hang = |world: &mut World, with_bodies| {
             let body = world.create_body(&cloth(with_bodies)).expect("a cloth");

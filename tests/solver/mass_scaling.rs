@@ -511,8 +511,6 @@ impl Tissue {
         let mesh = Self::mesh();
         let mut world = World::new(world).expect("a world");
         let body = world.create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             material: Some(Material {
                 model: Model::Tetrahedra,
                 young_modulus: 5000.0,
@@ -525,7 +523,7 @@ impl Tissue {
                 relaxation_time: 0.0,
             },
             mass_scaling,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         });
         let body = body.expect("a body");
         for (node, place) in (0..).zip(&mesh.positions) {
@@ -640,8 +638,6 @@ fn motion_that_makes_a_few_elements_stiff_refuses_no_step() {
         })
         .expect("a world");
         let body = world.create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             material: Some(Material {
                 model: Model::Tetrahedra,
                 young_modulus: 3000.0,
@@ -649,7 +645,7 @@ fn motion_that_makes_a_few_elements_stiff_refuses_no_step() {
                 ..Material::default()
             }),
             mass_scaling,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         });
         let body = body.expect("a body");
         let held = mesh.positions.iter().map(|place| place.x).fold(f32::INFINITY, f32::min) + 0.015;

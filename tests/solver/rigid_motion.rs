@@ -343,12 +343,10 @@ fn sheets_that_bend_move_with_the_scene() {
     assert_moves_with_it(&Case {
         name: "a curved sheet that bends",
         definition: BodyDefinition {
-            positions: &sheet.positions,
-            triangles: &sheet.triangles,
             masses: Values::Uniform(2e-4),
             stiffnesses: Values::Uniform(20.0),
             bending_stiffness: 2e-5,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&sheet)
         },
         start: &start,
         is_pressed: false,

@@ -48,12 +48,10 @@ fn tasks(thread_count: u32, run: &'static (dyn Fn(u32, Task) + Sync)) -> WorldDe
 fn add_cloth(world: &mut World, quads: u32) -> BodyId {
     let mesh = Mesh::cloth([0.3, 0.3], [quads, quads]).expect("a cloth");
     let definition = BodyDefinition {
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
         masses: Values::Uniform(1e-3),
         stiffnesses: Values::Uniform(20.0),
         spring_dampings: Values::Uniform(1e-3),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let body = world.create_body(&definition).expect("a body");
     world.body_mut(body).and_then(|body| body.pin(0)).expect("a node");

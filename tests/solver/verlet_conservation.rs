@@ -241,8 +241,6 @@ fn stretched(cells: u32, young_modulus: f32, substeps: u32) -> (f64, Vec<u32>) {
     let mut world = World::new(WorldDefinition { substeps, ..FREE }).expect("a world");
     let mesh = Mesh::block([0.1; 3], [cells; 3]).expect("a mesh");
     let id = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(Material {
             model: Model::Tetrahedra,
             young_modulus,
@@ -250,7 +248,7 @@ fn stretched(cells: u32, young_modulus: f32, substeps: u32) -> (f64, Vec<u32>) {
             density: 1000.0,
             ..Material::default()
         }),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     });
     let id = id.expect("a body");
     let body = world.body_mut(id).expect("a body");

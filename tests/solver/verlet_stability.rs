@@ -557,8 +557,6 @@ fn drawn_elements_take_substeps_near_what_their_law_allows() {
     let stable = |stretch: f32, across: f32| {
         let mut world = sinew::World::new(sinew::WorldDefinition::default()).expect("a world");
         let definition = sinew::BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             masses: sinew::Values::Uniform(1e-3),
             mass_scaling: 0.0,
             material: Some(sinew::Material {
@@ -567,7 +565,7 @@ fn drawn_elements_take_substeps_near_what_their_law_allows() {
                 poisson_ratio: NU as f32,
                 ..Default::default()
             }),
-            ..Default::default()
+            ..BodyDefinition::of(&mesh)
         };
         let body = world.create_body(&definition).expect("a body");
         let drawn: Vec<_> = mesh

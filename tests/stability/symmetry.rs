@@ -55,12 +55,10 @@ pub fn rotated(setup: &Setup) -> Outcome {
 
 fn tetrahedra(mesh: &Mesh) -> BodyDefinition<'_> {
     BodyDefinition {
-        positions: &mesh.positions,
         masses: Values::Uniform(0.001),
         node_dampings: Values::Uniform(0.004),
         stiffnesses: Values::Uniform(40.0),
-        tetrahedra: &mesh.tetrahedra,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(mesh)
     }
 }
 

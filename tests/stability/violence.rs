@@ -250,13 +250,10 @@ fn crush(setup: &Setup, gap: f32) -> Result<Crushed, super::setup::Stop> {
     let mesh = Mesh::block([THICKNESS; 3], [4; 3]).expect("a block");
     let node_mass = 0.1 / mesh.positions.len() as f32;
     let definition = BodyDefinition {
-        positions: &mesh.positions,
         masses: Values::Uniform(node_mass),
         node_dampings: Values::Uniform(30.0 * node_mass),
         stiffnesses: Values::Uniform(100.0),
-        tetrahedra: &mesh.tetrahedra,
-        triangles: &mesh.triangles,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let mut watched = Watched::of(setup, &definition, Vec3::ZERO)?.without_ledger();
     let half_turn = Quat::from_rotation_x(std::f32::consts::PI);

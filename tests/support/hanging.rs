@@ -51,16 +51,13 @@ impl Block {
         let node_mass = self.mass / mesh.positions.len() as f32;
         world
             .create_body(&BodyDefinition {
-                positions: &mesh.positions,
                 masses: Values::Uniform(node_mass),
                 node_dampings: Values::Uniform(self.drag * node_mass),
                 stiffnesses: Values::Uniform(self.stiffness),
-                triangles: &mesh.triangles,
-                tetrahedra: &mesh.tetrahedra,
                 solver: self.solver,
                 storage: self.storage,
                 contact: self.contact,
-                ..Default::default()
+                ..BodyDefinition::of(&mesh)
             })
             .expect("a body")
     }

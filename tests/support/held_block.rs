@@ -34,10 +34,8 @@ pub fn held_block_with(
     .expect("a world");
     let node_mass = 1000.0 * size.iter().product::<f32>() / mesh.positions.len() as f32;
     let definition = BodyDefinition {
-        positions: &mesh.positions,
         node_dampings: Values::Uniform(200.0 * node_mass),
-        tetrahedra: &mesh.tetrahedra,
-        ..Default::default()
+        ..BodyDefinition::of(&mesh)
     };
     let body = world.create_body(&with(definition, node_mass)).expect("a body");
     pin_all(&mut world, body, &nodes_at(&mesh, |place| place.y < -0.99 * TOP));

@@ -38,8 +38,6 @@ pub fn organ(length: f32, spacing: f32, young: f32) -> Parts {
 /// The tetrahedra of a mesh as elements of this Young's modulus, Pa, Poisson's ratio and density, kg/m³.
 pub fn of_elements(mesh: &Mesh, [young_modulus, poisson_ratio, density]: [f32; 3]) -> BodyDefinition<'_> {
     BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(Material {
             model: Model::Tetrahedra,
             young_modulus,
@@ -47,7 +45,7 @@ pub fn of_elements(mesh: &Mesh, [young_modulus, poisson_ratio, density]: [f32; 3
             density,
             ..Material::default()
         }),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(mesh)
     }
 }
 

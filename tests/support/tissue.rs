@@ -103,15 +103,12 @@ impl Tissue {
         let node_mass = self.node_mass(mesh);
         world
             .create_body(&BodyDefinition {
-                positions: &mesh.positions,
                 masses: Values::Uniform(node_mass),
                 node_dampings: Values::Uniform(self.drag * node_mass),
                 stiffnesses: Values::Uniform(self.stiffness),
                 spring_dampings: Values::Uniform(self.spring_damping),
-                triangles: &mesh.triangles,
-                tetrahedra: &mesh.tetrahedra,
                 solver,
-                ..Default::default()
+                ..BodyDefinition::of(mesh)
             })
             .expect("a body")
     }

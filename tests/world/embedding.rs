@@ -24,11 +24,9 @@ fn block(world: &mut World) -> (BodyId, Mesh) {
     let mesh = Mesh::block([0.06, 0.04, 0.05], [6, 4, 5]).unwrap();
     let body = world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(30.0),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         })
         .unwrap();
     (body, mesh)
@@ -127,11 +125,9 @@ fn normals_of_a_ball_look_outward() {
         let host = Mesh::block([2.0 * radius; 3], [2, 2, 2]).unwrap();
         let body = world
             .create_body(&BodyDefinition {
-                positions: &host.positions,
-                tetrahedra: &host.tetrahedra,
                 masses: Values::Uniform(1.0),
                 stiffnesses: Values::Uniform(1.0),
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&host)
             })
             .unwrap();
         let mut embedding = world
@@ -160,11 +156,9 @@ fn over_a_sheet_vertices_keep_their_height() {
     let mesh = Mesh::cloth([0.1, 0.1], [10, 10]).unwrap();
     let body = world
         .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(30.0),
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&mesh)
         })
         .unwrap();
     let up = {
@@ -222,8 +216,6 @@ fn made(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
     let (body, embedding) = world
         .create_body_from_surface(
             &BodyDefinition {
-                positions: &drawn.positions,
-                triangles: &drawn.triangles,
                 material: Some(Material {
                     model: Model::Tetrahedra,
                     young_modulus: 2e4,
@@ -232,7 +224,7 @@ fn made(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
                     thickness: 0.0,
                 }),
                 masses: Values::Uniform(0.0),
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&drawn)
             },
             0.008,
         )
@@ -376,11 +368,9 @@ fn what_is_no_surface_makes_no_body() {
     let mut world = world();
     let drawn = ball(0.03, 2);
     let sound = BodyDefinition {
-        positions: &drawn.positions,
-        triangles: &drawn.triangles,
         masses: Values::Uniform(1e-3),
         stiffnesses: Values::Uniform(20.0),
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&drawn)
     };
     let hash = world.state_hash();
     let mut refused = |definition: &BodyDefinition, spacing: f32, word: &str| {
@@ -431,12 +421,10 @@ fn to_be_cut(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
     let (body, embedding) = world
         .create_body_from_surface(
             &BodyDefinition {
-                positions: &drawn.positions,
-                triangles: &drawn.triangles,
                 masses: Values::Uniform(1e-3),
                 stiffnesses: Values::Uniform(20.0),
                 spare_nodes: 4000,
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&drawn)
             },
             0.01,
         )
@@ -456,12 +444,10 @@ fn no_large_triangle_reaches_across_a_cut() {
     for cells in [1, 3, 8] {
         let drawn = Mesh::block([0.1; 3], [cells; 3]).unwrap();
         let definition = BodyDefinition {
-            positions: &drawn.positions,
-            triangles: &drawn.triangles,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(20.0),
             spare_nodes: 4000,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(&drawn)
         };
         let (body, mut embedding) = world.create_body_from_surface(&definition, 0.02).unwrap();
         let at = |y: f32, z: f32| vec3(0.0123, y, z);
@@ -611,12 +597,10 @@ fn each_vertex_goes_with_its_side_of_a_cut() {
 fn sheet(world: &mut World) -> (Mesh, BodyId) {
     let mesh = Mesh::cloth([0.1, 0.1], [10, 10]).unwrap();
     let body = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
         masses: Values::Uniform(1e-3),
         stiffnesses: Values::Uniform(30.0),
         spare_nodes: 1000,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     });
     (mesh, body.unwrap())
 }
@@ -770,12 +754,10 @@ fn a_world_of_before_a_cut_takes_surfaces_of_then_and_refuses_those_of_later() {
     let mesh = Mesh::block([0.1; 3], [4; 3]).unwrap();
     let mut world = world();
     let body = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         masses: Values::Uniform(1e-3),
         stiffnesses: Values::Uniform(20.0),
         spare_nodes: 1000,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     });
     let body = body.unwrap();
     let fine = EmbeddingDefinition {

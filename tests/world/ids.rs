@@ -22,12 +22,10 @@ impl Scene {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let body = world
             .create_body(&BodyDefinition {
-                positions: &mesh.positions,
-                triangles: &mesh.triangles,
                 masses: Values::Uniform(1e-4),
                 stiffnesses: Values::Uniform(20.0),
                 spare_nodes: 50,
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&mesh)
             })
             .expect("a body");
         let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });

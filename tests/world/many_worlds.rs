@@ -24,14 +24,12 @@ impl Small {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let body = world
             .create_body(&BodyDefinition {
-                positions: &mesh.positions,
-                triangles: &mesh.triangles,
                 masses: Values::Uniform(1e-3 + 1e-6 * number as f32),
                 stiffnesses: Values::Uniform(40.0),
                 node_dampings: Values::Uniform(1e-3),
                 solver: [Solver::Verlet, Solver::Implicit][(number % 2) as usize],
                 spare_nodes: 20 * (number % 3 % 2),
-                ..BodyDefinition::default()
+                ..BodyDefinition::of(&mesh)
             })
             .expect("a body");
         world.body_mut(body).and_then(|body| body.pin(0)).expect("a pin");

@@ -38,8 +38,6 @@ fn slab_of(cells: u32, sleep: Sleep, threads: u32, change: impl FnOnce(&mut Body
     };
     let mut world = World::new(world).expect("a world");
     let mut definition = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(Material {
             young_modulus: 5000.0,
             poisson_ratio: 0.25,
@@ -48,7 +46,7 @@ fn slab_of(cells: u32, sleep: Sleep, threads: u32, change: impl FnOnce(&mut Body
         }),
         node_dampings: Values::Uniform(5e-3),
         sleep,
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     change(&mut definition);
     let body = world.create_body(&definition).expect("a body");
@@ -391,8 +389,6 @@ fn a_thousand_sleeps_lead_nowhere() {
     let mesh = Mesh::block([0.03, 0.03, 0.03], [cells; 3]).expect("a block");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let definition = BodyDefinition {
-        positions: &mesh.positions,
-        tetrahedra: &mesh.tetrahedra,
         material: Some(Material {
             young_modulus: 5000.0,
             poisson_ratio: 0.25,
@@ -404,7 +400,7 @@ fn a_thousand_sleeps_lead_nowhere() {
             speed: 1e-3,
             time: 0.02,
         },
-        ..BodyDefinition::default()
+        ..BodyDefinition::of(&mesh)
     };
     let body = world.create_body(&definition).expect("a body");
     for node in 0..mesh.positions.len() as u32 {

@@ -4,7 +4,7 @@
 //! cd benches/peers && cargo run --release                  # the cloth, some 20 minutes
 //! cd benches/peers && cargo run --release -- --seconds 20  # each contender on each cloth, at most
 //! cd benches/peers && cargo run --release -- --quick       # below one minute
-//! cd benches/peers && cargo run --release -- scenes        # error against time, some 40 minutes
+//! cd benches/peers && cargo run --release -- scenes        # error against time, about an hour
 //! cd benches/peers && cargo run --release -- scenes --scene rope --engine bullet --limit 20
 //! ```
 //!

@@ -199,13 +199,10 @@ impl Subject {
         let mesh = &self.mesh;
         let is_surface = mesh.tetrahedra.is_empty() && mesh.cells.is_empty();
         let definition = BodyDefinition {
-            positions: &mesh.positions,
             triangles: if is_surface { &mesh.triangles } else { &[] },
-            tetrahedra: &mesh.tetrahedra,
-            cells: &mesh.cells,
             node_dampings: Values::Each(&self.dampings),
             solver,
-            ..BodyDefinition::default()
+            ..BodyDefinition::of(mesh)
         };
         let definition = match self.matter.shape {
             // Its filling is nearly incompressible.
