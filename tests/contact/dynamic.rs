@@ -486,10 +486,12 @@ fn a_ball_of_any_mass_falls_on_a_sheet_of_heavy_nodes_and_is_not_flung() {
         let mesh = square(1.1, 11);
         let sheet = world
             .create_body(&BodyDefinition {
+                positions: &mesh.positions,
                 masses: Values::Uniform(0.1),
                 stiffnesses: Values::Uniform(1777.0),
                 spring_dampings: Values::Uniform(19.0),
-                ..BodyDefinition::of(&mesh)
+                triangles: &mesh.triangles,
+                ..Default::default()
             })
             .expect("a sheet");
         pin_all(&mut world, sheet, &[0, 11, 132, 143]);

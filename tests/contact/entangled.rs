@@ -19,6 +19,8 @@ fn ribbons(world: &mut World, thickness: f32, solver: Solver) -> [BodyId; 2] {
     }
     let ids = [&lying, &standing].map(|mesh| {
         let definition = BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
             masses: Values::Uniform(3e-4),
             stiffnesses: Values::Uniform(40.0),
             spring_dampings: Values::Uniform(0.02),
@@ -29,7 +31,7 @@ fn ribbons(world: &mut World, thickness: f32, solver: Solver) -> [BodyId; 2] {
                 with_bodies: true,
                 ..BodyContact::NOTHING
             },
-            ..BodyDefinition::of(mesh)
+            ..Default::default()
         };
         world.create_body(&definition).expect("a body")
     });

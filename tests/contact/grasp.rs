@@ -87,17 +87,20 @@ impl Held {
         .expect("a world");
         let body = world
             .create_body(&BodyDefinition {
+                positions: &mesh.positions,
                 masses: Values::Uniform(NODE_MASS),
                 node_dampings: Values::Uniform(setup.drag * NODE_MASS),
                 stiffnesses: Values::Uniform(100.0),
                 spring_dampings: Values::Uniform(setup.spring_damping),
+                triangles: &mesh.triangles,
+                tetrahedra: &mesh.tetrahedra,
                 storage: setup.storage,
                 solver: setup.solver,
                 order: setup.order,
                 accuracy: setup.accuracy,
                 iterations: if setup.accuracy > 0.0 { 20_000 } else { 0 },
                 mass_scaling: 0.0,
-                ..BodyDefinition::of(&mesh)
+                ..Default::default()
             })
             .expect("a body");
         let shape = Shape::Sphere { radius: 0.004 };
@@ -467,11 +470,13 @@ fn stretched(solver: Solver, width: u32) -> (World, BodyId, [ToolId; 2], Vec<Att
     let node_mass = 0.02 / mesh.positions.len() as f32;
     let cloth = world
         .create_body(&BodyDefinition {
+            positions: &mesh.positions,
             masses: Values::Uniform(node_mass),
             node_dampings: Values::Uniform(20.0 * node_mass),
             stiffnesses: Values::Uniform(50.0),
+            triangles: &mesh.triangles,
             solver,
-            ..BodyDefinition::of(&mesh)
+            ..Default::default()
         })
         .expect("a cloth");
     let mut ids = Vec::new();
@@ -859,10 +864,12 @@ fn threads_give_the_same_bits() {
                 let mesh = Mesh::cloth([0.2, 0.1], cells).expect("a cloth");
                 let cloth = world
                     .create_body(&BodyDefinition {
+                        positions: &mesh.positions,
                         masses: Values::Uniform(1e-5),
                         stiffnesses: Values::Uniform(20.0),
+                        triangles: &mesh.triangles,
                         solver,
-                        ..BodyDefinition::of(&mesh)
+                        ..Default::default()
                     })
                     .expect("a cloth");
                 let nodes: Vec<u32> = (0..mesh.positions.len() as u32).step_by(37).collect();

@@ -24,10 +24,12 @@ fn scene(
     let mesh = Mesh::cloth([0.9; 2], [9; 2]).expect("a cloth");
     let body = world
         .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-4),
             stiffnesses: Values::Uniform(STIFFNESS),
             solver,
-            ..BodyDefinition::of(&mesh)
+            ..Default::default()
         })
         .expect("a body");
     for node in 0..mesh.positions.len() as u32 {

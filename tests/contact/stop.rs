@@ -30,14 +30,16 @@ fn stop(tip: &Tip, solver: Solver, tissue: &Mesh, thickness: f32, gap: f32, subs
     .expect("a world");
     let body = world
         .create_body(&BodyDefinition {
+            positions: &tissue.positions,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(1.0),
+            triangles: &tissue.triangles,
             contact: BodyContact {
                 thickness,
                 ..Default::default()
             },
             solver,
-            ..BodyDefinition::of(tissue)
+            ..Default::default()
         })
         .expect("a body");
     let end = Vec3::Y * (tip.height + gap);

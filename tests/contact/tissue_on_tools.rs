@@ -123,6 +123,8 @@ fn a_sheet_that_meets_itself_stays_off_a_plane() {
         let mass = 0.6 / mesh.positions.len() as f32;
         let body = world
             .create_body(&BodyDefinition {
+                positions: &mesh.positions,
+                triangles: &mesh.triangles,
                 masses: Values::Uniform(mass),
                 stiffnesses: Values::Uniform(200.0),
                 node_dampings: Values::Uniform(mass),
@@ -134,7 +136,7 @@ fn a_sheet_that_meets_itself_stays_off_a_plane() {
                     ..BodyContact::NOTHING
                 },
                 solver,
-                ..BodyDefinition::of(&mesh)
+                ..Default::default()
             })
             .expect("a sheet");
         let mut is_down = false;

@@ -64,13 +64,16 @@ const SHEET: Matter = Matter {
 fn put(world: &mut World, mesh: &Mesh, matter: Matter, solver: Solver, contact: BodyContact) -> BodyId {
     let mass = matter.mass / mesh.positions.len() as f32;
     let definition = BodyDefinition {
+        positions: &mesh.positions,
         masses: Values::Uniform(mass),
         node_dampings: Values::Uniform(matter.drag * mass),
         stiffnesses: Values::Uniform(matter.stiffness),
         spring_dampings: Values::Uniform(matter.damping),
+        triangles: &mesh.triangles,
+        tetrahedra: &mesh.tetrahedra,
         solver,
         contact,
-        ..BodyDefinition::of(mesh)
+        ..Default::default()
     };
     world.create_body(&definition).expect("a body")
 }
@@ -630,6 +633,8 @@ fn what_cannot_be_seen_is_refused_and_nothing_changes() {
     let mesh = square(0.1, 4);
     let mut refused = |detection: Detection, resolution: f32, words: &[&str]| {
         let definition = BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(1.0),
             contact: BodyContact {
@@ -637,7 +642,7 @@ fn what_cannot_be_seen_is_refused_and_nothing_changes() {
                 resolution,
                 ..CONTACT
             },
-            ..BodyDefinition::of(&mesh)
+            ..Default::default()
         };
         let told = world.create_body(&definition).expect_err("refused").to_string();
         assert!(words.iter().all(|word| told.contains(word)), "{told}");

@@ -261,8 +261,10 @@ fn a_sheet_that_tears_stays_in_its_plane() {
     let mass = 0.01 / mesh.positions.len() as f32;
     let body = world
         .create_body(&BodyDefinition {
+            positions: &mesh.positions,
             masses: Values::Uniform(mass),
             node_dampings: Values::Uniform(20.0 * mass),
+            triangles: &mesh.triangles,
             stiffnesses: Values::Uniform(20.0),
             spare_nodes: 500,
             tearing: Tearing {
@@ -271,7 +273,7 @@ fn a_sheet_that_tears_stays_in_its_plane() {
                 ..Default::default()
             },
             contact: MEETS_ITSELF,
-            ..BodyDefinition::of(&mesh)
+            ..Default::default()
         })
         .unwrap();
     let ends = [-1.0, 1.0].map(|end: f32| nodes_at(&mesh, |place| place.x * end > 0.0299));

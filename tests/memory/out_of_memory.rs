@@ -227,12 +227,15 @@ fn a_body_of_any_kind_is_created_or_not() {
         for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
             for (kind, change) in KINDS {
                 let mut definition = BodyDefinition {
+                    positions: &mesh.positions,
+                    triangles: &mesh.triangles,
+                    tetrahedra: &mesh.tetrahedra,
                     masses: Values::Uniform(1e-3),
                     stiffnesses: Values::Uniform(20.0),
                     storage,
                     springs_per_node: 60,
                     solver,
-                    ..BodyDefinition::of(&mesh)
+                    ..BodyDefinition::default()
                 };
                 change(&mut definition);
                 // Beside one of its kind, with which it goes on afterwards as in a world that never lacked memory.
@@ -283,10 +286,13 @@ fn a_surface_is_bound_or_not() {
     for (mesh, is_cut) in [(&block, false), (&block, true), (&sheet, false), (&sheet, true)] {
         let mut world = plain_world();
         let body = world.create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            tetrahedra: &mesh.tetrahedra,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(20.0),
             spare_nodes: 300,
-            ..BodyDefinition::of(mesh)
+            ..BodyDefinition::default()
         });
         let body = body.expect("a body");
         if is_cut {
@@ -325,9 +331,11 @@ fn a_surface_is_bound_or_not() {
 fn tissue_is_made_of_a_surface_or_not() {
     let surface = Mesh::block([0.1; 3], [2, 2, 2]).expect("a block");
     let definition = BodyDefinition {
+        positions: &surface.positions,
+        triangles: &surface.triangles,
         masses: Values::Uniform(1e-3),
         stiffnesses: Values::Uniform(20.0),
-        ..BodyDefinition::of(&surface)
+        ..BodyDefinition::default()
     };
     let mut world = plain_world();
     let empty = world.state_hash();

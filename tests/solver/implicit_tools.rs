@@ -43,12 +43,15 @@ impl Press {
         .expect("a world");
         let body = world
             .create_body(&BodyDefinition {
+                positions: &mesh.positions,
                 masses: Values::Uniform(node_mass),
                 node_dampings: Values::Uniform(30.0 * node_mass),
                 stiffnesses: Values::Uniform(100.0),
+                tetrahedra: &mesh.tetrahedra,
+                triangles: &mesh.triangles,
                 solver,
                 storage,
-                ..BodyDefinition::of(&mesh)
+                ..BodyDefinition::default()
             })
             .expect("a body");
         let half_turn = Quat::from_rotation_x(std::f32::consts::PI);
@@ -234,10 +237,12 @@ fn both_ends_of_a_capsule_in_one_face_do_what_is_needed() {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let sheet = world
             .create_body(&BodyDefinition {
+                positions: &mesh.positions,
+                triangles: &mesh.triangles,
                 masses: Values::Uniform(0.01),
                 stiffnesses: Values::Uniform(100.0),
                 solver,
-                ..BodyDefinition::of(&mesh)
+                ..BodyDefinition::default()
             })
             .expect("a body");
         let middle: Vec3 = mesh.triangles[0]

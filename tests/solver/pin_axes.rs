@@ -816,6 +816,9 @@ fn elements_and_terms_are_held_too() {
     let mesh = Mesh::block([0.08; 3], [5; 3]).expect("a block");
     for (poisson_ratio, bending) in [(0.3, 0.0), (0.45, 0.0), (0.3, 1e-3)] {
         let definition = BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            triangles: &mesh.triangles,
             bending_stiffness: bending,
             material: Some(Material {
                 model: Model::Tetrahedra,
@@ -824,7 +827,7 @@ fn elements_and_terms_are_held_too() {
                 density: 1000.0,
                 ..Material::default()
             }),
-            ..BodyDefinition::of(&mesh)
+            ..BodyDefinition::default()
         };
         let mut ends = Vec::new();
         for solver in SOLVERS {
@@ -960,10 +963,12 @@ fn rimmed(world: WorldDefinition, solver: Solver, side: u32) -> Scene {
     let mut world = World::new(world).expect("a world");
     let id = world
         .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-4),
             stiffnesses: Values::Uniform(20.0),
             solver,
-            ..BodyDefinition::of(&mesh)
+            ..BodyDefinition::default()
         })
         .expect("a body");
     let mut scene = Scene { world, id };

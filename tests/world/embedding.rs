@@ -24,9 +24,11 @@ fn block(world: &mut World) -> (BodyId, Mesh) {
     let mesh = Mesh::block([0.06, 0.04, 0.05], [6, 4, 5]).unwrap();
     let body = world
         .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(30.0),
-            ..BodyDefinition::of(&mesh)
+            ..BodyDefinition::default()
         })
         .unwrap();
     (body, mesh)
@@ -125,9 +127,11 @@ fn normals_of_a_ball_look_outward() {
         let host = Mesh::block([2.0 * radius; 3], [2, 2, 2]).unwrap();
         let body = world
             .create_body(&BodyDefinition {
+                positions: &host.positions,
+                tetrahedra: &host.tetrahedra,
                 masses: Values::Uniform(1.0),
                 stiffnesses: Values::Uniform(1.0),
-                ..BodyDefinition::of(&host)
+                ..BodyDefinition::default()
             })
             .unwrap();
         let mut embedding = world
@@ -156,9 +160,11 @@ fn over_a_sheet_vertices_keep_their_height() {
     let mesh = Mesh::cloth([0.1, 0.1], [10, 10]).unwrap();
     let body = world
         .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(30.0),
-            ..BodyDefinition::of(&mesh)
+            ..BodyDefinition::default()
         })
         .unwrap();
     let up = {
@@ -216,6 +222,8 @@ fn made(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
     let (body, embedding) = world
         .create_body_from_surface(
             &BodyDefinition {
+                positions: &drawn.positions,
+                triangles: &drawn.triangles,
                 material: Some(Material {
                     model: Model::Tetrahedra,
                     young_modulus: 2e4,
@@ -224,7 +232,7 @@ fn made(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
                     thickness: 0.0,
                 }),
                 masses: Values::Uniform(0.0),
-                ..BodyDefinition::of(&drawn)
+                ..BodyDefinition::default()
             },
             0.008,
         )
@@ -368,9 +376,11 @@ fn what_is_no_surface_makes_no_body() {
     let mut world = world();
     let drawn = ball(0.03, 2);
     let sound = BodyDefinition {
+        positions: &drawn.positions,
+        triangles: &drawn.triangles,
         masses: Values::Uniform(1e-3),
         stiffnesses: Values::Uniform(20.0),
-        ..BodyDefinition::of(&drawn)
+        ..BodyDefinition::default()
     };
     let hash = world.state_hash();
     let mut refused = |definition: &BodyDefinition, spacing: f32, word: &str| {
@@ -421,10 +431,12 @@ fn to_be_cut(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
     let (body, embedding) = world
         .create_body_from_surface(
             &BodyDefinition {
+                positions: &drawn.positions,
+                triangles: &drawn.triangles,
                 masses: Values::Uniform(1e-3),
                 stiffnesses: Values::Uniform(20.0),
                 spare_nodes: 4000,
-                ..BodyDefinition::of(&drawn)
+                ..BodyDefinition::default()
             },
             0.01,
         )
@@ -444,10 +456,12 @@ fn no_large_triangle_reaches_across_a_cut() {
     for cells in [1, 3, 8] {
         let drawn = Mesh::block([0.1; 3], [cells; 3]).unwrap();
         let definition = BodyDefinition {
+            positions: &drawn.positions,
+            triangles: &drawn.triangles,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(20.0),
             spare_nodes: 4000,
-            ..BodyDefinition::of(&drawn)
+            ..BodyDefinition::default()
         };
         let (body, mut embedding) = world.create_body_from_surface(&definition, 0.02).unwrap();
         let at = |y: f32, z: f32| vec3(0.0123, y, z);
@@ -597,10 +611,12 @@ fn each_vertex_goes_with_its_side_of_a_cut() {
 fn sheet(world: &mut World) -> (Mesh, BodyId) {
     let mesh = Mesh::cloth([0.1, 0.1], [10, 10]).unwrap();
     let body = world.create_body(&BodyDefinition {
+        positions: &mesh.positions,
+        triangles: &mesh.triangles,
         masses: Values::Uniform(1e-3),
         stiffnesses: Values::Uniform(30.0),
         spare_nodes: 1000,
-        ..BodyDefinition::of(&mesh)
+        ..BodyDefinition::default()
     });
     (mesh, body.unwrap())
 }
@@ -754,10 +770,12 @@ fn a_world_of_before_a_cut_takes_surfaces_of_then_and_refuses_those_of_later() {
     let mesh = Mesh::block([0.1; 3], [4; 3]).unwrap();
     let mut world = world();
     let body = world.create_body(&BodyDefinition {
+        positions: &mesh.positions,
+        tetrahedra: &mesh.tetrahedra,
         masses: Values::Uniform(1e-3),
         stiffnesses: Values::Uniform(20.0),
         spare_nodes: 1000,
-        ..BodyDefinition::of(&mesh)
+        ..BodyDefinition::default()
     });
     let body = body.unwrap();
     let fine = EmbeddingDefinition {

@@ -17,7 +17,9 @@ fn cloth(cells: u32, thread_count: u32) -> (World, BodyId) {
     let mesh = Mesh::cloth([side, side], [cells, cells]).expect("a cloth");
     hanging(
         &BodyDefinition {
-            ..BodyDefinition::of(&mesh)
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            ..BodyDefinition::default()
         },
         thread_count,
     )
@@ -140,8 +142,10 @@ fn a_version_changes_when_positions_do() {
     for storage in [Storage::Packed, Storage::Efficient] {
         let mesh = Mesh::cloth([0.1, 0.1], [10, 10]).expect("a cloth");
         let definition = BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
             storage,
-            ..BodyDefinition::of(&mesh)
+            ..BodyDefinition::default()
         };
         let (mut world, body) = hanging(&definition, 1);
         world.step(1e-3).expect("a step");
@@ -201,10 +205,12 @@ fn a_step_that_is_unstable_is_not_seen() {
     };
     let mut world = World::new(definition).expect("a world");
     let body = BodyDefinition {
+        positions: &mesh.positions,
+        triangles: &mesh.triangles,
         masses: Values::Uniform(1e-4),
         stiffnesses: Values::Uniform(1e3),
         solver: Solver::Verlet,
-        ..BodyDefinition::of(&mesh)
+        ..BodyDefinition::default()
     };
     let body = world.create_body(&body).expect("a body");
     let mut reader = world.create_reader(body).expect("a reader");
@@ -278,8 +284,11 @@ fn soft(is_solid: bool) -> (World, BodyId) {
     };
     hanging(
         &BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            tetrahedra: &mesh.tetrahedra,
             spare_nodes: 3000,
-            ..BodyDefinition::of(&mesh)
+            ..BodyDefinition::default()
         },
         1,
     )
