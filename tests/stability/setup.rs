@@ -2,14 +2,7 @@
 
 use sinew::{Solver, Storage};
 
-pub const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
-
-pub const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
+pub use crate::support::scene::{SOLVERS, STORAGES};
 
 /// s; a frame of a second is a legal request.
 pub const STEPS: [f32; 6] = [1e-5, 1e-4, 1e-3, 1.0 / 60.0, 0.1, 1.0];

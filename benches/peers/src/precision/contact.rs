@@ -78,7 +78,11 @@ fn distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
 
 /// By how much kinetic and gravitational energy exceed what there was at the start, at most, as a part of what all nodes lose on their way to
 /// the last frame: at least so much came from nowhere. Elastic energy is left out, and a mean velocity over a frame has less energy than the node.
+/// 0 where a ball does work.
 pub fn energy_gain(model: &Model, motion: &Motion) -> f64 {
+    if model.ball.is_some_and(|ball| ball.speed != 0.0) {
+        return 0.0;
+    }
     let before = std::iter::once(&model.positions).chain(&motion.frames);
     let energy = |(from, to): (&Vec<[f64; 3]>, &Vec<[f64; 3]>)| -> f64 {
         let ways = from.iter().zip(to).zip(&model.masses);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::motion::Motion;
 use super::{DIVERGES, End, LineOutcome, Point, contact, model};
 use crate::players::{self, Line, Played, Said};
-use crate::scenes::{Measure, Scene};
+use crate::scenes::Scene;
 
 /// A line ends once a point is as near to the reference as this: well below the finest target.
 const FINE_ENOUGH: f64 = 3e-4;
@@ -56,12 +56,7 @@ pub fn follow(
                     error,
                     height: motion.height(),
                     speed: motion.speed_at_end(),
-                    gain: match scene.measure {
-                        Measure::Contact { .. } if scene.model.ball.is_none_or(|ball| ball.speed == 0.0) => {
-                            contact::energy_gain(&scene.model, &motion)
-                        }
-                        _ => 0.0,
-                    },
+                    gain: contact::energy_gain(&scene.model, &motion),
                 });
             }
             Played::Cut { expected } => {

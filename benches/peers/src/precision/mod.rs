@@ -83,7 +83,7 @@ pub struct Point {
     pub height: f64,
     /// See [`Motion::speed_at_end`], m/s.
     pub speed: f64,
-    /// See [`contact::energy_gain`]; 0 where a ball does work or there is nothing to meet.
+    /// See [`contact::energy_gain`].
     pub gain: f64,
 }
 

@@ -1,6 +1,7 @@
-//! Blocks of cubes that are cut in five tetrahedra each.
+//! Blocks of cubes that are cut in five tetrahedra each, and nets of springs.
 
-use std::collections::HashMap;
+use crate::cloth::Cloth;
+use crate::precision::model::Model;
 
 /// Positions and tetrahedra of a block.
 pub struct Block {
@@ -40,19 +41,30 @@ pub fn block(cells: [usize; 3], edge: f64) -> Block {
     Block { positions, tetrahedra }
 }
 
-/// The faces of tetrahedra that no other shares, their fronts outside.
+/// The surface of tetrahedra, outward.
 pub fn surface(tetrahedra: &[[usize; 4]]) -> Vec<[usize; 3]> {
-    let faces = |&[a, b, c, d]: &[usize; 4]| [[a, c, b], [a, b, d], [b, c, d], [a, d, c]];
-    let sorted = |mut face: [usize; 3]| {
-        face.sort_unstable();
-        face
+    let tetrahedra: Vec<[u32; 4]> = tetrahedra.iter().map(|nodes| nodes.map(|node| node as u32)).collect();
+    let faces = sinew::mesh::boundary(&tetrahedra).expect("memory");
+    faces.into_iter().map(|nodes| nodes.map(|node| node as usize)).collect()
+}
+
+/// A square net in the plane y = 0 with so many nodes along a side, of one mass, kg, each, and springs to all 8 neighbours.
+pub fn net(side: u32, spacing: f32, mass: f64) -> Model {
+    let cloth = Cloth {
+        spacing,
+        ..Cloth::new(side)
     };
-    let mut uses: HashMap<[usize; 3], usize> = HashMap::new();
-    for face in tetrahedra.iter().flat_map(faces) {
-        *uses.entry(sorted(face)).or_default() += 1;
+    let side = side as usize;
+    let corners = (0..side - 1).flat_map(|row| (0..side - 1).map(move |column| row * side + column));
+    Model {
+        positions: cloth.positions().map(|place| place.map(f64::from)).collect(),
+        masses: vec![mass; side * side],
+        springs: cloth.springs().map(|ends| ends.map(|end| end as usize)).collect(),
+        triangles: corners
+            .flat_map(|a| [[a, a + side, a + 1], [a + 1, a + side, a + side + 1]])
+            .collect(),
+        ..Model::default()
     }
-    let all = tetrahedra.iter().flat_map(faces);
-    all.filter(|&face| uses[&sorted(face)] == 1).collect()
 }
 
 /// The nodes of which something is true.

@@ -1,8 +1,7 @@
 //! A ball that is pressed into a net of springs held at its rim.
 
-use super::draped_cloth::faces;
+use super::mesh::net;
 use super::{Measure, Scene};
-use crate::cloth::Cloth;
 use crate::precision::model::{Ball, FRAME, Model};
 
 const SIDE: u32 = 41;
@@ -10,8 +9,6 @@ const RADIUS: f64 = 0.015;
 const FRAMES: usize = 60;
 
 pub fn scene() -> Scene {
-    let mut cloth = Cloth::new(SIDE);
-    cloth.spacing = 0.005;
     let side = SIDE as usize;
     let is_rim = |node: usize| {
         [node % side, node / side]
@@ -25,11 +22,7 @@ pub fn scene() -> Scene {
                 100 N/m, 0.1 kg, damping 2 /s, no friction"
             .into(),
         model: Model {
-            positions: cloth.positions().map(|place| place.map(f64::from)).collect(),
-            masses: vec![0.1 / nodes as f64; nodes],
             pinned: (0..nodes).filter(|&node| is_rim(node)).collect(),
-            springs: cloth.springs().map(|ends| ends.map(|end| end as usize)).collect(),
-            triangles: faces(side),
             stiffness: 100.0,
             ball: Some(Ball {
                 center: [0.1, RADIUS + 1e-3, 0.1],
@@ -38,7 +31,7 @@ pub fn scene() -> Scene {
             }),
             damping: 2.0,
             frames: FRAMES,
-            ..Model::default()
+            ..net(SIDE, 0.005, 0.1 / nodes as f64)
         },
         measure: Measure::Contact { size: RADIUS },
     }
