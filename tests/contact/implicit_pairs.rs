@@ -31,6 +31,7 @@ fn block(world: &mut World, solver: Solver, height: f32, mirrored: bool, damping
     if mirrored {
         mesh.positions.iter_mut().for_each(|place| place.y = -place.y);
         mesh.tetrahedra.iter_mut().for_each(|corners| corners.swap(1, 2));
+        mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
     }
     let mesh = moved(mesh, Vec3::Y * height);
     let node_mass = DENSITY * SIZE.iter().product::<f32>() / mesh.positions.len() as f32;
