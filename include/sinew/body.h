@@ -77,7 +77,7 @@ typedef struct sinew_body_def {
   float stiffness;  ///< [N/m] Stiffness of each spring; 0 for TETRAHEDRA without springs.
   float spring_damping;  ///< [N s/m] Damping of each spring; 0 for TETRAHEDRA without springs.
   /// 3 * triangle_count node indices, outward: the render and contact surface. Nullable: the
-  /// boundary of the tetrahedra or cells.
+  /// boundary of the tetrahedra or cells. Inward faces of tetrahedra are turned.
   const uint32_t *triangles;
   size_t triangle_count;           ///< Number of triangles given.
   const uint32_t *tetrahedra;      ///< 4 * tetrahedron_count node indices; nullable: no tetrahedra.

@@ -66,6 +66,7 @@ pub use pieces::Pieces;
 use published::Published;
 use query_tree::QueryTree;
 pub(crate) use stroke::Stroke;
+use surface::surface_of;
 use tears::Tears;
 
 /// A body of so many nodes or fewer keeps the caller's order: the search for the fastest one takes longer than all else that makes the body.
@@ -180,14 +181,10 @@ impl Body {
                 }
             }
         }
-        let mut surface = match (definition.triangles, definition.tetrahedra) {
-            ([], []) => crate::mesh::cell_boundary(definition.cells)?,
-            ([], tetrahedra) => crate::mesh::boundary(tetrahedra)?,
-            (triangles, _) => memory::copied(triangles)?,
-        };
+        let mut surface = surface_of(definition)?;
         let cuttable = Cuttable::new(definition, &springs, &surface, &order)?;
         if let Some(cuttable) = cuttable.as_ref().filter(|_| definition.triangles.is_empty()) {
-            // Outward however tetrahedra are turned.
+            // The same triangles in the order in which cuts number them.
             cuttable.take_surface(&mut surface)?;
         }
         let forces = Forces::new(needs.kernel, definition, law, &mut springs, &surface, &order)?;
@@ -249,8 +246,8 @@ impl Body {
         Ok(self.system.masses[self.system.order.own(node) as usize])
     }
 
-    /// The triangles that are drawn and touched, outward: those of its definition, or the boundary of its tetrahedra
-    /// or cells.
+    /// The triangles that are drawn and touched: those of its definition, or the outer faces of its tetrahedra or cells. Outer faces of
+    /// tetrahedra face outward, however the definition has them.
     pub fn surface(&self) -> &[[u32; 3]] {
         &self.system.surface
     }

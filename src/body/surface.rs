@@ -1,8 +1,26 @@
-//! A surface that changes: where it is drawn and touched it is not what it was made as.
+//! The surface where a body is drawn and touched, as it is made and as it changes.
 
 use super::Body;
-use crate::base::Result;
+use crate::base::{Result, memory};
 use crate::contact::SurfaceChange;
+use crate::def::BodyDefinition;
+use crate::mesh::{cell_boundary, outer_faces, turn_outward};
+
+/// The surface that a definition gives, or the outer faces of its elements; outward however its tetrahedra are turned.
+pub(super) fn surface_of(definition: &BodyDefinition) -> Result<Vec<[u32; 3]>> {
+    let (triangles, tetrahedra) = (definition.triangles, definition.tetrahedra);
+    if triangles.is_empty() && tetrahedra.is_empty() {
+        return cell_boundary(definition.cells);
+    }
+    let rest = definition.rest_positions.unwrap_or(definition.positions);
+    let outer = outer_faces(rest, tetrahedra)?;
+    if triangles.is_empty() {
+        return Ok(outer);
+    }
+    let mut surface = memory::copied(triangles)?;
+    turn_outward(&mut surface, outer);
+    Ok(surface)
+}
 
 impl Body {
     /// Makes room for a change of its surface with which so many nodes come, and so many triangles change and are added.

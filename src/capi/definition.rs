@@ -91,7 +91,7 @@ pub struct sinew_body_def {
     pub spring_damping: f32,
     /// 3 * triangle_count node indices, outward: the render and contact surface.
     ///
-    /// Nullable: the boundary of the tetrahedra or cells.
+    /// Nullable: the boundary of the tetrahedra or cells. Inward faces of tetrahedra are turned.
     pub triangles: *const u32,
     /// Number of triangles given.
     pub triangle_count: usize,

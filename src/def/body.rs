@@ -7,60 +7,10 @@ use super::ElementLaw;
 use super::Sleep;
 use super::SpringLaw;
 use super::Tearing;
-use super::{Material, Model, Viscosity, Yielding};
+use super::values::{check_values, expect_count, finite_vectors, node_indices};
+use super::{Material, Model, Values, Viscosity, Yielding};
 use crate::base::{Error, Result, finite, memory, not_negative};
 use crate::mesh::Mesh;
-
-/// One value for all, or one for each.
-///
-/// ```
-/// # use sinew::{mesh::Mesh, *};
-/// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
-/// let mut masses = vec![1e-4; mesh.positions.len()];
-/// // The first node is pinned for good.
-/// masses[0] = 0.0;
-/// let body = world.create_body(&BodyDefinition { masses: Values::Each(&masses), ..cloth })?;
-/// world.step(1.0 / 60.0)?;
-/// assert_eq!(world.body(body)?.positions()[0], mesh.positions[0]);
-/// # Ok::<(), sinew::Error>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Values<'a> {
-    /// The same value for all.
-    Uniform(f32),
-    /// A value for each, in order.
-    Each(&'a [f32]),
-}
-
-impl Values<'_> {
-    /// The value of number `index`.
-    #[inline]
-    pub fn get(&self, index: usize) -> f32 {
-        match self {
-            Values::Uniform(value) => *value,
-            Values::Each(values) => values[index],
-        }
-    }
-
-    /// The value of all, 0 where each has its own.
-    pub(crate) fn uniform(&self) -> f32 {
-        match self {
-            Values::Uniform(value) => *value,
-            Values::Each(_) => 0.0,
-        }
-    }
-
-    /// Whether every value is zero.
-    pub(crate) fn all_zero(&self) -> bool {
-        match self {
-            Values::Uniform(value) => *value == 0.0,
-            Values::Each(values) => values.iter().all(|&value| value == 0.0),
-        }
-    }
-}
 
 /// How a body keeps its springs.
 ///
@@ -163,8 +113,8 @@ pub struct BodyDefinition<'a> {
     pub rest_lengths: Option<&'a [f32]>,
     /// Damping along each spring in N s/m, at least 0; 0 where tetrahedra are elements and no springs are given.
     pub spring_dampings: Values<'a>,
-    /// The surface that is drawn and touched, outward by the right-hand rule; where it is empty, the boundary of the
-    /// tetrahedra, or of the cells.
+    /// The surface that is drawn and touched, outward by the right-hand rule; where it is empty, the outer faces of the tetrahedra, or
+    /// of the cells. Outer faces of tetrahedra that are given facing inward are turned.
     pub triangles: &'a [[u32; 3]],
     /// Tetrahedra, four nodes each.
     pub tetrahedra: &'a [[u32; 4]],
@@ -332,36 +282,6 @@ impl Default for BodyDefinition<'_> {
     }
 }
 
-/// A spring between two nodes, checked.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Spring {
-    pub nodes: [u32; 2],
-    pub stiffness: f32,
-    pub rest_length: f32,
-    pub damping: f32,
-}
-
-/// Rest lengths that come from positions are merged where they differ by no more than this part of themselves, however
-/// coarse the positions.
-const LARGEST_MERGER: f32 = 1e-3;
-
-/// What rest lengths may differ by, to be one.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Rounding {
-    /// The largest coordinate that they were computed from, m; 0 where they were given.
-    pub reach: f32,
-}
-
-impl Rounding {
-    /// The width within which rest lengths of about this length are one, m.
-    pub fn width(self, length: f32) -> f32 {
-        // Each end is rounded by up to half a unit in the last place along each axis, and so are the length and its ends'
-        // difference.
-        let rounded = 4.0 * f32::EPSILON * self.reach;
-        (4.0 * f32::EPSILON * length).max(rounded.min(LARGEST_MERGER * length))
-    }
-}
-
 impl BodyDefinition<'_> {
     /// Refuses whatever is out of range, with a message that names it.
     pub(crate) fn check(&self) -> Result<()> {
@@ -505,118 +425,4 @@ impl BodyDefinition<'_> {
         }
         Ok(())
     }
-
-    /// What rest lengths may differ by, to be one.
-    pub(crate) fn rounding(&self) -> Rounding {
-        let rest = self.rest_positions.unwrap_or(self.positions);
-        let reach = |reach: f32, position: &Vec3| reach.max(position.abs().max_element());
-        Rounding {
-            reach: match self.rest_lengths {
-                Some(_) => 0.0,
-                None => rest.iter().fold(0.0, reach),
-            },
-        }
-    }
-
-    /// The springs with their rest lengths, from the definition or from the edges of its elements.
-    pub(crate) fn resolved_springs(&self) -> Result<Vec<Spring>> {
-        let edges;
-        let pairs = match self.springs {
-            Some(springs) => springs,
-            None => {
-                edges = crate::mesh::element_edges(self.triangles, self.tetrahedra, self.cells)?;
-                &edges
-            }
-        };
-        let rest = self.rest_positions.unwrap_or(self.positions);
-        let mut springs = memory::reserved(pairs.len())?;
-        for (index, &nodes) in pairs.iter().enumerate() {
-            let rest_length = match self.rest_lengths {
-                Some(lengths) => lengths[index],
-                None => distance(rest[nodes[0] as usize], rest[nodes[1] as usize]),
-            };
-            if !rest_length.is_finite() {
-                return Err(Error::invalid(format!(
-                    "springs[{index}] would be {rest_length} m long: positions lie too far apart"
-                )));
-            }
-            springs.push(Spring {
-                nodes,
-                stiffness: self.stiffnesses.get(index),
-                rest_length,
-                damping: self.spring_dampings.get(index) + self.viscosity.dashpot() * self.stiffnesses.get(index),
-            });
-        }
-        Ok(springs)
-    }
-}
-
-/// The distance of two points, in metres, without overflow or loss on the way.
-pub(crate) fn distance(a: Vec3, b: Vec3) -> f32 {
-    (b.as_dvec3() - a.as_dvec3()).length() as f32
-}
-
-pub(crate) fn expect_count(name: &str, count: usize, expected: usize) -> Result<()> {
-    if count == expected {
-        return Ok(());
-    }
-    Err(Error::invalid(format!(
-        "{name} has {count} entries: must have {expected}"
-    )))
-}
-
-pub(crate) fn finite_vector(name: &str, vector: Vec3) -> Result<()> {
-    if vector.is_finite() {
-        return Ok(());
-    }
-    Err(Error::invalid(format!("{name} is {vector}: must be finite")))
-}
-
-pub(crate) fn finite_vectors(name: &str, vectors: &[Vec3]) -> Result<()> {
-    match vectors.iter().position(|vector| !vector.is_finite()) {
-        None => Ok(()),
-        Some(node) => Err(Error::invalid(format!(
-            "{name}[{node}] is {}: must be finite",
-            vectors[node]
-        ))),
-    }
-}
-
-/// Checks `values` of which each must be finite and at least 0; `name` in the singular.
-pub(crate) fn check_values(name: &str, values: &Values, count: usize) -> Result<()> {
-    match values {
-        Values::Uniform(value) => not_negative(name, *value),
-        Values::Each(values) => {
-            let plural = plural(name);
-            expect_count(&plural, values.len(), count)?;
-            match values.iter().position(|&value| !(value >= 0.0 && value.is_finite())) {
-                None => Ok(()),
-                Some(index) => not_negative(&format!("{plural}[{index}]"), values[index]),
-            }
-        }
-    }
-}
-
-fn plural(name: &str) -> String {
-    match name.strip_suffix("ss") {
-        Some(_) => format!("{name}es"),
-        None => format!("{name}s"),
-    }
-}
-
-/// Checks that each element joins existing nodes, no node twice.
-pub(crate) fn node_indices<const N: usize>(name: &str, elements: &[[u32; N]], nodes: usize) -> Result<()> {
-    for (index, element) in elements.iter().enumerate() {
-        for (corner, &node) in element.iter().enumerate() {
-            if node as usize >= nodes {
-                return Err(Error::invalid(format!(
-                    "{name}[{index}] names node {node}: there are {nodes} nodes"
-                )));
-            }
-            if element[..corner].contains(&node) {
-                return Err(Error::invalid(format!("{name}[{index}] names node {node} twice")));
-            }
-        }
-    }
-    Ok(())
 }

@@ -9,16 +9,15 @@ mod material;
 mod report;
 mod sleep;
 mod spring_law;
+mod springs;
 mod tearing;
+mod values;
 mod viscosity;
 mod yielding;
 
 pub use anchor::{Anchor, SurfacePoint};
-pub use body::{BodyDefinition, Solver, Storage, Values};
-pub(crate) use body::{
-    MOST_ITERATIONS, Rounding, SMALLEST_MASS, Spring, check_values, distance, expect_count, finite_vector,
-    finite_vectors, node_indices,
-};
+pub use body::{BodyDefinition, Solver, Storage};
+pub(crate) use body::{MOST_ITERATIONS, SMALLEST_MASS};
 pub use choice::{ChoiceReason, SolverChoice};
 pub(crate) use contact::check_reach;
 pub use contact::{BodyContact, CollisionFilter, Detection};
@@ -27,8 +26,11 @@ pub use material::{Material, Model};
 pub use report::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use sleep::{BodySettings, Sleep};
 pub use spring_law::SpringLaw;
+pub(crate) use springs::{Rounding, Spring, distance};
 pub(crate) use tearing::Withheld;
 pub use tearing::{TearReport, Tearing};
+pub use values::Values;
+pub(crate) use values::{check_values, expect_count, finite_vector, finite_vectors, node_indices};
 pub use viscosity::Viscosity;
 pub(crate) use viscosity::{Carried, RelaxationStep};
 pub use yielding::Yielding;

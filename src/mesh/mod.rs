@@ -23,7 +23,8 @@ pub(crate) use closed::FURTHEST;
 pub use file::{MeshFormat, load};
 pub use tidy::{LoadedMesh, NO_NODE, TidyReport, tidy};
 pub(crate) use topology::{
-    CELL_DIAGONALS, CELL_EDGES, TETRAHEDRON_EDGES, TRIANGLE_EDGES, cell_boundary, element_edges, pack, unpack,
+    CELL_DIAGONALS, CELL_EDGES, TETRAHEDRON_EDGES, TRIANGLE_EDGES, cell_boundary, element_edges, outer_faces, pack,
+    turn_outward, unpack,
 };
 pub use topology::{boundary, edges, is_closed};
 
@@ -74,13 +75,13 @@ impl Mesh {
         element_edges(&self.triangles, &self.tetrahedra, &self.cells)
     }
 
-    /// The surface, outward: the [`boundary`] of the tetrahedra; without tetrahedra, the outer faces of the cells; without
-    /// these, the triangles.
+    /// The surface: the [`boundary`] of the tetrahedra, outward however these are turned; without tetrahedra, the outer faces of the
+    /// cells; without these, the triangles.
     ///
     /// Errors: [`Error::OutOfMemory`].
     pub fn surface(&self) -> Result<Vec<[u32; 3]>> {
         if !self.tetrahedra.is_empty() {
-            return boundary(&self.tetrahedra);
+            return outer_faces(&self.positions, &self.tetrahedra);
         }
         if !self.cells.is_empty() {
             return cell_boundary(&self.cells);

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::topology::{boundary, sorted};
+use super::topology::{boundary, smallest_first, sorted, turn_outward};
 use super::{Mesh, tetrahedron_volume};
 use crate::base::memory;
 use crate::{Error, Result};
@@ -223,30 +223,13 @@ impl RawMesh {
         if self.tetrahedra.is_empty() || self.triangles.is_empty() {
             return Ok(());
         }
-        let mut surface = boundary(&self.tetrahedra)?;
-        surface.sort_unstable_by_key(|t| sorted(*t));
-        for triangle in &mut self.triangles {
-            let nodes = sorted(*triangle);
-            if let Ok(face) = surface.binary_search_by_key(&nodes, |t| sorted(*t))
-                && smallest_first(surface[face]) != smallest_first(*triangle)
-            {
-                triangle.swap(1, 2);
-                report.turned_triangles += 1;
-            }
-        }
+        report.turned_triangles = turn_outward(&mut self.triangles, boundary(&self.tetrahedra)?);
         // A triangle that was turned onto one that faced outward already was the back of it.
         let backs = keep_first(&mut self.triangles, |t| smallest_first(*t))?;
         report.doubled_triangles += backs;
         report.turned_triangles -= backs;
         Ok(())
     }
-}
-
-/// The triangle in the same direction from its smallest node on.
-fn smallest_first(mut nodes: [u32; 3]) -> [u32; 3] {
-    let smallest = (0..3).min_by_key(|&k| nodes[k]).unwrap_or(0);
-    nodes.rotate_left(smallest);
-    nodes
 }
 
 /// Gives the elements other node numbers and drops those that repeat a node; returns how many.

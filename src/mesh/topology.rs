@@ -1,5 +1,8 @@
 //! Edges and surfaces, found by sorting: near-linear, and the same result on every run.
 
+use glam::Vec3;
+
+use super::tetrahedron_volume;
 use crate::Result;
 use crate::base::memory;
 
@@ -84,13 +87,42 @@ pub(crate) fn element_edges(
 ///
 /// Errors: [`Error::OutOfMemory`](crate::Error::OutOfMemory).
 pub fn boundary(tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 3]>> {
-    faces_of_one(tetrahedra, &FACES)
+    faces_of_one(tetrahedra, &FACES, |_| false)
+}
+
+/// The same where nodes lie at `positions`, outward however the tetrahedra are turned.
+pub(crate) fn outer_faces(positions: &[Vec3], tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 3]>> {
+    faces_of_one(tetrahedra, &FACES, |corners| {
+        tetrahedron_volume(corners.map(|node| positions[node as usize].as_dvec3())) < 0.0
+    })
+}
+
+/// Turns the triangles that are outer faces, given outward, and face inward; returns how many.
+pub(crate) fn turn_outward(triangles: &mut [[u32; 3]], mut outer: Vec<[u32; 3]>) -> usize {
+    outer.iter_mut().for_each(|face| *face = smallest_first(*face));
+    outer.sort_unstable();
+    let mut turned = 0;
+    for triangle in triangles {
+        let [a, b, c] = *triangle;
+        if outer.binary_search(&smallest_first([a, c, b])).is_ok() {
+            triangle.swap(1, 2);
+            turned += 1;
+        }
+    }
+    turned
+}
+
+/// The triangle in the same direction from its smallest node on.
+pub(super) fn smallest_first(mut nodes: [u32; 3]) -> [u32; 3] {
+    let smallest = (0..3).min_by_key(|&k| nodes[k]).unwrap_or(0);
+    nodes.rotate_left(smallest);
+    nodes
 }
 
 /// The surface of cells, their outer faces, in the order of the cells and outward; two triangles each, cut along the diagonal
 /// that joins corners with an even number of bits.
 pub(crate) fn cell_boundary(cells: &[[u32; 8]]) -> Result<Vec<[u32; 3]>> {
-    let faces = faces_of_one(cells, &CELL_FACES)?;
+    let faces = faces_of_one(cells, &CELL_FACES, |_| false)?;
     let mut surface = memory::reserved(faces.len() * 2)?;
     surface.extend(faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]));
     Ok(surface)
@@ -111,10 +143,11 @@ pub(super) fn sorted_faces<const CORNERS: usize, const SIDES: usize, const FACES
     Ok(faces)
 }
 
-/// The faces that exactly one element has, in the order of the elements.
+/// The faces that exactly one element has, in the order of the elements; turned where that one is inverted.
 fn faces_of_one<const CORNERS: usize, const SIDES: usize, const FACES: usize>(
     elements: &[[u32; CORNERS]],
     sides: &[[usize; SIDES]; FACES],
+    is_inverted: impl Fn(&[u32; CORNERS]) -> bool,
 ) -> Result<Vec<[u32; SIDES]>> {
     let faces = sorted_faces(elements, sides)?;
     let mut once = Vec::new();
@@ -126,10 +159,14 @@ fn faces_of_one<const CORNERS: usize, const SIDES: usize, const FACES: usize>(
     once.sort_unstable();
 
     let mut surface = memory::reserved(once.len())?;
-    surface.extend(
-        once.iter()
-            .map(|face| sides[face % FACES].map(|corner| elements[face / FACES][corner])),
-    );
+    surface.extend(once.iter().map(|face| {
+        let element = &elements[face / FACES];
+        let mut nodes = sides[face % FACES].map(|corner| element[corner]);
+        if is_inverted(element) {
+            nodes.reverse();
+        }
+        nodes
+    }));
     Ok(surface)
 }
 

@@ -25,13 +25,11 @@ fn floor() -> World {
     world
 }
 
-/// A block of soft tetrahedra; mirrored: upside down, so that two of them are each other's images.
+/// A block of soft tetrahedra; mirrored: upside down, so that two of them are each other's images, its elements and triangles inside out.
 fn block(world: &mut World, solver: Solver, height: f32, mirrored: bool, damping: f32) -> (BodyId, Mesh) {
     let mut mesh = Mesh::block(SIZE, CELLS).expect("a block");
     if mirrored {
         mesh.positions.iter_mut().for_each(|place| place.y = -place.y);
-        mesh.tetrahedra.iter_mut().for_each(|corners| corners.swap(1, 2));
-        mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
     }
     let mesh = moved(mesh, Vec3::Y * height);
     let node_mass = DENSITY * SIZE.iter().product::<f32>() / mesh.positions.len() as f32;

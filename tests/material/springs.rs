@@ -463,6 +463,26 @@ fn cells_have_their_outer_faces_as_surface() {
     assert_eq!(springs, mesh.edges().expect("edges").len());
 }
 
+#[test]
+fn surfaces_face_outward_however_tetrahedra_are_turned() {
+    let mut mesh = Mesh::block([0.2, 0.3, 0.4], [2, 3, 4]).expect("a block");
+    mesh.positions.iter_mut().for_each(|place| place.x = -place.x);
+    let bare = Mesh {
+        triangles: vec![],
+        ..mesh.clone()
+    };
+    for mesh in [mesh, bare] {
+        let (world, id) = world_of(&definition(&mesh, TISSUE));
+        let enclosed = Mesh {
+            triangles: world.body(id).expect("the body").surface().to_vec(),
+            tetrahedra: vec![],
+            ..mesh
+        };
+        let volume = enclosed.volume().expect("a volume");
+        assert!((volume / 0.024 - 1.0).abs() < 1e-5, "{volume} m³");
+    }
+}
+
 /// The error of a definition that is refused.
 fn refusal(definition: &BodyDefinition) -> String {
     let mut world = World::new(FREE).expect("a world");

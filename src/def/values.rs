@@ -1,0 +1,121 @@
+//! Values for nodes and springs, and the checks of lists that callers give.
+
+use glam::Vec3;
+
+use crate::base::{Error, Result, not_negative};
+
+/// One value for all, or one for each.
+///
+/// ```
+/// # use sinew::{mesh::Mesh, *};
+/// # let mut world = World::new(WorldDefinition::default())?;
+/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
+/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
+/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
+/// let mut masses = vec![1e-4; mesh.positions.len()];
+/// // The first node is pinned for good.
+/// masses[0] = 0.0;
+/// let body = world.create_body(&BodyDefinition { masses: Values::Each(&masses), ..cloth })?;
+/// world.step(1.0 / 60.0)?;
+/// assert_eq!(world.body(body)?.positions()[0], mesh.positions[0]);
+/// # Ok::<(), sinew::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Values<'a> {
+    /// The same value for all.
+    Uniform(f32),
+    /// A value for each, in order.
+    Each(&'a [f32]),
+}
+
+impl Values<'_> {
+    /// The value of number `index`.
+    #[inline]
+    pub fn get(&self, index: usize) -> f32 {
+        match self {
+            Values::Uniform(value) => *value,
+            Values::Each(values) => values[index],
+        }
+    }
+
+    /// The value of all, 0 where each has its own.
+    pub(crate) fn uniform(&self) -> f32 {
+        match self {
+            Values::Uniform(value) => *value,
+            Values::Each(_) => 0.0,
+        }
+    }
+
+    /// Whether every value is zero.
+    pub(crate) fn all_zero(&self) -> bool {
+        match self {
+            Values::Uniform(value) => *value == 0.0,
+            Values::Each(values) => values.iter().all(|&value| value == 0.0),
+        }
+    }
+}
+
+pub(crate) fn expect_count(name: &str, count: usize, expected: usize) -> Result<()> {
+    if count == expected {
+        return Ok(());
+    }
+    Err(Error::invalid(format!(
+        "{name} has {count} entries: must have {expected}"
+    )))
+}
+
+pub(crate) fn finite_vector(name: &str, vector: Vec3) -> Result<()> {
+    if vector.is_finite() {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("{name} is {vector}: must be finite")))
+}
+
+pub(crate) fn finite_vectors(name: &str, vectors: &[Vec3]) -> Result<()> {
+    match vectors.iter().position(|vector| !vector.is_finite()) {
+        None => Ok(()),
+        Some(node) => Err(Error::invalid(format!(
+            "{name}[{node}] is {}: must be finite",
+            vectors[node]
+        ))),
+    }
+}
+
+/// Checks `values` of which each must be finite and at least 0; `name` in the singular.
+pub(crate) fn check_values(name: &str, values: &Values, count: usize) -> Result<()> {
+    match values {
+        Values::Uniform(value) => not_negative(name, *value),
+        Values::Each(values) => {
+            let plural = plural(name);
+            expect_count(&plural, values.len(), count)?;
+            match values.iter().position(|&value| !(value >= 0.0 && value.is_finite())) {
+                None => Ok(()),
+                Some(index) => not_negative(&format!("{plural}[{index}]"), values[index]),
+            }
+        }
+    }
+}
+
+fn plural(name: &str) -> String {
+    match name.strip_suffix("ss") {
+        Some(_) => format!("{name}es"),
+        None => format!("{name}s"),
+    }
+}
+
+/// Checks that each element joins existing nodes, no node twice.
+pub(crate) fn node_indices<const N: usize>(name: &str, elements: &[[u32; N]], nodes: usize) -> Result<()> {
+    for (index, element) in elements.iter().enumerate() {
+        for (corner, &node) in element.iter().enumerate() {
+            if node as usize >= nodes {
+                return Err(Error::invalid(format!(
+                    "{name}[{index}] names node {node}: there are {nodes} nodes"
+                )));
+            }
+            if element[..corner].contains(&node) {
+                return Err(Error::invalid(format!("{name}[{index}] names node {node} twice")));
+            }
+        }
+    }
+    Ok(())
+}
