@@ -1,6 +1,6 @@
 //! A kilohertz hand: a step in each tick, and steps of a frame beside the ticks of a handle.
 //!
-//! `cargo bench --bench tick` (a minute; `-- --quick`: a tenth of one) writes `target/report/tick.md`. A ball presses into an organ of tissue
+//! `cargo bench --bench tick` (ten minutes; `-- --quick`: one; `-- --deadlines 1000000`: so many steps with deadlines alone) writes `target/report/tick.md`. A ball presses into an organ of tissue
 //! (E 5 kPa) by 5 mm and slides there, and each millisecond a step is taken: how much of the processor's time steps take, and how many of them end late, beside a
 //! loop that does nothing. Then larger organs are stepped at 60 Hz by two threads while a third ticks a handle a thousand times a second.
 #![allow(clippy::print_stderr)]
@@ -8,6 +8,7 @@
 #[path = "../storage/clock.rs"]
 #[allow(dead_code)] // the storage bench uses the rest
 mod clock;
+mod deadline;
 
 use std::fmt::Write;
 use std::path::Path;
@@ -18,8 +19,8 @@ use std::time::{Duration, Instant};
 use glam::Vec3;
 use sinew::mesh::{Mesh, MeshFormat, load};
 use sinew::{
-    BodyDefinition, HapticDefinition, Material, Model, Pose, Shape, Solver, ToolDefinition, ToolId, Values, World,
-    WorldDefinition,
+    BodyDefinition, BodyId, HapticDefinition, Material, Model, Pose, Shape, Solver, ToolDefinition, ToolId, Values,
+    World, WorldDefinition,
 };
 
 /// Of the ball, m, how deep it presses, and how far it slides.
@@ -84,6 +85,7 @@ type Tissue = (Model, Solver, f32);
 /// An organ and a ball that stands on its highest point.
 struct Scene {
     world: World,
+    body: BodyId,
     ball: ToolId,
     /// Where the ball first touches.
     touch: Vec3,
@@ -137,7 +139,12 @@ impl Scene {
             ..ToolDefinition::new(Shape::Sphere { radius: RADIUS })
         };
         let ball = world.create_tool(&ball).expect("a ball");
-        Self { world, ball, touch }
+        Self {
+            world,
+            body,
+            ball,
+            touch,
+        }
     }
 
     /// Where the ball is after so many seconds.
@@ -281,11 +288,20 @@ fn frames_beside_a_hand(report: &mut String, frames: u32) {
 }
 
 fn main() -> ExitCode {
-    let is_quick = std::env::args().any(|argument| argument == "--quick");
+    let arguments: Vec<String> = std::env::args().collect();
+    let is_quick = arguments.iter().any(|argument| argument == "--quick");
+    let deadlines = arguments
+        .iter()
+        .skip_while(|argument| *argument != "--deadlines")
+        .nth(1);
+    let deadlines = deadlines.map(|count| count.parse().expect("--deadlines: a number of steps"));
     let (ticks, frames) = if is_quick { (1_000, 60) } else { (10_000, 600) };
     let mut report = String::from("# A kilohertz hand\n\n");
-    step_in_the_tick(&mut report, ticks);
-    frames_beside_a_hand(&mut report, frames);
+    if deadlines.is_none() {
+        step_in_the_tick(&mut report, ticks);
+        frames_beside_a_hand(&mut report, frames);
+    }
+    deadline::run(&mut report, &stomach(), deadlines.unwrap_or(ticks));
     eprintln!("{report}");
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("report");
     let path = folder.join("tick.md");

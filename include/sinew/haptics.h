@@ -82,8 +82,7 @@ typedef struct sinew_haptic_contact {
 } sinew_haptic_contact;
 
 /// Writes the contacts of the model that the last tick used, without waiting.
-/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist, at most
-/// 32; with more, those with the largest force.
+/// `out_contacts`: up to `capacity` entries; `out_count`: how many exist, the 32 largest at most.
 sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic,
     sinew_haptic_contact *out_contacts, size_t capacity, size_t *out_count);
 

@@ -38,8 +38,7 @@ sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body,
     size_t node_count);
 
 /// Changes the velocities of nodes at once by impulses [N s], 3 * count floats.
-/// `nodes` holds `count` indices, which may repeat. They have no effect on a pinned or attached
-/// node, nor along a pinned axis.
+/// `nodes`: `count` indices, which may repeat. None acts on a pinned or attached node or axis.
 sinew_status sinew_body_apply_impulses(sinew_world *world, sinew_body_id body,
     const uint32_t *nodes, const float *impulses, size_t count);
 
@@ -192,11 +191,14 @@ sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t
     sinew_step_report *report);
 
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
-/// The first calls measure. A step can be late if the scene became slower. For a bitwise replay
-/// record `work` of `report`, which is nullable.
+/// The first calls measure; any can be late. `work` of the nullable `report` replays it bitwise.
 /// Errors: those of sinew_world_step_with_budget; SINEW_STATUS_UNSUPPORTED on WebAssembly.
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
     sinew_step_report *report);
+
+/// Writes how far the force on a tool is at most from what the equations of the last step ask for.
+/// `out` [N]; 0 if only VERLET bodies press it. Mesh and time step have errors of their own.
+sinew_status sinew_tool_get_force_error(const sinew_world *world, sinew_tool_id tool, float *out);
 
 // ---- Ids and user data --------------------------------------------------------------------------
 

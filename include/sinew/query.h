@@ -55,8 +55,7 @@ typedef struct sinew_detector_def {
   /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes. Depths along the
   /// view exceed the shortest distance by about 2 % of the size with three axes, by 6 % with one.
   float direction[3];
-  /// IMAGE_SPACE: capacity of an image in pixels, 1 to 2^24; default 2^18. If it is too small, the
-  /// pixel size doubles until the image fits.
+  /// IMAGE_SPACE: pixels of an image, 1 to 2^24; default 2^18. Too few become larger.
   uint32_t pixels;
   /// INTERVALS: capacity of ray-face crossings per body and image, at least 1; default 2^20. If it
   /// is too small, the pixel size doubles. The default capacities take about 18 MB.

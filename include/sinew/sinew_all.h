@@ -960,8 +960,7 @@ typedef struct sinew_detector_def {
   /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes. Depths along the
   /// view exceed the shortest distance by about 2 % of the size with three axes, by 6 % with one.
   float direction[3];
-  /// IMAGE_SPACE: capacity of an image in pixels, 1 to 2^24; default 2^18. If it is too small, the
-  /// pixel size doubles until the image fits.
+  /// IMAGE_SPACE: pixels of an image, 1 to 2^24; default 2^18. Too few become larger.
   uint32_t pixels;
   /// INTERVALS: capacity of ray-face crossings per body and image, at least 1; default 2^20. If it
   /// is too small, the pixel size doubles. The default capacities take about 18 MB.
@@ -1380,8 +1379,7 @@ typedef struct sinew_haptic_contact {
 } sinew_haptic_contact;
 
 /// Writes the contacts of the model that the last tick used, without waiting.
-/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist, at most
-/// 32; with more, those with the largest force.
+/// `out_contacts`: up to `capacity` entries; `out_count`: how many exist, the 32 largest at most.
 sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic,
     sinew_haptic_contact *out_contacts, size_t capacity, size_t *out_count);
 
@@ -1570,8 +1568,7 @@ sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body,
     size_t node_count);
 
 /// Changes the velocities of nodes at once by impulses [N s], 3 * count floats.
-/// `nodes` holds `count` indices, which may repeat. They have no effect on a pinned or attached
-/// node, nor along a pinned axis.
+/// `nodes`: `count` indices, which may repeat. None acts on a pinned or attached node or axis.
 sinew_status sinew_body_apply_impulses(sinew_world *world, sinew_body_id body,
     const uint32_t *nodes, const float *impulses, size_t count);
 
@@ -1724,11 +1721,14 @@ sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t
     sinew_step_report *report);
 
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
-/// The first calls measure. A step can be late if the scene became slower. For a bitwise replay
-/// record `work` of `report`, which is nullable.
+/// The first calls measure; any can be late. `work` of the nullable `report` replays it bitwise.
 /// Errors: those of sinew_world_step_with_budget; SINEW_STATUS_UNSUPPORTED on WebAssembly.
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
     sinew_step_report *report);
+
+/// Writes how far the force on a tool is at most from what the equations of the last step ask for.
+/// `out` [N]; 0 if only VERLET bodies press it. Mesh and time step have errors of their own.
+sinew_status sinew_tool_get_force_error(const sinew_world *world, sinew_tool_id tool, float *out);
 
 // ---- Ids and user data --------------------------------------------------------------------------
 

@@ -1,7 +1,9 @@
 //! Steps of bounded work and time.
 
-use super::guard::sinew_world;
+use super::guard::{sinew_world, with_world};
+use super::memory;
 use super::status::sinew_status;
+use super::tool::sinew_tool_id;
 use super::world::{sinew_step_report, step_and_report};
 use crate::world::BudgetReport;
 
@@ -36,8 +38,7 @@ pub unsafe extern "C" fn sinew_world_step_with_budget(
 
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
 ///
-/// The first calls measure. A step can be late if the scene became slower. For a bitwise replay record `work` of
-/// `report`, which is nullable.
+/// The first calls measure; any can be late. `work` of the nullable `report` replays it bitwise.
 ///
 /// Errors: those of sinew_world_step_with_budget; SINEW_STATUS_UNSUPPORTED on WebAssembly.
 #[unsafe(no_mangle)]
@@ -49,4 +50,17 @@ pub unsafe extern "C" fn sinew_world_step_within(
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe { step_and_report(world, report, |world| world.step_within(dt, seconds)) }
+}
+
+/// Writes how far the force on a tool is at most from what the equations of the last step ask for.
+///
+/// `out` [N]; 0 if only VERLET bodies press it. Mesh and time step have errors of their own.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_force_error(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    out: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_world(world, |world| memory::write("out", out, world.force_error(tool.id())?)) }
 }

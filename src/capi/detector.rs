@@ -49,9 +49,7 @@ pub struct sinew_detector_def {
     ///
     /// Depths along the view exceed the shortest distance by about 2 % of the size with three axes, by 6 % with one.
     pub direction: [f32; 3],
-    /// IMAGE_SPACE: capacity of an image in pixels, 1 to 2^24; default 2^18.
-    ///
-    /// If it is too small, the pixel size doubles until the image fits.
+    /// IMAGE_SPACE: pixels of an image, 1 to 2^24; default 2^18. Too few become larger.
     pub pixels: u32,
     /// INTERVALS: capacity of ray-face crossings per body and image, at least 1; default 2^20.
     ///

@@ -263,8 +263,7 @@ pub unsafe extern "C" fn sinew_haptic_tick(
 
 /// Writes the contacts of the model that the last tick used, without waiting.
 ///
-/// `out_contacts` receives at most `capacity` entries, `out_count` the number that exist, at most 32; with more, those
-/// with the largest force.
+/// `out_contacts`: up to `capacity` entries; `out_count`: how many exist, the 32 largest at most.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_get_contacts(
     haptic: *const sinew_haptic,

@@ -163,8 +163,7 @@ pub unsafe extern "C" fn sinew_body_get_masses(
 
 /// Changes the velocities of nodes at once by impulses [N s], 3 * count floats.
 ///
-/// `nodes` holds `count` indices, which may repeat. They have no effect on a pinned or attached node, nor along a
-/// pinned axis.
+/// `nodes`: `count` indices, which may repeat. None acts on a pinned or attached node or axis.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_apply_impulses(
     world: *mut sinew_world,

@@ -40,9 +40,11 @@ const SWEEPS_OF_A_SLICE: u32 = 16;
 pub(crate) struct ToolLoad {
     pub impulse: DVec3,
     pub angular_impulse: DVec3,
+    /// By how much, at most, an equation of the step has the force on it off, N.
+    pub force_error: f64,
 }
 
-saved! { ToolLoad { impulse, angular_impulse } }
+saved! { ToolLoad { impulse, angular_impulse, force_error } }
 
 impl ToolLoad {
     /// Adds an impulse at this place, from the tool's position.
@@ -56,6 +58,7 @@ impl ToolLoad {
         Self {
             impulse: self.impulse - before.impulse,
             angular_impulse: self.angular_impulse - before.angular_impulse,
+            ..*self
         }
     }
 }
@@ -366,23 +369,35 @@ impl Contacts {
 
     /// What contacts gave beside what the equation of a substep of so many seconds had them do, and what they gave in all, N s.
     pub fn beyond_holds(&self, substep: f64) -> [f64; 2] {
-        let (mut beyond, mut all) = (0.0, 0.0);
-        for (index, constraint) in self.constraints.iter().enumerate() {
+        self.given_beyond(substep)
+            .fold([0.0; 2], |[beyond, all], (_, more, given)| [beyond + more, all + given])
+    }
+
+    /// The same of each contact, with the tool's place in the step.
+    fn given_beyond(&self, substep: f64) -> impl Iterator<Item = (usize, f64, f64)> {
+        let of_features = self.constraints.iter().enumerate().map(move |(index, constraint)| {
             let given = constraint.given().as_dvec3();
             let held = if index < self.holds.len() {
                 self.holds.force(index) * substep
             } else {
                 DVec3::ZERO
             };
-            beyond += (given - held).length();
-            all += given.length();
+            (constraint.tool, (given - held).length(), given.length())
+        });
+        let of_nodes = self.nodes.iter().map(|contact| {
+            let given = contact.given().as_dvec3().length();
+            (contact.tool, given, given)
+        });
+        of_features.chain(of_nodes)
+    }
+
+    /// Takes up as an error of the forces on tools what contacts gave after the equation of a long substep of so many seconds: tissue did not know of it.
+    pub fn take_beyond_holds(&mut self, substep: f64) {
+        let mut loads = std::mem::take(&mut self.loads);
+        for (tool, beyond, _) in self.given_beyond(substep) {
+            loads[tool].force_error += beyond / substep;
         }
-        let of_nodes: f64 = self
-            .nodes
-            .iter()
-            .map(|contact| contact.given().as_dvec3().length())
-            .sum();
-        [beyond + of_nodes, all + of_nodes]
+        self.loads = loads;
     }
 
     /// Makes what tools received in a long substep of so many seconds the mean over it: an equation knows the forces at its end, and those at
@@ -401,6 +416,33 @@ impl Contacts {
         });
         for (index, constraint) in constraints.iter().enumerate().take(holds.len()) {
             loads[constraint.tool].add(holds.force(index) * (0.5 * substep), constraint.arm);
+        }
+    }
+
+    /// Takes up by how much an equation has the force on each tool off, at most, where it is off by this in the squared norm of its matrix, J. The
+    /// nodes at a tool, moved as one, are held by no more than the sum k of their stiffnesses, so that the force is off by at most `sqrt(k square)`
+    /// (Cauchy and Schwarz); beside that contacts may lack some of their multipliers. The stiffness of nodes that a tool holds, N/m, is that of its place in the world.
+    pub fn bound_force_errors(
+        &mut self,
+        tools: &[ToolPath],
+        square: f64,
+        push_of: impl Fn(usize) -> DVec3,
+        stiffness_held: impl Fn(usize) -> f64,
+    ) {
+        let Self {
+            holds,
+            constraints,
+            loads,
+            ..
+        } = self;
+        for (place, (tool, load)) in tools.iter().zip(loads).enumerate() {
+            let of_tool = |&(index, _): &(usize, _)| constraints[index].tool == place;
+            let (mut stiffness, mut missing) = (stiffness_held(tool.slot), 0.0);
+            for (index, hold) in holds.pressing().filter(of_tool) {
+                stiffness += hold.resistance(constraints[index].firmness);
+                missing += hold.missing(&push_of).abs();
+            }
+            load.force_error = load.force_error.max((stiffness * square).sqrt() + missing);
         }
     }
 
@@ -442,6 +484,22 @@ impl Contacts {
         let over = (meeting.substep, meeting.bindings, drags);
         self.holds.begin(&self.constraints, slot, over, stiffness_of, way);
         true
+    }
+
+    /// Forgets the contacts of an equation that leads nowhere: what it had tools feel may be all wrong.
+    pub fn forget_holds(&mut self) {
+        for (index, _) in self.holds.pressing() {
+            self.loads[self.constraints[index].tool].force_error += self.holds.force(index).length();
+        }
+        self.holds.clear();
+    }
+
+    /// Forgets the contacts of an equation that is to stand, where nodes go further than those can tell.
+    pub fn forgo_holds(&mut self, meeting: &Meeting) {
+        self.find_candidates(meeting);
+        if self.needed_slices(meeting) > 1 {
+            self.holds.clear();
+        }
     }
 
     /// Gives the impulses that keep the body out of the tools, and moves what they touch.

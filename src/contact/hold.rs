@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::gauge::{Gauge, Meets};
+use super::holds::STIFFER;
 use super::supports::{MOST, Ties};
 use crate::codec::saved;
 
@@ -85,6 +86,20 @@ impl Hold {
             shares,
             stiffness,
         }
+    }
+
+    /// How much more it would do with a better multiplier, N.
+    pub fn missing(&self, push_of: impl Fn(usize) -> DVec3) -> f64 {
+        let better = Self {
+            multiplier: self.kept * self.answer.force,
+            ..*self
+        };
+        better.answer_to(push_of).force - self.answer.force
+    }
+
+    /// What holds its nodes beside it, N/m, where its constraint is so firm.
+    pub fn resistance(&self, firmness: f32) -> f64 {
+        self.stiffness / f64::from(STIFFER * firmness)
     }
 
     /// The vectors of its corners, which those of its nodes make.

@@ -21,7 +21,7 @@ use crate::codec::saved;
 use crate::nodes::Bindings;
 
 /// How much stiffer a contact is than its nodes: the more, the faster its multiplier is found, and the worse what lies between.
-const STIFFER: f32 = 3.0;
+pub(super) const STIFFER: f32 = 3.0;
 
 /// The part of a node in a hold.
 #[derive(Clone, Copy, Debug)]
@@ -311,12 +311,7 @@ impl Holds {
     pub fn missing(&self, push_of: impl Fn(usize) -> DVec3) -> f64 {
         let (mut missing, mut all) = (0.0, 0.0);
         for hold in &self.holds {
-            let better = Hold {
-                multiplier: hold.kept * hold.answer.force,
-                ..*hold
-            };
-            let force = better.answer_to(&push_of).force;
-            missing += (force - hold.answer.force).abs();
+            missing += hold.missing(&push_of).abs();
             all += hold.answer.force;
         }
         missing += self.grips.missing(push_of);
@@ -358,6 +353,14 @@ impl Holds {
     /// Whether contact number `index` is one of the equation that pushed in the last one too.
     pub(super) fn lasts(&self, index: usize) -> bool {
         self.holds.get(index).is_some_and(|hold| hold.lasts)
+    }
+
+    /// The contacts that push, with their numbers.
+    pub(super) fn pressing(&self) -> impl Iterator<Item = (usize, &Hold)> {
+        self.holds
+            .iter()
+            .enumerate()
+            .filter(|(_, hold)| hold.answer.force > 0.0)
     }
 
     /// Whether a contact pushes.

@@ -229,6 +229,8 @@ pub(crate) struct Tool {
     pub force: Vec3,
     /// Mean torque about its position over the last step, N m.
     pub torque: Vec3,
+    /// By how much, at most, equations of the last step had that force off, N.
+    pub force_error: f32,
     /// Its mass and motion, where forces move it.
     pub rigid: Option<Box<Rigid>>,
     /// What the caller keeps with it.
@@ -236,7 +238,7 @@ pub(crate) struct Tool {
 }
 
 saved! { Tool {
-    form, friction, force_limit, filter, pose, target, led_to, reach, force, torque, rigid,
+    form, friction, force_limit, filter, pose, target, led_to, reach, force, torque, force_error, rigid,
 } leaves { user_data: 0 } }
 
 /// A longer capsule, as a part of its radius, has no caps among triangles with corners in `f32`.
@@ -314,6 +316,7 @@ impl Tool {
             reach: None,
             force: Vec3::ZERO,
             torque: Vec3::ZERO,
+            force_error: 0.0,
             rigid: None,
             user_data: 0,
         })

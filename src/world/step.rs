@@ -256,6 +256,7 @@ impl World {
             // Finite, whatever the step's length.
             tool.force = force.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
             tool.torque = torque.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
+            tool.force_error = force_error(bodies, outcomes, index);
             tool.pose = paths[index].end();
             tool.led_to = tool.target.take().unwrap_or(tool.pose);
             tool.reach = None;
@@ -333,6 +334,14 @@ fn wrench(
         }
     }
     wrench
+}
+
+/// By how much, at most, the force on a tool is off in the step that was tried, N.
+fn force_error(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], index: usize) -> f32 {
+    let took = |place: usize| matches!(outcomes[place], Some(Outcome::Asleep | Outcome::Done { .. }));
+    let all = bodies.iter().filter(|(place, _)| took(*place));
+    let errors = all.filter_map(|(_, body)| Some(body.system().contacts.as_ref()?.loads()[index].force_error));
+    errors.sum::<f64>() as f32
 }
 
 /// What the step would come to where a body cannot take it.

@@ -168,6 +168,15 @@ impl World {
         Ok((tool.force, tool.torque))
     }
 
+    /// How far the force on a tool may be, at most, from what the equations of the last step ask for, N; 0 where bodies of VERLET press it alone, which
+    /// solve none. It says nothing of what the mesh and the step's length cost.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`].
+    pub fn force_error(&self, tool: ToolId) -> Result<f32> {
+        Ok(self.tools.get(tool.0)?.force_error)
+    }
+
     pub(crate) fn tool_ids(&self) -> impl Iterator<Item = ToolId> {
         self.tools.iter_ids().map(|(id, _)| ToolId(id))
     }

@@ -528,6 +528,7 @@ static void tool_calls(void)
     REFUSES_NO_TOOL(sinew_tool_destroy(world, tool));
     REFUSES_NO_TOOL(sinew_tool_set_pose(world, tool, fine, upright));
     REFUSES_NO_TOOL(sinew_tool_get_wrench(world, tool, out.force, out.torque));
+    REFUSES_NO_TOOL(sinew_tool_get_force_error(world, tool, out.force));
     REFUSED(INVALID, "position", sinew_tool_set_pose(the.world, the.tool, NULL, upright));
     REFUSED(INVALID, "orientation", sinew_tool_set_pose(the.world, the.tool, fine, nowhere));
     for (i = 0; i < NOT_FINITE; i++) {

@@ -1,7 +1,7 @@
 //! Steps of bounded work: what they do is bounded, nothing is lost, energy does not grow, and the same work gives the same bits.
 
 use glam::Vec3;
-use sinew::{BodyDefinition, Error, Shape, Solver, ToolDefinition, World, WorldDefinition};
+use sinew::{BodyDefinition, Error, Pose, Shape, Solver, ToolDefinition, World, WorldDefinition};
 
 use crate::support::bodies::{FREE, Parts, Scene, without_ids};
 
@@ -150,6 +150,70 @@ fn contact_holds_however_little_work_is_allowed() {
         }
         assert!(nearest < 1e-3, "{solver:?}: it has landed, {nearest} m");
     }
+}
+
+/// Each step beside the same one with work enough for its equation.
+#[test]
+fn work_beside_a_tool_is_bounded_and_its_force_is_within_its_error() {
+    const RADIUS: f32 = 0.02;
+    const ENOUGH: u32 = 160;
+    let (mut compared, mut covered) = (0, 0);
+    for work in [3, 10, 40] {
+        let mut parts = block();
+        let highest = parts.positions.iter().fold(Vec3::MIN, |high, place| high.max(*place));
+        for (mass, place) in parts.masses.iter_mut().zip(&parts.positions) {
+            *mass = if place.y < 0.001 { 0.0 } else { 1e-3 };
+        }
+        let mut scene = Scene::with(&parts, EARTH, |definition| BodyDefinition {
+            solver: Solver::Implicit,
+            ..definition
+        });
+        let above = Vec3::new(0.5 * highest.x, highest.y + RADIUS + 1e-3, 0.5 * highest.z);
+        let at = |position| Pose {
+            position,
+            ..Pose::IDENTITY
+        };
+        let ball = scene
+            .world
+            .create_tool(&ToolDefinition {
+                pose: at(above),
+                ..ToolDefinition::new(Shape::Sphere { radius: RADIUS })
+            })
+            .expect("a ball");
+        for frame in 1..=60 {
+            let place = above - Vec3::Y * 0.009 * (frame as f32 / 40.0).min(1.0);
+            let saved = scene.world.save().expect("a snapshot");
+            scene.world.set_pose(ball, place, None).expect("a pose");
+            let done = scene.world.step_with_budget(DT, work).expect("a step");
+            // What first comes near a tool is solved again, and friction may take a product more.
+            assert!(done.work_done <= 2 * work + 2 && done.step.substeps == 1, "{done:?}");
+            assert!(scene.is_finite() && done.step.bodies_restored == 0 && done.lag == 0.0);
+            let nearest = scene.positions().iter().fold(f64::INFINITY, |near, node| {
+                near.min((*node - place.as_dvec3()).length() - f64::from(RADIUS))
+            });
+            assert!(nearest > -5e-4, "work {work}, frame {frame}: {nearest} m");
+            let mut solved = World::load(&saved, 1, None).expect("a world");
+            solved.set_pose(ball, place, None).expect("a pose");
+            solved.step_with_budget(DT, ENOUGH).expect("a step");
+            let force = |world: &World| world.wrench(ball).expect("the ball").0;
+            let off = force(&scene.world).distance(force(&solved));
+            let error = |world: &World| world.force_error(ball).expect("the ball");
+            compared += 1;
+            covered += u32::from(off <= error(&scene.world) + error(&solved));
+            if off > error(&scene.world) + error(&solved) {
+                eprintln!(
+                    "work {work} frame {frame}: off {off} of {} +- {} +- {}",
+                    force(&solved),
+                    error(&scene.world),
+                    error(&solved)
+                );
+            }
+        }
+    }
+    assert!(
+        f64::from(covered) >= 0.99 * f64::from(compared),
+        "{covered} of {compared}"
+    );
 }
 
 #[test]

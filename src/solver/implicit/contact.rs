@@ -6,6 +6,7 @@
 
 use glam::Vec3;
 
+use super::parts::parts_near;
 use super::step::Substep;
 use super::{End, Implicit};
 use crate::base::{Stage, Stopwatch};
@@ -23,11 +24,17 @@ pub(super) const LONGEST: f64 = 1e-3;
 /// With a smaller budget than this short parts would have too few products each to be solved.
 const SMALL: u32 = 256;
 
+/// What a part of a step costs beside its products, in products.
+const COST_OF_A_PART: u32 = 10;
+
 /// Whether a part longer than that may be tried. What comes near on the way ends up to some micrometres inside, so a budget that is enough
-/// for short parts is used for them.
+/// for short parts is used for them, unless the caller allows less work than those take.
 pub(super) fn may_be_long(body: &System, implicit: &Implicit, request: &StepRequest) -> bool {
     let is_alone = request.dynamic.is_empty() && request.neighbor_speed.is_none() && body.bindings.is_none();
-    implicit.has_small_budget() && !implicit.is_attached && is_alone && body.contacts.is_some()
+    let is_bounded = || implicit.newton.is_none() && implicit.is_bounded();
+    let too_little_work = COST_OF_A_PART.saturating_mul(parts_near(request.dt));
+    let is_short_of_work = implicit.has_small_budget() || is_bounded() && implicit.allowed < too_little_work;
+    is_short_of_work && !implicit.is_attached && is_alone && body.contacts.is_some()
 }
 
 /// How far an open contact may be to belong to an equation, as a part of the body's extent.
@@ -92,7 +99,7 @@ impl Substep<'_> {
         // Nor is a dynamic tool's impulse on a node one that goes on.
         let is_of_order_1 = |contacts: &Contacts| !contacts.holds.is_empty() || contacts.has_dynamic();
         if self.is_long() {
-            return is_told.then_some(*self);
+            return (is_told || self.stands).then_some(*self);
         }
         if body.contacts.as_deref().is_some_and(is_of_order_1) {
             Some(self.of_order_1())
@@ -129,6 +136,23 @@ impl Substep<'_> {
         let push = |node: usize| implicit.pushes.get(node).as_dvec3();
         contacts.holds.imbalance(residual) <= f64::from(implicit.accuracy)
             && !(self.is_long() && contacts.holds.missing(push) > lacking)
+    }
+
+    /// Has contacts take up by how much the forces on tools are off where the equation is off by so much in the squared norm of its matrix, J.
+    pub(super) fn bound_tool_forces(&self, body: &mut System, implicit: &Implicit, square: f64) {
+        let per_mass = (1.0 / (self.step * self.step)) as f32;
+        let (forces, masses) = (&body.forces, &body.masses);
+        let grasps = body.grasps.as_deref();
+        let stiffness_held = |slot: usize| {
+            let held = grasps.into_iter().flat_map(|grasps| grasps.held_nodes());
+            let held = held.filter(|(_, tool)| *tool == slot);
+            held.map(|(node, _)| f64::from(forces.stiffness_at(node, masses[node] * per_mass)))
+                .sum()
+        };
+        let push = |node: usize| implicit.pushes.get(node).as_dvec3();
+        if let Some(contacts) = &mut body.contacts {
+            contacts.bound_force_errors(self.request.tools, square, push, stiffness_held);
+        }
     }
 
     /// Makes the preconditioner one of the pressed contacts too: their stiffness is part of the blocks, and the coarse level, which
@@ -213,14 +237,21 @@ impl Substep<'_> {
         let next = 1 - implicit.settled;
         let (per_step, step) = ((1.0 / self.step) as f32, self.step as f32);
         scaled(&implicit.histories[next].ways, per_step, means);
-        self.contact(body, means, |contacts, meeting, _| contacts.resolve(meeting));
+        let may_forgo = self.stands && self.is_long();
+        self.contact(body, means, |contacts, meeting, _| {
+            if may_forgo {
+                contacts.forgo_holds(&meeting);
+            }
+            contacts.resolve(meeting);
+        });
         let Some(contacts) = &body.contacts else {
             return End::Fine;
         };
         if contacts.are_far() {
             return End::Fine;
         }
-        if self.is_long() && !(may_stand && self.is_foreseen(contacts, &implicit.pushes, &implicit.residuals)) {
+        let is_foreseen = || may_stand && self.is_foreseen(contacts, &implicit.pushes, &implicit.residuals);
+        if self.is_long() && !self.stands && !is_foreseen() {
             return End::Near;
         }
         let history = &mut implicit.histories[next];
@@ -263,6 +294,7 @@ impl Substep<'_> {
             && let Some(contacts) = &mut body.contacts
         {
             contacts.average_loads(self.request.tools, self.step);
+            contacts.take_beyond_holds(self.step);
         }
         if body.state.next_is_finite() {
             End::Fine
@@ -273,9 +305,14 @@ impl Substep<'_> {
 }
 
 impl Implicit {
-    /// Whether it takes long steps beside tools.
+    /// Whether it takes long steps beside tools whatever is allowed.
     pub fn has_small_budget(&self) -> bool {
         self.newton.is_none() && self.budget < SMALL
+    }
+
+    /// Whether the caller allows less work than the definition.
+    pub(super) fn is_bounded(&self) -> bool {
+        self.allowed < self.budget
     }
 
     /// How fast a node goes on its way in the substep that was just solved, m/s.

@@ -101,7 +101,11 @@ impl Implicit {
             }
             self.search(body, growth, team);
         }
-        self.spectrum.smallest();
+        let known = self.spectrum.known_smallest();
+        if self.spectrum.smallest() > known && solved.products == goal.budget && self.is_bounded() {
+            // Cut short, it has seen less of the matrix than those before it.
+            self.spectrum.assume(known);
+        }
         solved
     }
 

@@ -246,6 +246,7 @@ impl Substep<'_> {
         implicit.report.iterations += products;
         implicit.left = implicit.left.saturating_sub(products);
         implicit.report.has_converged &= is_solved;
+        self.bound_tool_forces(body, implicit, error);
         let error = (error / all_inertia).sqrt() as f32;
         implicit.report.error = implicit.report.error.max(error);
         square.is_finite()

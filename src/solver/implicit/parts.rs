@@ -44,7 +44,8 @@ pub(in crate::solver) fn run(
             parts = short;
         }
         implicit.grant(substeps.saturating_mul(parts));
-        let mut cuts = 0;
+        let is_bounded = implicit.is_bounded();
+        let (mut cuts, mut is_final) = (0, false);
         loop {
             if is_near && short > 1 && parts >= short && substeps * short > request.most_parts() {
                 body.implicit = Some(implicit);
@@ -54,12 +55,21 @@ pub(in crate::solver) fn run(
             }
             let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
             // What a small budget does not solve in so many parts it does not solve in more.
-            let is_spent = is_near && cuts > 0 && whole[0] / 4 > implicit.budget;
-            let is_last_resort = cuts == CUTS || whole[0].saturating_mul(4) > PARTS || is_spent;
+            let is_spent = is_near && cuts > 0 && whole[0] / 4 > implicit.budget.min(implicit.allowed);
+            let is_last_resort = is_final || cuts == CUTS || whole[0].saturating_mul(4) > PARTS || is_spent;
             let may_be_shorter = is_long && parts < short && contact::is_near(body);
-            end = run_in_parts(body, &mut implicit, request, whole, is_last_resort, team);
+            let resorts = [is_last_resort, is_final || is_bounded && is_near];
+            end = run_in_parts(body, &mut implicit, request, whole, resorts, team);
             match end {
                 End::Fine => break,
+                _ if is_final => break,
+                // A caller that bounds the work of a step has it taken twice at most.
+                _ if is_bounded => {
+                    (is_final, is_near) = (true, true);
+                    parts = if is_long { parts } else { parts.max(short) };
+                    implicit.left = implicit.allowed;
+                    implicit.grant(substeps.saturating_mul(parts));
+                }
                 // Then there was nothing near before, and the equation knew of nothing.
                 End::Near if is_long && !is_near => is_near = true,
                 End::Near => {
@@ -116,13 +126,13 @@ fn run_in_parts(
     implicit: &mut Implicit,
     request: &StepRequest,
     [substeps, middle]: [u32; 2],
-    is_last_resort: bool,
+    resorts: [bool; 2],
     team: &Team,
 ) -> End {
     begin(body, request);
     implicit.begin();
     for index in 0..substeps {
-        let end = take_part(body, implicit, request, [index, substeps], is_last_resort, team);
+        let end = take_part(body, implicit, request, [index, substeps], resorts, team);
         if end != End::Fine {
             return end;
         }
@@ -142,7 +152,7 @@ fn take_part(
     implicit: &mut Implicit,
     request: &StepRequest,
     [index, substeps]: [u32; 2],
-    is_last_resort: bool,
+    [is_last_resort, stands]: [bool; 2],
     team: &Team,
 ) -> End {
     let step = f64::from(request.dt) / f64::from(substeps);
@@ -154,6 +164,7 @@ fn take_part(
         end: f64::from(index + 1) / f64::from(substeps),
         is_first: index == 0,
         equations: substeps - index,
+        stands,
         formula: Formula::new(order, step, f64::from(implicit.last(index == 0).step)),
         team,
     };
@@ -209,7 +220,7 @@ pub(crate) fn next_part(
     let Some(mut implicit) = body.implicit.take() else {
         return true;
     };
-    let end = take_part(body, &mut implicit, request, part_of, is_last_resort, team);
+    let end = take_part(body, &mut implicit, request, part_of, [is_last_resort, false], team);
     body.implicit = Some(implicit);
     end == End::Fine
 }

@@ -63,6 +63,8 @@ pub(super) struct Substep<'a> {
     pub is_first: bool,
     /// With those that come after it in the step.
     pub(super) equations: u32,
+    /// Whether it stands whatever it did not foresee of contacts.
+    pub(super) stands: bool,
     pub(super) formula: Formula,
     pub team: &'a Team<'a>,
 }

@@ -1,0 +1,143 @@
+//! Steps that are to end in time while other work keeps every core busy, and how far from their solution they stop.
+//!
+//! The processor is shared with as many idle loops as it has cores. The wall's time of a step then says how the system schedules, the thread's own time what the step
+//! does; both are counted. Now and then a saved copy of the world takes the same step with work enough for its equation.
+
+use std::fmt::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::Vec3;
+use sinew::mesh::Mesh;
+use sinew::{Model, Solver, World};
+
+use super::{FRAME, Scene, Times, clock};
+
+/// How much later than asked for a step is to be counted as late.
+const LATE: f64 = 1.05;
+
+/// How many steps are compared with their solutions.
+const COMPARED: u32 = 50;
+
+/// The work with which a step of one equation is solved.
+const ENOUGH: u32 = 160;
+
+/// Steps until the pace is known and the ball is in contact.
+const FIRST: u32 = 60;
+
+/// How often an error is no larger than its bound, and how many times as large the bound is.
+#[derive(Default)]
+struct Bounds {
+    covered: u32,
+    ratios: Vec<f64>,
+}
+
+impl Bounds {
+    fn take(&mut self, bound: f64, error: f64) {
+        self.covered += u32::from(bound >= error);
+        self.ratios.push(bound / error.max(f64::MIN_POSITIVE));
+    }
+
+    fn cells(&self) -> String {
+        if self.ratios.is_empty() {
+            return "- | -".into();
+        }
+        let covered = 100.0 * f64::from(self.covered) / self.ratios.len() as f64;
+        format!("{covered:.1} | {:.1}", Times(self.ratios.clone()).quantile(0.5))
+    }
+}
+
+/// What a step left: where nodes are and what the ball feels.
+fn state(scene: &Scene, world: &World) -> (Vec<Vec3>, Vec3) {
+    let positions = world.body(scene.body).expect("the body").positions().to_vec();
+    (positions, world.wrench(scene.ball).expect("the ball").0)
+}
+
+pub fn run(report: &mut String, mesh: &Mesh, steps: u32) {
+    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
+    let _ = writeln!(
+        report,
+        "## Steps with a deadline\n\n{} nodes, {} tetrahedra, {steps} steps of 1/60 s each, one thread beside {cores} that never rest. Late: more than 5 % after the \
+         deadline, by the wall's clock and by the thread's own. Error: of {COMPARED} steps, against the same step with its equation solved.\n\n\
+         | body | deadline, ms | wall, of the deadline: p50 | p99 | p99.9 | most | late, % | late by own time, % | behind at most, s | error in position within \
+         its bound, % | bound over error, median | in the ball's force, % | median |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+        mesh.positions.len(),
+        mesh.tetrahedra.len(),
+    );
+    let is_over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        for _ in 0..cores {
+            scope.spawn(|| {
+                while !is_over.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            });
+        }
+        for (name, tissue) in [
+            ("springs, VERLET", (Model::Springs, Solver::Verlet, 0.0)),
+            ("springs, IMPLICIT", (Model::Springs, Solver::Implicit, 0.0)),
+            ("tetrahedra, IMPLICIT", (Model::Tetrahedra, Solver::Implicit, 0.0)),
+        ] {
+            for deadline in [2e-3, 8e-3] {
+                row(report, Scene::new(mesh, tissue, 1), steps, deadline, name);
+            }
+        }
+        is_over.store(true, Ordering::Relaxed);
+    });
+    report.push('\n');
+}
+
+fn row(report: &mut String, mut scene: Scene, steps: u32, deadline: f64, name: &str) {
+    let (mut walls, mut late, mut own, mut behind) = (Vec::new(), 0, 0, 0.0_f64);
+    let (mut in_place, mut in_force) = (Bounds::default(), Bounds::default());
+    for step in 0..FIRST + steps {
+        let place = Scene::place(scene.touch, (step + 1) as f32 * FRAME);
+        let is_compared = step >= FIRST && step % (steps / COMPARED).max(1) == 0;
+        let saved = is_compared.then(|| scene.world.save().expect("a snapshot"));
+        scene.world.set_pose(scene.ball, place, None).expect("a pose");
+        let mut done = None;
+        let took = clock::time(|| done = Some(scene.world.step_within(FRAME, deadline).expect("a step")));
+        let done = done.expect("a step");
+        if step < FIRST {
+            continue;
+        }
+        walls.push(took.wall / deadline);
+        late += u32::from(took.wall > LATE * deadline);
+        own += u32::from(took.processor > LATE * deadline);
+        behind = behind.max(done.lag);
+        if let Some(saved) = saved
+            && done.lag == 0.0
+            && done.error > 0.0
+        {
+            let mut solved = World::load(&saved, 1, None).expect("a world");
+            solved.set_pose(scene.ball, place, None).expect("a pose");
+            solved.step_with_budget(FRAME, ENOUGH).expect("a step");
+            let ((places, force), (right, right_force)) = (state(&scene, &scene.world), state(&scene, &solved));
+            let body = scene.world.body(scene.body).expect("the body");
+            let [mut sum, mut all] = [0.0; 2];
+            for (node, (place, right)) in (0..).zip(places.iter().zip(&right)) {
+                let mass = f64::from(body.node_mass(node).expect("a node"));
+                sum += mass * f64::from(place.distance_squared(*right));
+                all += mass;
+            }
+            let error = (sum / all).sqrt();
+            in_place.take(f64::from(done.error), error);
+            in_force.take(
+                f64::from(scene.world.force_error(scene.ball).expect("the ball")),
+                f64::from(force.distance(right_force)),
+            );
+        }
+    }
+    let part = |count: u32| 100.0 * f64::from(count) / f64::from(steps);
+    let line = format!(
+        "| {name} | {:.0} | {} | {:.3} | {:.3} | {behind:.3} | {} | {} |",
+        1e3 * deadline,
+        Times(walls).row(),
+        part(late),
+        part(own),
+        in_place.cells(),
+        in_force.cells(),
+    );
+    eprintln!("{line}");
+    report.push_str(&line);
+    report.push('\n');
+}
