@@ -291,6 +291,10 @@ public:
     sinew::wrench out{};
     return check(sinew_tool_get_wrench(world(), id, out.force.data(), out.torque.data())), out;
   }
+  float force_error() const { // N
+    float out = 0;
+    return check(sinew_tool_get_force_error(world(), id, &out)), out;
+  }
   std::size_t contacts(span<sinew_contact> into) const { // how many there are
     std::size_t count = 0;
     return check(sinew_tool_get_contacts(world(), id, into.data(), into.size(), &count)), count;

@@ -48,11 +48,13 @@ pub struct BudgetReport {
     pub step: StepReport,
     /// The units of work that were allowed: [`World::step_with_budget`] with as many does the same.
     pub work: u32,
-    /// Those that the step that was taken has done, by the body that did most.
+    /// Those that the step that was taken has done, by the body that did most. IMPLICIT may do twice as many as are allowed where something first
+    /// comes near a tool, and one for each millisecond in a grasp and near other tissue.
     pub work_done: u32,
     /// How long the world lags behind the sum of the steps, s.
     pub lag: f64,
-    /// How far nodes may be from where the equations of the step have them, m: the largest of all bodies, 0 for those of VERLET.
+    /// How far nodes may be from where the equations of the step have them, m: root mean square by mass, the largest of all bodies, 0 for those of
+    /// VERLET. [`World::force_error`] tells what that means for a tool.
     pub error: f32,
 }
 
