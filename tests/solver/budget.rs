@@ -152,13 +152,14 @@ fn contact_holds_however_little_work_is_allowed() {
     }
 }
 
-/// Each step beside the same one with work enough for its equation.
+/// Each step beside the same one with more work: two that are off by no more than they say differ by no more than both.
 #[test]
 fn work_beside_a_tool_is_bounded_and_its_force_is_within_its_error() {
     const RADIUS: f32 = 0.02;
-    const ENOUGH: u32 = 160;
+    /// The most that is spent on one equation.
+    const MOST: u32 = 39;
     let (mut compared, mut covered) = (0, 0);
-    for work in [3, 10, 40] {
+    for work in [3, 6, 12] {
         let mut parts = block();
         let highest = parts.positions.iter().fold(Vec3::MIN, |high, place| high.max(*place));
         for (mass, place) in parts.masses.iter_mut().zip(&parts.positions) {
@@ -194,20 +195,12 @@ fn work_beside_a_tool_is_bounded_and_its_force_is_within_its_error() {
             assert!(nearest > -5e-4, "work {work}, frame {frame}: {nearest} m");
             let mut solved = World::load(&saved, 1, None).expect("a world");
             solved.set_pose(ball, place, None).expect("a pose");
-            solved.step_with_budget(DT, ENOUGH).expect("a step");
+            solved.step_with_budget(DT, MOST).expect("a step");
             let force = |world: &World| world.wrench(ball).expect("the ball").0;
             let off = force(&scene.world).distance(force(&solved));
             let error = |world: &World| world.force_error(ball).expect("the ball");
             compared += 1;
             covered += u32::from(off <= error(&scene.world) + error(&solved));
-            if off > error(&scene.world) + error(&solved) {
-                eprintln!(
-                    "work {work} frame {frame}: off {off} of {} +- {} +- {}",
-                    force(&solved),
-                    error(&scene.world),
-                    error(&solved)
-                );
-            }
         }
     }
     assert!(

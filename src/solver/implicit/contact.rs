@@ -25,7 +25,7 @@ pub(super) const LONGEST: f64 = 1e-3;
 const SMALL: u32 = 256;
 
 /// What a part of a step costs beside its products, in products.
-const COST_OF_A_PART: u32 = 10;
+pub(super) const COST_OF_A_PART: u32 = 10;
 
 /// Whether a part longer than that may be tried. What comes near on the way ends up to some micrometres inside, so a budget that is enough
 /// for short parts is used for them, unless the caller allows less work than those take.

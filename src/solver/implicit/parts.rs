@@ -40,11 +40,17 @@ pub(in crate::solver) fn run(
         let short = short.min(f64::from(u32::MAX / 4 / substeps)) as u32;
         let mut is_near = contact::is_near(body);
         let is_long = contact::may_be_long(body, &implicit, request);
-        if is_near && !is_long {
-            parts = short;
+        let is_bounded = implicit.is_bounded();
+        let parts_near = match (is_long, is_bounded) {
+            (false, _) => short,
+            (true, false) => 1,
+            // Half of the work for the parts, half for their products.
+            (true, true) => (implicit.allowed / (2 * contact::COST_OF_A_PART)).clamp(1, short),
+        };
+        if is_near {
+            parts = parts_near;
         }
         implicit.grant(substeps.saturating_mul(parts));
-        let is_bounded = implicit.is_bounded();
         let (mut cuts, mut is_final) = (0, false);
         loop {
             if is_near && short > 1 && parts >= short && substeps * short > request.most_parts() {
@@ -66,7 +72,7 @@ pub(in crate::solver) fn run(
                 // A caller that bounds the work of a step has it taken twice at most.
                 _ if is_bounded => {
                     (is_final, is_near) = (true, true);
-                    parts = if is_long { parts } else { parts.max(short) };
+                    parts = parts.max(parts_near);
                     implicit.left = implicit.allowed;
                     implicit.grant(substeps.saturating_mul(parts));
                 }
