@@ -68,9 +68,9 @@ pub(in crate::solver) fn run(
             end = run_in_parts(body, &mut implicit, request, whole, resorts, team);
             match end {
                 End::Fine => break,
-                _ if is_final => break,
-                // A caller that bounds the work of a step has it taken twice at most.
-                _ if is_bounded => {
+                End::Near | End::Gained if is_final => break,
+                // A caller that bounds the work of a step has it taken twice, or more often where it would be refused else.
+                _ if is_bounded && !is_final => {
                     (is_final, is_near) = (true, true);
                     parts = parts.max(parts_near);
                     implicit.left = implicit.allowed;
