@@ -374,7 +374,7 @@ impl Contacts {
     }
 
     /// The same of each contact, with the tool's place in the step.
-    fn given_beyond(&self, substep: f64) -> impl Iterator<Item = (usize, f64, f64)> {
+    pub(super) fn given_beyond(&self, substep: f64) -> impl Iterator<Item = (usize, f64, f64)> {
         let of_features = self.constraints.iter().enumerate().map(move |(index, constraint)| {
             let given = constraint.given().as_dvec3();
             let held = if index < self.holds.len() {
@@ -389,15 +389,6 @@ impl Contacts {
             (contact.tool, given, given)
         });
         of_features.chain(of_nodes)
-    }
-
-    /// Takes up as an error of the forces on tools what contacts gave after the equation of a long substep of so many seconds: tissue did not know of it.
-    pub fn take_beyond_holds(&mut self, substep: f64) {
-        let mut loads = std::mem::take(&mut self.loads);
-        for (tool, beyond, _) in self.given_beyond(substep) {
-            loads[tool].force_error += beyond / substep;
-        }
-        self.loads = loads;
     }
 
     /// Makes what tools received in a long substep of so many seconds the mean over it: an equation knows the forces at its end, and those at
@@ -416,33 +407,6 @@ impl Contacts {
         });
         for (index, constraint) in constraints.iter().enumerate().take(holds.len()) {
             loads[constraint.tool].add(holds.force(index) * (0.5 * substep), constraint.arm);
-        }
-    }
-
-    /// Takes up by how much an equation has the force on each tool off, at most, where it is off by this in the squared norm of its matrix, J. The
-    /// nodes at a tool, moved as one, are held by no more than the sum k of their stiffnesses, so that the force is off by at most `sqrt(k square)`
-    /// (Cauchy and Schwarz); beside that contacts may lack some of their multipliers. The stiffness of nodes that a tool holds, N/m, is that of its place in the world.
-    pub fn bound_force_errors(
-        &mut self,
-        tools: &[ToolPath],
-        square: f64,
-        push_of: impl Fn(usize) -> DVec3,
-        stiffness_held: impl Fn(usize) -> f64,
-    ) {
-        let Self {
-            holds,
-            constraints,
-            loads,
-            ..
-        } = self;
-        for (place, (tool, load)) in tools.iter().zip(loads).enumerate() {
-            let of_tool = |&(index, _): &(usize, _)| constraints[index].tool == place;
-            let (mut stiffness, mut missing) = (stiffness_held(tool.slot), 0.0);
-            for (index, hold) in holds.pressing().filter(of_tool) {
-                stiffness += hold.resistance(constraints[index].firmness);
-                missing += hold.missing(&push_of).abs();
-            }
-            load.force_error = load.force_error.max((stiffness * square).sqrt() + missing);
         }
     }
 
@@ -484,14 +448,6 @@ impl Contacts {
         let over = (meeting.substep, meeting.bindings, drags);
         self.holds.begin(&self.constraints, slot, over, stiffness_of, way);
         true
-    }
-
-    /// Forgets the contacts of an equation that leads nowhere: what it had tools feel may be all wrong.
-    pub fn forget_holds(&mut self) {
-        for (index, _) in self.holds.pressing() {
-            self.loads[self.constraints[index].tool].force_error += self.holds.force(index).length();
-        }
-        self.holds.clear();
     }
 
     /// Forgets the contacts of an equation that is to stand, where nodes go further than those can tell.

@@ -14,6 +14,7 @@ mod driven;
 mod edges;
 pub(crate) mod exact;
 mod features;
+mod force_errors;
 mod gauge;
 mod grip;
 mod hold;
