@@ -10,6 +10,10 @@ check:
 test *ARGS:
     cargo test {{ARGS}}
 
+# The unit tests in src, for which the library is compiled once more.
+unit *ARGS:
+    cargo test --lib {{ARGS}}
+
 # The long tests alone.
 long *ARGS:
     cargo test {{ARGS}} -- --ignored

@@ -76,15 +76,6 @@ impl Sum<'_> {
             cavities.add(tile, changes);
         }
     }
-
-    /// Without terms and cavities.
-    pub fn of_springs_and_elements(self) -> Self {
-        Self {
-            terms: None,
-            cavities: None,
-            ..self
-        }
-    }
 }
 
 impl Forces {

@@ -488,8 +488,7 @@ impl System {
         let mut forces = TileForces::ZERO;
         let velocities = self.forces.springs.damped().then(|| self.state.velocities());
         let motion = Motion::at(self.state.positions(), velocities);
-        let sum = self.forces.sum().of_springs_and_elements();
-        sum.write(tile, nodes.clone(), &motion, &mut forces);
+        self.forces.sum().write(tile, nodes.clone(), &motion, &mut forces);
         let (mut largest, mut sum, mut count) = (0.0_f32, Vec3::ZERO, 0.0);
         for (place, node) in nodes.enumerate() {
             let inverse_mass = self.inverse_masses[node];

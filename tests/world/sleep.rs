@@ -382,6 +382,36 @@ fn every_solver_storage_and_model_sleeps() {
     }
 }
 
+/// Home springs and the pressure inside balance gravity and springs: they are among the forces that are asked for before it sleeps.
+#[test]
+fn what_home_springs_and_pressure_hold_up_sleeps() {
+    type Change = fn(&mut BodyDefinition);
+    let changes: [(&str, Change); 2] = [
+        ("home springs", |definition| {
+            definition.home_stiffnesses = Values::Uniform(5.0)
+        }),
+        ("pressure", |definition| definition.pressure = 200.0),
+    ];
+    for (name, change) in changes {
+        let [mut asleep, mut awake, plain] =
+            [(SLEEP, change), (AWAKE, change), (AWAKE, |_| ())].map(|(sleep, change)| {
+                let mut slab = slab_of(8, sleep, 1, |definition| {
+                    definition.node_dampings = Values::Uniform(0.05);
+                    change(definition);
+                });
+                slab.run(2.0);
+                slab
+            });
+        assert_eq!(asleep.awake(), 0.0, "{name}");
+        assert!(awake.apart(&plain) > 10.0 * FAR, "{name} does nothing");
+        for slab in [&mut asleep, &mut awake] {
+            slab.run(0.5);
+        }
+        let apart = asleep.apart(&awake);
+        assert!(apart <= FAR, "{name}: {apart} m apart");
+    }
+}
+
 /// Falling asleep and waking a thousand times changes neither where it rests nor its energy.
 #[test]
 fn a_thousand_sleeps_lead_nowhere() {

@@ -71,7 +71,8 @@ pub(in crate::solver) fn run(
                 End::Near | End::Gained if is_final => break,
                 // A caller that bounds the work of a step has it taken twice, or more often where it would be refused else.
                 _ if is_bounded && !is_final => {
-                    (is_final, is_near) = (true, true);
+                    is_final = true;
+                    is_near |= end == End::Near;
                     parts = parts.max(parts_near);
                     implicit.left = implicit.allowed;
                     implicit.grant(substeps.saturating_mul(parts));
