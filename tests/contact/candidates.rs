@@ -1,5 +1,7 @@
 //! What is near a tool is remembered from substep to substep; results must not tell how.
 
+use std::ops::Range;
+
 use crate::support::solid::cuboid;
 use crate::support::tissue::*;
 use glam::{Quat, Vec3};
@@ -107,16 +109,29 @@ fn a_tool_inside_a_body_is_found_however_far_it_pushes() {
 
 #[test]
 fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps() {
+    a_step_to_a_tolerance_is_the_step_of_so_many_substeps_of(0..15);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps_in_other_shots() {
+    a_step_to_a_tolerance_is_the_step_of_so_many_substeps_of(15..60);
+}
+
+fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps_of(shots: Range<u32>) {
     // Bullets fly past and against a needle: the coarse steps see them beyond it, the last must see them before it.
     let mut random = Random::new(6);
     let mut met = 0;
-    for shot in 0..60 {
+    for shot in 0..shots.end {
         let start = Vec3::new(
             random.between(-0.05, 0.05),
             random.between(0.02, 0.15),
             random.between(-0.004, 0.004),
         );
         let velocity = Vec3::new(random.between(-3.0, 3.0), -10.0, random.between(-0.3, 0.3));
+        if !shots.contains(&shot) {
+            continue;
+        }
         let run = |substeps: u32, tolerance: f32| {
             let mut world = World::new(WorldDefinition {
                 gravity: DOWN,
@@ -161,7 +176,7 @@ fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps() {
             report.substeps
         );
     }
-    assert!(met > 5, "only {met} shots met the needle");
+    assert!(met > shots.len() as u32 / 12, "only {met} shots met the needle");
 }
 
 #[test]
@@ -226,6 +241,7 @@ fn another_tool_in_the_place_of_one_is_felt() {
         world
             .create_tool(&ToolDefinition {
                 detection,
+                resolution: if detection == Detection::Exact { 0.0 } else { 2e-3 },
                 pose: Pose {
                     position: Vec3::Y * 0.045,
                     ..Pose::IDENTITY

@@ -125,10 +125,11 @@ fn put(world: &mut World, mesh: &Mesh, solver: Solver) -> BodyId {
         .expect("a body")
 }
 
-fn nothing_passes_and_all_comes_to_rest(solver: Solver) {
+fn nothing_passes_and_all_comes_to_rest(solver: Solver, is_tried: fn(usize) -> bool) {
     // What falls has about so much to lose, J.
     const MOST: f64 = 2.0;
-    for (name, ground, falls, place, velocity) in cases() {
+    let scenes = cases().into_iter().enumerate().filter(|scene| is_tried(scene.0));
+    for (_, (name, ground, falls, place, velocity)) in scenes {
         let mut world = world(DOWN);
         tool(&mut world, Shape::Plane, 0.5, Vec3::ZERO, Quat::IDENTITY);
         let held = nodes_at(&ground, |at| at.y < 0.01);
@@ -162,11 +163,17 @@ fn nothing_passes_and_all_comes_to_rest(solver: Solver) {
 
 #[test]
 fn nothing_passes_and_all_comes_to_rest_in_degenerate_scenes() {
-    nothing_passes_and_all_comes_to_rest(Solver::Verlet);
+    nothing_passes_and_all_comes_to_rest(Solver::Verlet, |scene| scene % 3 == 1);
+}
+
+#[test]
+#[ignore = "long"]
+fn nothing_passes_and_all_comes_to_rest_in_other_degenerate_scenes() {
+    nothing_passes_and_all_comes_to_rest(Solver::Verlet, |scene| scene % 3 != 1);
 }
 
 #[test]
 #[ignore = "long"]
 fn nothing_passes_and_all_comes_to_rest_in_degenerate_scenes_of_implicit() {
-    nothing_passes_and_all_comes_to_rest(Solver::Implicit);
+    nothing_passes_and_all_comes_to_rest(Solver::Implicit, |_| true);
 }

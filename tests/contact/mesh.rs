@@ -129,6 +129,11 @@ fn drape(detection: Detection, solver: Solver, cells: u32) {
 #[test]
 fn a_cloth_lies_on_an_organ_found_exactly() {
     drape(Detection::Exact, Solver::Verlet, 16);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_cloth_of_implicit_lies_on_an_organ() {
     drape(Detection::Exact, Solver::Implicit, 12);
 }
 

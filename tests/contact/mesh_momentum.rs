@@ -55,7 +55,7 @@ impl Thrown {
             let pose = Pose { position, orientation };
             let tool = ToolDefinition {
                 detection: setup.detection,
-                resolution: if setup.detection == Detection::Exact { 0.0 } else { 1e-3 },
+                resolution: if setup.detection == Detection::Exact { 0.0 } else { 2e-3 },
                 friction: setup.friction,
                 pose,
                 ..ToolDefinition::new(Shape::Mesh {
@@ -143,16 +143,33 @@ impl Thrown {
 
 #[test]
 fn a_block_at_rest_presses_with_its_weight() {
+    a_block_at_rest_presses_with_its_weight_of(|detection, solver| {
+        detection == Detection::Exact || solver == Solver::Verlet
+    });
+}
+
+#[test]
+#[ignore = "long"]
+fn a_block_at_rest_presses_with_its_weight_in_the_other_cases() {
+    a_block_at_rest_presses_with_its_weight_of(|detection, solver| {
+        detection != Detection::Exact && solver != Solver::Verlet
+    });
+}
+
+fn a_block_at_rest_presses_with_its_weight_of(is_tried: fn(Detection, Solver) -> bool) {
     let mesh = Mesh::block([0.04, 0.02, 0.04], [3, 2, 3]).expect("a block");
     let table = Mesh::block([0.1, 0.03, 0.1], [1, 1, 1]).expect("a block");
     let node_mass = MASS / mesh.positions.len() as f32;
     let applied = Vec3::new(0.1, -0.4, 0.2);
     for detection in WAYS {
-        for solver in [Solver::Verlet, Solver::Implicit] {
+        for solver in [Solver::Verlet, Solver::Implicit]
+            .into_iter()
+            .filter(|&solver| is_tried(detection, solver))
+        {
             let mut world = world(GRAVITY * Vec3::Y);
             let tool = ToolDefinition {
                 detection,
-                resolution: if detection == Detection::Exact { 0.0 } else { 1e-3 },
+                resolution: if detection == Detection::Exact { 0.0 } else { 2e-3 },
                 friction: 0.6,
                 ..ToolDefinition::new(Shape::Mesh {
                     positions: &table.positions,
@@ -235,9 +252,26 @@ fn unbalanced(setup: Setup, dt: f32) -> (f64, usize) {
 
 #[test]
 fn the_momentum_meshes_give_is_the_momentum_that_arrives() {
+    the_momentum_meshes_give_is_the_momentum_that_arrives_of(|detection, solver| {
+        (detection == Detection::Exact) == (solver == Solver::Verlet)
+    });
+}
+
+#[test]
+#[ignore = "long"]
+fn the_momentum_meshes_give_is_the_momentum_that_arrives_in_the_other_cases() {
+    the_momentum_meshes_give_is_the_momentum_that_arrives_of(|detection, solver| {
+        (detection == Detection::Exact) != (solver == Solver::Verlet)
+    });
+}
+
+fn the_momentum_meshes_give_is_the_momentum_that_arrives_of(is_tried: fn(Detection, Solver) -> bool) {
     let mut failures = Vec::new();
     for detection in WAYS {
         for (solver, order) in [(Solver::Verlet, 0), (Solver::Implicit, 1), (Solver::Implicit, 2)] {
+            if !is_tried(detection, solver) {
+                continue;
+            }
             for (friction, drag, pinned) in [(0.0, 0.0, false), (0.6, 0.1, false), (0.6, 0.0, true)] {
                 for dt in [0.001, 1.0 / 60.0] {
                     // The rest adds little but time: near tools both orders are one.

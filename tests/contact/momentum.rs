@@ -126,9 +126,19 @@ fn the_momentum_a_tool_gives_is_the_momentum_that_arrives() {
 
 #[test]
 fn the_angular_momentum_a_tool_gives_arrives_up_to_the_motion_of_a_substep() {
+    the_angular_momentum_a_tool_gives_arrives_up_to_the_motion_of_a_substep_of(|visit| visit % 4 == 1);
+}
+
+#[test]
+#[ignore = "long"]
+fn the_angular_momentum_a_tool_gives_arrives_up_to_the_motion_of_a_substep_in_other_visits() {
+    the_angular_momentum_a_tool_gives_arrives_up_to_the_motion_of_a_substep_of(|visit| visit % 4 != 1);
+}
+
+fn the_angular_momentum_a_tool_gives_arrives_up_to_the_motion_of_a_substep_of(is_tried: fn(usize) -> bool) {
     // A contact acts where the node is at the beginning or at the end of a substep, which moves the arm by about the
     // speed times the substep: of first order, so that a tenth of the substep leaves a tenth of the error.
-    for (index, visit) in visits().iter().enumerate() {
+    for (index, visit) in visits().iter().enumerate().filter(|visit| is_tried(visit.0)) {
         let (_, coarse, _) = errors(visit, 0.001, 1);
         let (_, fine, _) = errors(visit, 0.0001, 1);
         // Nothing is faster than 2 m/s: the arm is off by less than 2 mm, and by less than 0.2 mm.

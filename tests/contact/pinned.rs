@@ -136,10 +136,20 @@ fn it_pushes_back_out_by_the_side_on_which_a_tool_came() {
 
 #[test]
 fn a_tool_of_limited_force_stops_at_it() {
+    a_tool_of_limited_force_stops_at_it_of(|solver, speed| solver == Solver::Verlet || speed < 1.0);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_tool_of_limited_force_stops_at_it_in_the_other_cases() {
+    a_tool_of_limited_force_stops_at_it_of(|solver, speed| solver != Solver::Verlet && speed > 1.0);
+}
+
+fn a_tool_of_limited_force_stops_at_it_of(is_tried: fn(Solver, f32) -> bool) {
     let limit = 1.0;
     for solver in SOLVERS {
         // What is fast would be beyond the sheet within a step.
-        for speed in [0.6, 60.0_f32] {
+        for speed in [0.6, 60.0_f32].into_iter().filter(|&speed| is_tried(solver, speed)) {
             let case = format!("{solver:?}, {speed} m/s");
             let shape = Shape::Sphere { radius: 0.04 };
             let (mut world, _, tool) = scene(solver, shape, (Vec3::Y * 0.3, Quat::IDENTITY), limit);

@@ -65,6 +65,16 @@ fn stop(tip: &Tip, solver: Solver, tissue: &Mesh, thickness: f32, gap: f32, subs
 
 #[test]
 fn what_a_tool_stops_short_of_stays_at_rest() {
+    what_a_tool_stops_short_of_stays_at_rest_of(|tip, solver| (tip % 2 == 0) == (solver == Solver::Verlet));
+}
+
+#[test]
+#[ignore = "long"]
+fn what_a_tool_stops_short_of_stays_at_rest_in_the_other_cases() {
+    what_a_tool_stops_short_of_stays_at_rest_of(|tip, solver| (tip % 2 == 0) != (solver == Solver::Verlet));
+}
+
+fn what_a_tool_stops_short_of_stays_at_rest_of(is_tried: fn(usize, Solver) -> bool) {
     let round = ball(0.02, 2);
     let lowest = round.positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
     let block = Mesh::block([0.03, 0.02, 0.04], [1, 1, 1]).expect("a block");
@@ -116,8 +126,11 @@ fn what_a_tool_stops_short_of_stays_at_rest() {
     };
     let cloth = square(0.25, 4);
     let mut failures = Vec::new();
-    for tip in &tips {
-        for solver in [Solver::Verlet, Solver::Implicit] {
+    for (number, tip) in tips.iter().enumerate() {
+        for solver in [Solver::Verlet, Solver::Implicit]
+            .into_iter()
+            .filter(|&solver| is_tried(number, solver))
+        {
             for (substeps, dt) in [(1, 1e-3), (7, 1e-3), (1, 1.0 / 60.0), (0, 1.0 / 60.0)] {
                 for (what, tissue) in [("node", &node), ("cloth", &cloth)] {
                     for thickness in [0.0, 1e-3] {

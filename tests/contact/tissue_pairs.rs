@@ -116,13 +116,24 @@ fn inside(world: &World, of: BodyId, mesh: &Mesh, other: BodyId) -> usize {
 
 #[test]
 fn two_blocks_that_meet_keep_their_momentum_and_part_again() {
-    for (left_solver, right_solver, detection) in [
+    two_blocks_that_meet_keep_their_momentum_and_part_again_of(&[
         (Solver::Verlet, Solver::Verlet, Detection::Exact),
+        (Solver::Implicit, Solver::Verlet, Detection::ImageSpace),
+    ]);
+}
+
+#[test]
+#[ignore = "long"]
+fn two_blocks_that_meet_keep_their_momentum_and_part_again_in_the_other_cases() {
+    two_blocks_that_meet_keep_their_momentum_and_part_again_of(&[
         (Solver::Implicit, Solver::Implicit, Detection::Exact),
         (Solver::Verlet, Solver::Implicit, Detection::Exact),
         (Solver::Verlet, Solver::Verlet, Detection::ImageSpace),
-        (Solver::Implicit, Solver::Verlet, Detection::ImageSpace),
-    ] {
+    ]);
+}
+
+fn two_blocks_that_meet_keep_their_momentum_and_part_again_of(cases: &[(Solver, Solver, Detection)]) {
+    for &(left_solver, right_solver, detection) in cases {
         // One of two asks for it.
         let contacts = [CONTACT, BodyContact { detection, ..CONTACT }];
         let mut world = world(Vec3::ZERO);

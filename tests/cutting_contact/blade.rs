@@ -349,17 +349,17 @@ fn tissue_without_toughness_is_cut_where_a_sweep_would_cut_it() {
 
 #[test]
 fn whatever_is_asked_of_it_stays_finite() {
-    whatever_is_asked_of_it_stays_finite_of(|step| step < 0.05);
+    whatever_is_asked_of_it_stays_finite_of(|step, solver| step < 0.05 && solver == Solver::Verlet);
 }
 
 #[test]
 #[ignore = "long"]
 fn whatever_is_asked_of_it_stays_finite_in_long_steps() {
-    whatever_is_asked_of_it_stays_finite_of(|step| step >= 0.05);
+    whatever_is_asked_of_it_stays_finite_of(|step, solver| step >= 0.05 || solver != Solver::Verlet);
 }
 
-/// With these steps, s; long ones take long.
-fn whatever_is_asked_of_it_stays_finite_of(is_tried: fn(f32) -> bool) {
+/// With these steps, s, and solvers; long ones take long.
+fn whatever_is_asked_of_it_stays_finite_of(is_tried: fn(f32, Solver) -> bool) {
     for (stiffness, dt, stride, mass, solver) in [
         (1e9, 1e-3, 1e-3, 1.0, Solver::Verlet),
         (1e9, 0.1, 1.0, 1.0, Solver::Verlet),
@@ -371,7 +371,7 @@ fn whatever_is_asked_of_it_stays_finite_of(is_tried: fn(f32) -> bool) {
         (1e38, 1e-3, 0.003, 1.0, Solver::Verlet),
     ]
     .into_iter()
-    .filter(|case| is_tried(case.1))
+    .filter(|case| is_tried(case.1, case.4))
     {
         let sheet = Sheet {
             cells: 8,
