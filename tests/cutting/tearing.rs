@@ -625,15 +625,23 @@ fn pulled_about(smallest_piece: f32, threads: u32, solver: Solver) -> (Vec<f64>,
 
 #[test]
 fn no_piece_is_smaller_than_asked_whatever_pulls() {
+    no_piece_is_smaller_than_asked_whatever_pulls_of(Solver::Verlet);
+}
+
+#[test]
+#[ignore = "long"]
+fn no_piece_is_smaller_than_asked_whatever_pulls_implicit() {
+    no_piece_is_smaller_than_asked_whatever_pulls_of(Solver::Implicit);
+}
+
+fn no_piece_is_smaller_than_asked_whatever_pulls_of(solver: Solver) {
     let least = |areas: &[f64]| areas.iter().copied().fold(f64::INFINITY, f64::min);
-    let (areas, tears, _) = pulled_about(0.0, 1, Solver::Verlet);
+    let (areas, tears, _) = pulled_about(0.0, 1, solver);
     assert!(tears > 50 && areas.len() > 3, "{tears} tears, {areas:?}");
     assert!(least(&areas) < 4e-4, "{areas:?}");
-    for solver in [Solver::Verlet, Solver::Implicit] {
-        let (areas, tears, _) = pulled_about(4e-4, 1, solver);
-        assert!(tears > 50, "{tears} tears");
-        assert!(least(&areas) > 4e-4 * (1.0 - 1e-5), "{areas:?}");
-    }
+    let (areas, tears, _) = pulled_about(4e-4, 1, solver);
+    assert!(tears > 50, "{tears} tears");
+    assert!(least(&areas) > 4e-4 * (1.0 - 1e-5), "{areas:?}");
 }
 
 #[test]

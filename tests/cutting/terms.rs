@@ -80,13 +80,13 @@ const CUTS: [(Vec3, Vec3); 4] = [
 /// Each term with one solver and storage, and each of these with a term.
 #[test]
 fn cuts_in_motion_keep_what_terms_have() {
-    cuts_in_motion_keep_what_terms_have_of(|case| case % 4 == 0);
+    cuts_in_motion_keep_what_terms_have_of(|case| case % 4 == 2);
 }
 
 #[test]
 #[ignore = "long"]
 fn cuts_in_motion_keep_what_terms_have_in_the_other_cases() {
-    cuts_in_motion_keep_what_terms_have_of(|case| case % 4 != 0);
+    cuts_in_motion_keep_what_terms_have_of(|case| case % 4 != 2);
 }
 
 fn cuts_in_motion_keep_what_terms_have_of(is_tried: fn(usize) -> bool) {

@@ -1,6 +1,7 @@
 //! Solids that are cut while they move: what is kept, whatever they are made of, keeps their springs and moves them.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
@@ -172,25 +173,29 @@ pub const CUTS: [[[f32; 2]; 3]; 4] = [
 
 #[test]
 fn cuts_in_motion_keep_mass_momentum_and_energy() {
-    cuts_in_motion_keep_mass_momentum_and_energy_of(is_short);
+    cuts_in_motion_keep_mass_momentum_and_energy_of(|matter, solver, storage| {
+        is_short(matter, solver) && storage == Storage::Packed
+    });
 }
 
 #[test]
 #[ignore = "long"]
 fn cuts_in_motion_keep_mass_momentum_and_energy_in_the_other_cases() {
-    cuts_in_motion_keep_mass_momentum_and_energy_of(|case, storage| !is_short(case, storage));
+    cuts_in_motion_keep_mass_momentum_and_energy_of(|matter, solver, storage| {
+        !is_short(matter, solver) || storage != Storage::Packed
+    });
 }
 
-/// Each matter with a solver, and each solver with a matter.
-fn is_short(case: usize, storage: Storage) -> bool {
-    case.is_multiple_of(3) && storage == Storage::Packed
+/// Each matter with a solver, and each solver with a matter: NEWTON, which takes long, with one.
+fn is_short(matter: usize, solver: Solver) -> bool {
+    solver == SOLVERS[if matter == 1 { 2 } else { matter % 2 }]
 }
 
-fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_tried: fn(usize, Storage) -> bool) {
-    for (number, matter) in (0..).zip(MATTER) {
-        for (case, solver) in (number..).zip(SOLVERS) {
+fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_tried: fn(usize, Solver, Storage) -> bool) {
+    for (number, matter) in MATTER.into_iter().enumerate() {
+        for solver in SOLVERS {
             for storage in [Storage::Packed, Storage::FastLink, Storage::DynamicBulk] {
-                if !is_tried(case, storage) {
+                if !is_tried(number, solver, storage) {
                     continue;
                 }
                 if storage != Storage::Packed && (solver == Solver::Newton || matter == Matter::Elements) {
@@ -310,8 +315,18 @@ fn a_mesh_of_its_own_follows_the_list() {
 
 #[test]
 fn what_is_cut_off_falls_and_what_is_held_stays() {
-    for matter in MATTER {
-        for solver in SOLVERS {
+    what_is_cut_off_falls_and_what_is_held_stays_of(is_short);
+}
+
+#[test]
+#[ignore = "long"]
+fn what_is_cut_off_falls_and_what_is_held_stays_in_the_other_cases() {
+    what_is_cut_off_falls_and_what_is_held_stays_of(|matter, solver| !is_short(matter, solver));
+}
+
+fn what_is_cut_off_falls_and_what_is_held_stays_of(is_tried: fn(usize, Solver) -> bool) {
+    for (number, matter) in MATTER.into_iter().enumerate() {
+        for solver in SOLVERS.into_iter().filter(|&solver| is_tried(number, solver)) {
             let (mut world, body) = made(matter, solver, Storage::Packed, vec3(0.0, -9.81, 0.0));
             let (rest, _) = mesh();
             for node in (0..rest.len()).filter(|&node| rest[node].y > 0.049) {
@@ -375,9 +390,23 @@ fn what_is_cut_off_falls_and_what_is_held_stays() {
 
 #[test]
 fn a_stroke_through_tissue_that_gapes_leaves_no_bridge() {
+    a_stroke_through_tissue_that_gapes_leaves_no_bridge_of(0..8);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_stroke_through_tissue_that_gapes_leaves_no_bridge_in_the_other_rounds() {
+    a_stroke_through_tissue_that_gapes_leaves_no_bridge_of(8..24);
+}
+
+fn a_stroke_through_tissue_that_gapes_leaves_no_bridge_of(rounds: Range<usize>) {
     let (rest, cells) = mesh();
     let mut random = Random(8);
-    for round in 0..24 {
+    for round in 0..rounds.end {
+        let [a, b, lean, bend] = [0; 4].map(|_| random.between(-1.0, 1.0));
+        if !rounds.contains(&round) {
+            continue;
+        }
         let solver = SOLVERS[round % 2];
         let positions: Vec<Vec3> = rest.iter().map(|&place| place * vec3(1.2, 1.0, 1.0)).collect();
         let mut world = World::new(WorldDefinition::default()).unwrap();
@@ -402,7 +431,6 @@ fn a_stroke_through_tissue_that_gapes_leaves_no_bridge() {
         for node in (0..rest.len()).filter(|&node| rest[node].x < 0.001 || rest[node].x > 0.059) {
             world.body_mut(body).unwrap().pin(node as u32).unwrap();
         }
-        let [a, b, lean, bend] = [0; 4].map(|_| random.between(-1.0, 1.0));
         let steps = [15, 40, 90][round % 3];
         let edge = |part: f32| {
             let x = 0.036 + 0.008 * a + 0.008 * b * (2.0 * part - 1.0) + 0.003 * bend * (3.0 * part).sin();
@@ -463,7 +491,7 @@ fn tetrahedra_may_be_turned_either_way() {
 
 #[test]
 fn two_blades_in_one_solid_have_a_stroke_each() {
-    let (mut world, body) = made(Matter::Elements, Solver::Implicit, Storage::Packed, Vec3::ZERO);
+    let (mut world, body) = made(Matter::Elements, Solver::Verlet, Storage::Packed, Vec3::ZERO);
     let it = world.body(body).unwrap();
     // They cross, one after the other.
     let ways = [
@@ -482,10 +510,10 @@ fn two_blades_in_one_solid_have_a_stroke_each() {
         definition.pose.position = middle;
         world.create_blade(&definition).unwrap()
     });
-    for step in 1..=80 {
-        for ((&blade, [start, end]), wait) in blades.iter().zip(&ways).zip([0, 20]) {
+    for step in 1..=40 {
+        for ((&blade, [start, end]), wait) in blades.iter().zip(&ways).zip([0, 10]) {
             let [from, to] = [start, end].map(|edge| 0.5 * (edge[0] + edge[1]));
-            let part = ((step - wait) as f32 / 60.0).clamp(0.0, 1.0);
+            let part = ((step - wait) as f32 / 30.0).clamp(0.0, 1.0);
             world.set_blade_pose(blade, from.lerp(to, part), None).unwrap();
         }
         world.step(2e-3).unwrap();

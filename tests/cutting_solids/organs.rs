@@ -75,13 +75,26 @@ fn assert_parted(what: &str, body: &Body, side: impl Fn(DVec3) -> f64) {
 
 #[test]
 fn planes_part_organs() {
+    planes_part_organs_of(0..1);
+}
+
+#[test]
+#[ignore = "long"]
+fn planes_part_organs_in_the_other_rounds() {
+    planes_part_organs_of(1..6);
+}
+
+fn planes_part_organs_of(rounds: Range<usize>) {
     for (name, mesh) in organs() {
         let mut random = Random(31);
-        for round in 0..6 {
+        for round in 0..rounds.end {
             let turn =
                 Quat::from_rotation_y(random.between(0.0, TAU)) * Quat::from_rotation_x(random.between(0.0, TAU));
             let through = random.point(-0.8, 0.8);
             let at = |x: f32, z: f32| through + turn * vec3(x, 0.0, z);
+            if !rounds.contains(&round) {
+                continue;
+            }
             let mut body = Body::new(mesh.clone(), flat);
             let steps = [1, 7, 40][round % 3];
             let ways: Vec<[Vec3; 2]> = (0..=steps)
@@ -99,9 +112,19 @@ fn planes_part_organs() {
 
 #[test]
 fn curved_strokes_and_loops_part_organs() {
+    curved_strokes_and_loops_part_organs_of(0..1);
+}
+
+#[test]
+#[ignore = "long"]
+fn curved_strokes_and_loops_part_organs_in_the_other_rounds() {
+    curved_strokes_and_loops_part_organs_of(1..4);
+}
+
+fn curved_strokes_and_loops_part_organs_of(rounds: Range<usize>) {
     for (name, mesh) in organs() {
         let mut random = Random(32);
-        for round in 0..4 {
+        for round in 0..rounds.end {
             let turn =
                 Quat::from_rotation_y(random.between(0.0, TAU)) * Quat::from_rotation_x(random.between(0.0, TAU));
             let (middle, radius) = (random.point(-1.0, 1.0), random.between(1.5, 2.5));
@@ -110,6 +133,9 @@ fn curved_strokes_and_loops_part_organs() {
                 .map(|step| (step % steps) as f32 / steps as f32 * TAU)
                 .map(|angle| [-20.0, 20.0].map(|z| middle + turn * vec3(radius * angle.cos(), radius * angle.sin(), z)))
                 .collect();
+            if !rounds.contains(&round) {
+                continue;
+            }
             let mut body = Body::new(mesh.clone(), flat);
             body.cut_along(&ways);
             let what = format!("{name}, round {round}");

@@ -1,6 +1,8 @@
 //! Many cuts at random: nothing breaks, cuts that close part what they should, and what is simulated stays well shaped.
 
-use super::block::{Body, bent, block, far, flat, shaken};
+use std::ops::Range;
+
+use super::block::{Body, Mesh, bent, block, far, flat, shaken};
 use crate::support::change_lists::Follower;
 use crate::support::random::Random;
 use glam::{Vec3, vec3};
@@ -14,9 +16,19 @@ fn edge(x: f32, y: f32, lean: [f32; 2]) -> [Vec3; 2] {
 
 #[test]
 fn loops_of_any_size_and_pace_cut_a_piece_out() {
+    loops_of_any_size_and_pace_cut_a_piece_out_of(0..30);
+}
+
+#[test]
+#[ignore = "long"]
+fn loops_of_any_size_and_pace_cut_a_piece_out_in_more_rounds() {
+    loops_of_any_size_and_pace_cut_a_piece_out_of(30..90);
+}
+
+fn loops_of_any_size_and_pace_cut_a_piece_out_of(rounds: Range<usize>) {
     let blocks = [block([6, 6, 3]), shaken([6, 6, 3], 6), shaken([6, 6, 3], 7)];
     // Bends are no tighter than the elements: 0.65 edges.
-    for round in 0..90 {
+    for round in rounds {
         let mut random = Random(100_000 + round as u64);
         let (x, y) = (random.between(2.5, 3.5), random.between(2.5, 3.5));
         let (wide, high) = (random.between(1.2, 2.2), random.between(1.2, 2.2));
@@ -39,8 +51,18 @@ fn loops_of_any_size_and_pace_cut_a_piece_out() {
 
 #[test]
 fn wild_strokes_from_side_to_side_part_a_block() {
+    wild_strokes_from_side_to_side_part_a_block_of(0..30);
+}
+
+#[test]
+#[ignore = "long"]
+fn wild_strokes_from_side_to_side_part_a_block_in_more_rounds() {
+    wild_strokes_from_side_to_side_part_a_block_of(30..90);
+}
+
+fn wild_strokes_from_side_to_side_part_a_block_of(rounds: Range<usize>) {
     let blocks = [block([6, 6, 3]), shaken([6, 6, 3], 8), shaken([6, 6, 3], 9)];
-    for round in 0..90 {
+    for round in rounds {
         let mut random = Random(200_000 + round as u64);
         let steps = (4.0 * 100f64.powf(random.next())) as usize;
         let [a, b, c] = [0; 3].map(|_| random.between(-0.5, 0.5));
@@ -67,54 +89,62 @@ fn wild_strokes_from_side_to_side_part_a_block() {
 }
 
 #[test]
+fn three_hundred_cuts_in_a_row() {
+    cuts_in_a_row(block([8, 8, 6]), 300, 1);
+}
+
+#[test]
+#[ignore = "long"]
 fn a_thousand_cuts_in_a_row() {
-    for (mesh, cuts, seed) in [(shaken([8, 8, 6], 5), 1000, 2), (block([8, 8, 6]), 300, 1)] {
-        let mut body = Body::new(mesh, bent);
-        let (nodes, tetrahedra, triangles) = (
-            body.positions.len(),
-            body.solid.tetrahedra().len(),
-            body.triangles.len(),
+    cuts_in_a_row(shaken([8, 8, 6], 5), 1000, 2);
+}
+
+fn cuts_in_a_row(mesh: Mesh, cuts: usize, seed: u64) {
+    let mut body = Body::new(mesh, bent);
+    let (nodes, tetrahedra, triangles) = (
+        body.positions.len(),
+        body.solid.tetrahedra().len(),
+        body.triangles.len(),
+    );
+    let before = body.worst_ratio();
+    let mut random = Random(seed);
+    let mut worst = 0.0f64;
+    for cut in 0..cuts {
+        let start = random.point(-1.0, 9.0);
+        let (edge, way, turn) = (
+            random.point(-2.0, 2.0),
+            random.point(-1.5, 1.5),
+            random.point(-0.5, 0.5),
         );
-        let before = body.worst_ratio();
-        let mut random = Random(seed);
-        let mut worst = 0.0f64;
-        for cut in 0..cuts {
-            let start = random.point(-1.0, 9.0);
-            let (edge, way, turn) = (
-                random.point(-2.0, 2.0),
-                random.point(-1.5, 1.5),
-                random.point(-0.5, 0.5),
-            );
-            // The wounds gape, and nodes go where they like.
-            let Follower { positions, rest, .. } = &mut body.follower;
-            for (place, &rest) in positions.iter_mut().zip(&*rest) {
-                *place = bent(rest) + random.point(-0.1, 0.1);
-            }
-            let sweep = Sweep {
-                start: [start, start + edge],
-                end: [start + way, start + way + edge + turn],
-            };
-            let near = body.solid.near(&sweep, &body.positions).unwrap();
-            let changes = body
-                .solid
-                .cut(&sweep, &body.follower.positions, &near, Limits::NONE)
-                .unwrap();
-            body.apply(&changes);
-            if cut % 100 == 99 {
-                body.check();
-                worst = worst.max(body.worst_ratio() / before);
-            }
+        // The wounds gape, and nodes go where they like.
+        let Follower { positions, rest, .. } = &mut body.follower;
+        for (place, &rest) in positions.iter_mut().zip(&*rest) {
+            *place = bent(rest) + random.point(-0.1, 0.1);
         }
-        let more = [
-            body.positions.len() - body.bound.len() - nodes,
-            body.solid.tetrahedra().len() - tetrahedra,
-            body.solid.triangles().len() - triangles,
-        ];
-        assert!(worst < 2.0, "stiffness by mass {worst} times what it was");
-        // A cut crosses some 20 edges, with five tetrahedra about each, and again those that earlier cuts have made of them.
-        assert!(
-            more[0] < 2 * cuts && more[1] < 120 * cuts && more[2] < 80 * cuts,
-            "more nodes, tetrahedra, triangles: {more:?}"
-        );
+        let sweep = Sweep {
+            start: [start, start + edge],
+            end: [start + way, start + way + edge + turn],
+        };
+        let near = body.solid.near(&sweep, &body.positions).unwrap();
+        let changes = body
+            .solid
+            .cut(&sweep, &body.follower.positions, &near, Limits::NONE)
+            .unwrap();
+        body.apply(&changes);
+        if cut % 100 == 99 {
+            body.check();
+            worst = worst.max(body.worst_ratio() / before);
+        }
     }
+    let more = [
+        body.positions.len() - body.bound.len() - nodes,
+        body.solid.tetrahedra().len() - tetrahedra,
+        body.solid.triangles().len() - triangles,
+    ];
+    assert!(worst < 2.0, "stiffness by mass {worst} times what it was");
+    // A cut crosses some 20 edges, with five tetrahedra about each, and again those that earlier cuts have made of them.
+    assert!(
+        more[0] < 2 * cuts && more[1] < 120 * cuts && more[2] < 80 * cuts,
+        "more nodes, tetrahedra, triangles: {more:?}"
+    );
 }

@@ -139,44 +139,56 @@ fn cut_across(world: &mut World, body: BodyId) {
 
 #[test]
 fn a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume() {
-    for solver in SOLVERS {
-        for (poisson_ratio, is_viscous) in [(0.45, true), (0.49, false)] {
-            if is_viscous && solver == Solver::Newton {
-                continue;
-            }
-            let what = format!("{poisson_ratio}, {solver:?}");
-            let of = Tissue {
-                poisson_ratio,
-                solver,
-                is_viscous,
-                damping: 0.02,
-                ..FREE
-            };
-            let (mut world, body) = tissue(of, stretched);
-            for _ in 0..10 {
-                world.step(2e-3).unwrap();
-            }
-            cut_across(&mut world, body);
-            let it = world.body(body).unwrap();
-            let rest = carried(it);
-            assert!(off_rest(it, &rest) > 1e-3, "{what}: strained as it is cut");
-            // As near to incompressible as the whole was: what presses it is some part of Young's modulus.
-            let most = (2.0 * off_volume(it, &rest)).max(0.01);
-            for step in 0..400 {
-                world.step(2e-3).unwrap();
-                if step % 10 == 0 {
-                    let off = off_volume(world.body(body).unwrap(), &rest);
-                    assert!(
-                        off < most,
-                        "{what}: a volume is off by {off}, {most} expected, at {step}"
-                    );
-                }
-            }
-            let it = world.body(body).unwrap();
-            let off = off_rest(it, &rest);
-            assert!(off < 1e-4 * 0.06, "{what}: {off} m off the rest shape");
-            assert!(off_volume(it, &rest) < 1e-4, "{what}");
+    a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume_of(&[
+        (Solver::Verlet, 0.49, false),
+        (Solver::Implicit, 0.45, true),
+    ]);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume_in_the_other_cases() {
+    a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume_of(&[
+        (Solver::Verlet, 0.45, true),
+        (Solver::Implicit, 0.49, false),
+        (Solver::Newton, 0.49, false),
+    ]);
+}
+
+fn a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume_of(cases: &[(Solver, f32, bool)]) {
+    for &(solver, poisson_ratio, is_viscous) in cases {
+        let what = format!("{poisson_ratio}, {solver:?}");
+        let of = Tissue {
+            poisson_ratio,
+            solver,
+            is_viscous,
+            damping: 0.02,
+            ..FREE
+        };
+        let (mut world, body) = tissue(of, stretched);
+        for _ in 0..10 {
+            world.step(2e-3).unwrap();
         }
+        cut_across(&mut world, body);
+        let it = world.body(body).unwrap();
+        let rest = carried(it);
+        assert!(off_rest(it, &rest) > 1e-3, "{what}: strained as it is cut");
+        // As near to incompressible as the whole was: what presses it is some part of Young's modulus.
+        let most = (2.0 * off_volume(it, &rest)).max(0.01);
+        for step in 0..400 {
+            world.step(2e-3).unwrap();
+            if step % 10 == 0 {
+                let off = off_volume(world.body(body).unwrap(), &rest);
+                assert!(
+                    off < most,
+                    "{what}: a volume is off by {off}, {most} expected, at {step}"
+                );
+            }
+        }
+        let it = world.body(body).unwrap();
+        let off = off_rest(it, &rest);
+        assert!(off < 1e-4 * 0.06, "{what}: {off} m off the rest shape");
+        assert!(off_volume(it, &rest) < 1e-4, "{what}");
     }
 }
 
@@ -221,8 +233,18 @@ fn under_load_it_comes_to_rest_where_it_would_without_a_past() {
 
 #[test]
 fn no_energy_comes_in_afterwards() {
+    no_energy_comes_in_afterwards_of(|matter, solver| matter == Matter::ViscousRings && solver != Solver::Newton);
+}
+
+#[test]
+#[ignore = "long"]
+fn no_energy_comes_in_afterwards_in_the_other_cases() {
+    no_energy_comes_in_afterwards_of(|matter, solver| matter == Matter::Rings || solver == Solver::Newton);
+}
+
+fn no_energy_comes_in_afterwards_of(is_tried: fn(Matter, Solver) -> bool) {
     for matter in [Matter::Rings, Matter::ViscousRings] {
-        for solver in SOLVERS {
+        for solver in SOLVERS.into_iter().filter(|solver| is_tried(matter, *solver)) {
             let what = format!("{matter:?}, {solver:?}");
             let mut tops = [f64::MIN; 2];
             for (cuts, top) in [0, CUTS.len()].into_iter().zip(&mut tops) {
@@ -325,7 +347,7 @@ fn the_state_hash_knows_the_past() {
 
 #[test]
 fn threads_agree() {
-    let (rest, cells) = shaken([22, 20, 20], 5);
+    let (rest, cells) = shaken([20, 20, 18], 5);
     let cells: Vec<[u32; 4]> = cells.iter().map(|&cell| upright(&rest, cell)).collect();
     let positions: Vec<Vec3> = rest.iter().map(|&rest| stretched(0.001 * rest)).collect();
     let rest: Vec<Vec3> = rest.iter().map(|&rest| 0.001 * rest).collect();
