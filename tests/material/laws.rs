@@ -287,9 +287,19 @@ fn a_body_that_swings_keeps_its_energy_and_momentum() {
 
 #[test]
 fn every_solver_comes_to_the_same_rest() {
+    every_solver_comes_to_the_same_rest_of([LAWS[0], LAWS[2]]);
+}
+
+#[test]
+#[ignore = "long"]
+fn every_solver_comes_to_the_same_rest_with_other_laws() {
+    every_solver_comes_to_the_same_rest_of([LAWS[1], LAWS[3]]);
+}
+
+fn every_solver_comes_to_the_same_rest_of(laws: [ElementLaw; 2]) {
     let mesh = Mesh::block([0.08, 0.02, 0.02], [8, 2, 2]).expect("a block");
     let gravity = Vec3::NEG_Y * 9.81;
-    for (law, nu) in LAWS.into_iter().flat_map(|law| [(law, 0.3), (law, 0.47)]) {
+    for (law, nu) in laws.into_iter().flat_map(|law| [(law, 0.3), (law, 0.47)]) {
         let mut expected = None;
         for solver in SOLVERS.into_iter().rev() {
             let definition = BodyDefinition {

@@ -69,27 +69,31 @@ fn come_back(mesh: &Mesh, definition: &BodyDefinition, start: &[Vec3], step: f32
     assert_eq!(end.1, 0, "{named}: inside out after {time} s");
 }
 
-/// Of each number and start with a solver each.
+/// VERLET takes long for what is scattered.
+fn is_long(start: &str, solver: Solver) -> bool {
+    start == "scattered" && solver == Solver::Verlet
+}
+
 #[test]
 fn organs_of_tetrahedra_come_back_from_anywhere() {
-    organs_of_tetrahedra_come_back_of(|case| case % 3 == 0);
+    organs_of_tetrahedra_come_back_of(|start, solver| !is_long(start, solver));
 }
 
 #[test]
 #[ignore = "long"]
-fn organs_of_tetrahedra_come_back_from_anywhere_with_the_other_solvers() {
-    organs_of_tetrahedra_come_back_of(|case| case % 3 != 0);
+fn scattered_organs_of_tetrahedra_come_back_with_verlet() {
+    organs_of_tetrahedra_come_back_of(is_long);
 }
 
-fn organs_of_tetrahedra_come_back_of(is_tried: fn(usize) -> bool) {
+fn organs_of_tetrahedra_come_back_of(is_tried: fn(&str, Solver) -> bool) {
     let mesh = Mesh::organ(0.1, 0.012).expect("an organ");
-    for (number, nu) in (0..).zip([0.0, 0.3, 0.45]) {
-        for (way, (solver, step)) in (number..).zip([
+    for nu in [0.0, 0.3, 0.45] {
+        for (solver, step) in [
             (Solver::Implicit, 1.0 / 60.0),
             (Solver::Implicit, 0.1),
             (Solver::Verlet, 1e-3),
-        ]) {
-            for (_, (name, start)) in (way..).zip(starts(&mesh)).filter(|start| is_tried(start.0)) {
+        ] {
+            for (name, start) in starts(&mesh).into_iter().filter(|start| is_tried(start.0, solver)) {
                 let definition = BodyDefinition {
                     node_dampings: Values::Uniform(0.02),
                     solver,
@@ -107,28 +111,27 @@ fn organs_of_tetrahedra_come_back_of(is_tried: fn(usize) -> bool) {
     }
 }
 
-/// Of each law and start with a solver each.
 #[test]
 fn scattered_and_flat_organs_of_hyperelastic_laws_come_back() {
-    organs_of_hyperelastic_laws_come_back_of(|case| case % 2 == 0);
+    organs_of_hyperelastic_laws_come_back_of(|start, solver| !is_long(start, solver));
 }
 
 #[test]
 #[ignore = "long"]
-fn scattered_and_flat_organs_of_hyperelastic_laws_come_back_with_the_other_solver() {
-    organs_of_hyperelastic_laws_come_back_of(|case| case % 2 != 0);
+fn scattered_organs_of_hyperelastic_laws_come_back_with_verlet() {
+    organs_of_hyperelastic_laws_come_back_of(is_long);
 }
 
-fn organs_of_hyperelastic_laws_come_back_of(is_tried: fn(usize) -> bool) {
+fn organs_of_hyperelastic_laws_come_back_of(is_tried: fn(&str, Solver) -> bool) {
     let mesh = Mesh::organ(0.1, 0.0125).expect("an organ");
-    for (number, (law, nu)) in (0..).zip([
+    for (law, nu) in [
         (ElementLaw::NeoHookean, 0.3),
         (ElementLaw::NeoHookean, 0.45),
         (ElementLaw::MooneyRivlin { ratio: 0.3 }, 0.3),
         (ElementLaw::MooneyRivlin { ratio: 0.3 }, 0.45),
-    ]) {
-        for (way, (solver, step)) in (number..).zip([(Solver::Implicit, 1.0 / 60.0), (Solver::Verlet, 1e-3)]) {
-            for (_, (name, start)) in (way..).zip(starts(&mesh)).filter(|start| is_tried(start.0)) {
+    ] {
+        for (solver, step) in [(Solver::Implicit, 1.0 / 60.0), (Solver::Verlet, 1e-3)] {
+            for (name, start) in starts(&mesh).into_iter().filter(|start| is_tried(start.0, solver)) {
                 // All at one point is an equilibrium of these laws, and nearly one nearby.
                 if name == "collapsed" {
                     continue;

@@ -378,6 +378,16 @@ fn only_what_lies_within_the_region_is_scaled() {
 
 #[test]
 fn a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up() {
+    a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_of(Solver::Verlet);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_with_implicit() {
+    a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_of(Solver::Implicit);
+}
+
+fn a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_of(solver: Solver) {
     let block = Block::new([8, 6, 6], 6);
     let mut random = Random::new(7);
     let velocities: Vec<Vec3> = block.mesh.positions.iter().map(|_| 0.2 * random.vector()).collect();
@@ -386,35 +396,33 @@ fn a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up(
         .into_iter()
         .filter(|&node| block.mesh.positions[node as usize].x < 0.0)
         .collect();
-    for solver in [Solver::Verlet, Solver::Implicit] {
-        for asked in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS] {
-            let mut world = World::new(FREE).expect("a world");
-            let id = block.make(&mut world, asked, (Storage::Packed, solver), 1.0, 1.0);
-            world
-                .body_mut(id)
-                .expect("it")
-                .set_velocities(&velocities)
-                .expect("velocities");
-            let mut substeps = 0;
-            for _ in 0..5 {
-                substeps = world.step(1e-2).expect("a step").substeps;
+    for asked in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS] {
+        let mut world = World::new(FREE).expect("a world");
+        let id = block.make(&mut world, asked, (Storage::Packed, solver), 1.0, 1.0);
+        world
+            .body_mut(id)
+            .expect("it")
+            .set_velocities(&velocities)
+            .expect("velocities");
+        let mut substeps = 0;
+        for _ in 0..5 {
+            substeps = world.step(1e-2).expect("a step").substeps;
+        }
+        let body = world.body_mut(id).expect("it");
+        body.scale_region(&nodes, 100.0, 1.0).expect("a region");
+        let energy = body.energy(Vec3::ZERO);
+        let energy = energy.kinetic + energy.elastic;
+        for _ in 0..10 {
+            let report = world.step(1e-2).expect("a step");
+            assert_eq!(report.bodies_restored, 0);
+            if solver == Solver::Verlet {
+                assert!(report.substeps > 4 * substeps, "{asked:?}: {}", report.substeps);
             }
-            let body = world.body_mut(id).expect("it");
-            body.scale_region(&nodes, 100.0, 1.0).expect("a region");
-            let energy = body.energy(Vec3::ZERO);
-            let energy = energy.kinetic + energy.elastic;
-            for _ in 0..10 {
-                let report = world.step(1e-2).expect("a step");
-                assert_eq!(report.bodies_restored, 0);
-                if solver == Solver::Verlet {
-                    assert!(report.substeps > 4 * substeps, "{asked:?}: {}", report.substeps);
-                }
-                let now = world.body(id).expect("it").energy(Vec3::ZERO);
-                let now = now.kinetic + now.elastic;
-                assert!(now < 1.05 * energy, "{asked:?} {solver:?}: {now} of {energy} J");
-                if solver == Solver::Verlet {
-                    assert!(now > 0.9 * energy, "{asked:?} {solver:?}: {now} of {energy} J");
-                }
+            let now = world.body(id).expect("it").energy(Vec3::ZERO);
+            let now = now.kinetic + now.elastic;
+            assert!(now < 1.05 * energy, "{asked:?} {solver:?}: {now} of {energy} J");
+            if solver == Solver::Verlet {
+                assert!(now > 0.9 * energy, "{asked:?} {solver:?}: {now} of {energy} J");
             }
         }
     }
