@@ -128,6 +128,16 @@ fn what_tools_hold_gains_no_energy() {
 
 #[test]
 fn what_is_set_in_each_frame_gains_no_energy() {
+    what_is_set_in_each_frame_gains_no_energy_of(|setting| setting == 1);
+}
+
+#[test]
+#[ignore = "long"]
+fn what_is_set_in_each_frame_gains_no_energy_in_the_other_cases() {
+    what_is_set_in_each_frame_gains_no_energy_of(|setting| setting != 1);
+}
+
+fn what_is_set_in_each_frame_gains_no_energy_of(is_tried: fn(usize) -> bool) {
     type Setting = (&'static str, fn(&mut World, BodyId));
     let settings: [Setting; 3] = [
         ("node damping", |world, body| {
@@ -144,7 +154,7 @@ fn what_is_set_in_each_frame_gains_no_energy() {
             body.scale_region(&[0, 1, 2], 1.0, 1.0).expect("a region");
         }),
     ];
-    for (name, set) in settings {
+    for (_, (name, set)) in (0..).zip(settings).filter(|setting| is_tried(setting.0)) {
         let (mut world, body, _) = pinned();
         let gained = gain((&mut world, body), 1200, |world| {
             set(world, body);

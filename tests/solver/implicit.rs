@@ -5,7 +5,7 @@ use crate::support::euler::{euler_step, uneven_block};
 use crate::support::motion::two_masses;
 use crate::support::scene::STORAGES;
 use glam::{DVec3, Vec3};
-use sinew::{BodyDefinition, Error, Solver, World, WorldDefinition};
+use sinew::{BodyDefinition, Error, Solver, Storage, World, WorldDefinition};
 
 fn implicit(parts: &Parts, world: WorldDefinition, order: u32, accuracy: f32) -> Scene {
     Scene::with(parts, world, |definition| BodyDefinition {
@@ -78,7 +78,17 @@ fn each_order_is_reached() {
 
 #[test]
 fn bodies_fall_alike_far_from_the_origin() {
-    for offset in [0.0, 1.0, 10.0] {
+    bodies_fall_alike_far_from_the_origin_of(&[10.0]);
+}
+
+#[test]
+#[ignore = "long"]
+fn bodies_fall_alike_nearer_to_the_origin() {
+    bodies_fall_alike_far_from_the_origin_of(&[0.0, 1.0]);
+}
+
+fn bodies_fall_alike_far_from_the_origin_of(offsets: &[f32]) {
+    for &offset in offsets {
         for (order, h, allowed) in [(1, 1e-4, 2e-4), (2, 1e-4, 3e-5), (2, 1e-2, 1e-3)] {
             let mut parts = Parts::block([2, 2, 2], 0.05, 0.01, 100.0);
             for position in &mut parts.positions {
@@ -128,6 +138,16 @@ fn nodes_reach_their_terminal_velocity_at_every_step() {
 /// A chain of forty that hangs from a pin: each spring is stretched by the weight of all that is below it.
 #[test]
 fn a_chain_hangs_as_far_at_every_step_in_every_storage() {
+    a_chain_hangs_as_far_at_every_step_in_every_storage_of(|storage, h| storage == Storage::Packed || h > 0.5);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_chain_hangs_as_far_at_every_step_in_every_storage_in_the_other_cases() {
+    a_chain_hangs_as_far_at_every_step_in_every_storage_of(|storage, h| storage != Storage::Packed && h < 0.5);
+}
+
+fn a_chain_hangs_as_far_at_every_step_in_every_storage_of(is_tried: fn(Storage, f32) -> bool) {
     let (count, mass, stiffness) = (40, 0.01, 50.0);
     let mut parts = Parts::chain(count + 1, Vec3::Y * -0.1, mass, stiffness);
     parts.masses[0] = 0.0;
@@ -140,6 +160,9 @@ fn a_chain_hangs_as_far_at_every_step_in_every_storage() {
     let extension = pull * (count * (count + 1)) as f64 / 2.0;
     for storage in STORAGES {
         for (order, h, steps) in [(1, 1.0_f32, 400), (2, 0.1, 4000), (2, 1.0 / 60.0, 20_000)] {
+            if !is_tried(storage, h) {
+                continue;
+            }
             let mut scene = Scene::with(&parts, world, |definition| BodyDefinition {
                 solver: Solver::Implicit,
                 order,

@@ -63,6 +63,20 @@ fn drag(solver: Solver, model: Model, shape: Shape, friction: f32) -> Vec<Felt> 
 
 #[test]
 fn a_tool_feels_what_it_should_with_few_iterations() {
+    a_tool_feels_what_it_should_with_few_iterations_of(&[(true, Model::Tetrahedra, 0.3)]);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_tool_feels_what_it_should_with_few_iterations_in_the_other_cases() {
+    a_tool_feels_what_it_should_with_few_iterations_of(&[
+        (false, Model::Springs, 0.0),
+        (false, Model::Springs, 0.3),
+        (false, Model::Tetrahedra, 0.3),
+    ]);
+}
+
+fn a_tool_feels_what_it_should_with_few_iterations_of(cases: &[(bool, Model, f32)]) {
     let round = ball(RADIUS, 2);
     let mesh = Shape::Mesh {
         positions: &round.positions,
@@ -70,12 +84,8 @@ fn a_tool_feels_what_it_should_with_few_iterations() {
     };
     let sphere = Shape::Sphere { radius: RADIUS };
     let mut failures = Vec::new();
-    for (name, shape, model, friction) in [
-        ("sphere", sphere, Model::Springs, 0.0),
-        ("sphere", sphere, Model::Springs, 0.3),
-        ("sphere", sphere, Model::Tetrahedra, 0.3),
-        ("mesh", mesh, Model::Tetrahedra, 0.3),
-    ] {
+    for &(is_mesh, model, friction) in cases {
+        let (name, shape) = if is_mesh { ("mesh", mesh) } else { ("sphere", sphere) };
         let right = drag(Solver::Verlet, model, shape, friction);
         let found = drag(Solver::Implicit, model, shape, friction);
         let largest = right.iter().map(|felt| felt.force.length()).fold(0.0, f32::max);

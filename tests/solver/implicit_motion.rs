@@ -338,6 +338,16 @@ fn angular_momentum(scene: &Scene, masses: &[f32]) -> (DVec3, f64) {
 /// with order 2 and steps of 1/60 s, and far more with order 1.
 #[test]
 fn a_free_body_spins_on() {
+    a_free_body_spins_on_of(|solver, order, is_solid| (order == 2) == (is_solid == (solver == Solver::Implicit)));
+}
+
+#[test]
+#[ignore = "long"]
+fn a_free_body_spins_on_in_the_other_cases() {
+    a_free_body_spins_on_of(|solver, order, is_solid| (order == 2) != (is_solid == (solver == Solver::Implicit)));
+}
+
+fn a_free_body_spins_on_of(is_tried: fn(Solver, u32, bool) -> bool) {
     let h = 1.0 / 60.0;
     let spin = Vec3::new(0.0, 5.0, 0.0);
     let mesh = Mesh::block([1.5; 3], [3; 3]).expect("a block");
@@ -356,7 +366,10 @@ fn a_free_body_spins_on() {
                 if solver == Solver::Newton && gravity != Vec3::ZERO {
                     continue;
                 }
-                for is_solid in [false, true] {
+                for is_solid in [false, true]
+                    .into_iter()
+                    .filter(|&is_solid| is_tried(solver, order, is_solid))
+                {
                     let (parts, mut scene) = if is_solid {
                         let mut world = World::new(under(gravity)).expect("a world");
                         let definition = BodyDefinition {

@@ -261,8 +261,18 @@ fn a_body_without_slivers_is_what_it_would_be_without_mass_scaling() {
 /// Leapfrog keeps a shadow energy; the energy is at most E0 / (1 - (h omega)²/4), with h omega up to 0.9 of its limit.
 #[test]
 fn energy_does_not_grow() {
+    energy_does_not_grow_of(&[(0.02, 1e-4)]);
+}
+
+#[test]
+#[ignore = "long"]
+fn energy_does_not_grow_in_the_other_cases() {
+    energy_does_not_grow_of(&[(0.003, 0.0), (0.02, 0.0), (0.2, 0.0)]);
+}
+
+fn energy_does_not_grow_of(cases: &[(f32, f32)]) {
     const SHADOW: f64 = 1.0 / (1.0 - RESERVE * RESERVE);
-    for (part, spring_damping) in [(0.003, 0.0), (0.02, 0.0), (0.2, 0.0), (0.02, 1e-4)] {
+    for &(part, spring_damping) in cases {
         let mut parts = slivers(5, 5, false);
         parts.spring_damping = spring_damping;
         let mut scene = scene(&parts, FREE, part);

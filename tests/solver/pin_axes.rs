@@ -558,54 +558,61 @@ fn thrown(which: (Solver, Storage), world: WorldDefinition) -> (Scene, Vec<[bool
 
 #[test]
 fn what_is_held_never_moves() {
-    let careful = WorldDefinition {
+    what_is_held_never_moves_of(HANGING);
+}
+
+#[test]
+#[ignore = "long"]
+fn what_is_held_never_moves_in_steps_to_a_tolerance() {
+    what_is_held_never_moves_of(WorldDefinition {
         tolerance: 1e-4,
         max_substeps: 64,
         ..HANGING
-    };
+    });
+}
+
+fn what_is_held_never_moves_of(world: WorldDefinition) {
     for which in each() {
-        for world in [HANGING, careful] {
-            let (mut scene, axes) = thrown(which, world);
-            let start = scene.positions();
-            let ball = ToolDefinition {
-                friction: 0.5,
-                pose: Pose {
-                    position: Vec3::new(0.02, 0.055, 0.018),
-                    orientation: Quat::IDENTITY,
-                },
-                ..ToolDefinition::new(Shape::Sphere { radius: 0.01 })
-            };
-            let ball = scene.world.create_tool(&ball).expect("a tool");
-            let mut random = Random::new(8);
-            for step in 0..12 {
-                for node in 0..axes.len() as u32 {
-                    let force = 1e-3 * random.vector();
-                    scene.body_mut().apply_force(node, force).expect("a node");
-                }
-                let depth = 0.055 - 1e-3 * step as f32;
-                let place = Vec3::new(0.02, depth, 0.018);
-                scene.world.set_pose(ball, place, None).expect("a pose");
-                if scene.world.step(0.002).is_err() {
-                    // Contact has no order to speak of.
-                    assert!(world.tolerance > 0.0);
-                    break;
-                }
-                let (places, velocities) = (scene.positions(), scene.velocities());
-                let mut fastest = 0.0_f64;
-                for (node, &axes) in axes.iter().enumerate() {
-                    let axes = BVec3::from(axes);
-                    let moved = DVec3::select(axes, places[node] - start[node], DVec3::ZERO);
-                    let speed = DVec3::select(axes, velocities[node], DVec3::ZERO);
-                    assert_eq!(
-                        (moved, speed),
-                        (DVec3::ZERO, DVec3::ZERO),
-                        "{which:?}, step {step}: node {node}"
-                    );
-                    fastest = fastest.max(velocities[node].length());
-                }
-                // The ball goes at 0.5 m/s; a node gives way by four times that at most, for each of the contacts at it.
-                assert!(fastest < 3.0, "{which:?}, step {step}: {fastest} m/s");
+        let (mut scene, axes) = thrown(which, world);
+        let start = scene.positions();
+        let ball = ToolDefinition {
+            friction: 0.5,
+            pose: Pose {
+                position: Vec3::new(0.02, 0.055, 0.018),
+                orientation: Quat::IDENTITY,
+            },
+            ..ToolDefinition::new(Shape::Sphere { radius: 0.01 })
+        };
+        let ball = scene.world.create_tool(&ball).expect("a tool");
+        let mut random = Random::new(8);
+        for step in 0..12 {
+            for node in 0..axes.len() as u32 {
+                let force = 1e-3 * random.vector();
+                scene.body_mut().apply_force(node, force).expect("a node");
             }
+            let depth = 0.055 - 1e-3 * step as f32;
+            let place = Vec3::new(0.02, depth, 0.018);
+            scene.world.set_pose(ball, place, None).expect("a pose");
+            if scene.world.step(0.002).is_err() {
+                // Contact has no order to speak of.
+                assert!(world.tolerance > 0.0);
+                break;
+            }
+            let (places, velocities) = (scene.positions(), scene.velocities());
+            let mut fastest = 0.0_f64;
+            for (node, &axes) in axes.iter().enumerate() {
+                let axes = BVec3::from(axes);
+                let moved = DVec3::select(axes, places[node] - start[node], DVec3::ZERO);
+                let speed = DVec3::select(axes, velocities[node], DVec3::ZERO);
+                assert_eq!(
+                    (moved, speed),
+                    (DVec3::ZERO, DVec3::ZERO),
+                    "{which:?}, step {step}: node {node}"
+                );
+                fastest = fastest.max(velocities[node].length());
+            }
+            // The ball goes at 0.5 m/s; a node gives way by four times that at most, for each of the contacts at it.
+            assert!(fastest < 3.0, "{which:?}, step {step}: {fastest} m/s");
         }
     }
 }

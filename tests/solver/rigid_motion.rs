@@ -160,6 +160,10 @@ fn motions() -> Vec<Motion> {
 
 /// Holds a case to its image under each motion.
 fn assert_moves_with_it(case: &Case) {
+    assert_moves_by(case, &motions());
+}
+
+fn assert_moves_by(case: &Case, motions: &[Motion]) {
     let rest = case.definition.positions;
     let size = f64::from(rest.iter().fold(0.0_f32, |size, p| size.max(p.length()))) * 2.0;
     let pins = pins(rest);
@@ -169,7 +173,7 @@ fn assert_moves_with_it(case: &Case) {
         } else {
             (1.0 / 60.0, 6)
         };
-        for motion in motions() {
+        for &motion in motions {
             let moved: Vec<Vec3> = case.start.iter().map(|p| motion.of(p.as_dvec3()).as_vec3()).collect();
             let still: Vec<Vec3> = moved.iter().map(|p| motion.back(p.as_dvec3()).as_vec3()).collect();
             let mut still = Scene::new(case, solver, &still, Motion::NONE);
@@ -315,6 +319,16 @@ fn elements_move_with_the_scene() {
 
 #[test]
 fn pressed_tissue_moves_with_the_scene() {
+    pressed_tissue_moves_with_the_scene_of(&motions()[3..]);
+}
+
+#[test]
+#[ignore = "long"]
+fn pressed_tissue_moves_with_the_scene_however_it_turns() {
+    pressed_tissue_moves_with_the_scene_of(&motions()[..3]);
+}
+
+fn pressed_tissue_moves_with_the_scene_of(motions: &[Motion]) {
     let block = Block::new();
     let damped = BodyDefinition {
         node_dampings: Values::Uniform(0.005),
@@ -325,7 +339,7 @@ fn pressed_tissue_moves_with_the_scene() {
         is_pressed: true,
         ..block.case("tetrahedra that a ball is pressed into", damped)
     };
-    assert_moves_with_it(&case);
+    assert_moves_by(&case, motions);
 }
 
 #[test]

@@ -116,7 +116,7 @@ fn a_tool_far_away_changes_no_bit_of_a_large_body() {
             };
             scene.world.create_tool(&definition).expect("a tool");
         }
-        for _ in 0..6 {
+        for _ in 0..3 {
             scene.step(40.0 / 4096.0);
         }
         (scene.positions(), scene.velocities())
