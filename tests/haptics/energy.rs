@@ -54,9 +54,27 @@ fn strike(bench: &mut Bench, mut hand: Hand, ticks: u32) -> [f64; 3] {
 
 #[test]
 fn a_hand_that_strikes_tissue_gains_nothing() {
+    a_hand_that_strikes_tissue_gains_nothing_of(is_short);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_hand_that_strikes_tissue_gains_nothing_in_the_other_cases() {
+    a_hand_that_strikes_tissue_gains_nothing_of(|solver, stiffness, speed| !is_short(solver, stiffness, speed));
+}
+
+/// IMPLICIT takes long.
+fn is_short(solver: Solver, stiffness: f64, speed: f64) -> bool {
+    solver == Solver::Verlet || (stiffness, speed) == (200.0, 0.2)
+}
+
+fn a_hand_that_strikes_tissue_gains_nothing_of(is_tried: fn(Solver, f64, f64) -> bool) {
     for (solver, every) in [(Solver::Verlet, 1), (Solver::Verlet, 16), (Solver::Implicit, 1)] {
         for (mass, stiffness) in [(0.05, 0.0), (0.3, 0.0), (0.1, 200.0), (0.1, 3000.0)] {
             for speed in [0.05, 0.2] {
+                if !is_tried(solver, stiffness, speed) {
+                    continue;
+                }
                 let mut bench = Bench::new(solver, every);
                 let hand = Hand {
                     mass,

@@ -189,18 +189,23 @@ fn bits(world: &World, body: BodyId) -> Vec<u32> {
     bits.chain(body.surface().iter().flatten().copied()).collect()
 }
 
-/// One solver for each.
 #[test]
 fn whatever_a_body_has_goes_on_to_the_bit() {
-    let [made, cut] = go_on_to_the_bit(|feature, solver| feature % SOLVERS.len() == solver);
+    let [made, cut] = go_on_to_the_bit(is_short);
     assert!(made > 40 && cut > 16, "{made} bodies, {cut} cut");
 }
 
 #[test]
 #[ignore = "long"]
 fn whatever_a_body_has_goes_on_to_the_bit_with_the_other_solvers() {
-    let [made, cut] = go_on_to_the_bit(|feature, solver| feature % SOLVERS.len() != solver);
+    let [made, cut] = go_on_to_the_bit(|feature, solver| !is_short(feature, solver));
     assert!(made > 80 && cut > 34, "{made} bodies, {cut} cut");
+}
+
+/// One solver for each; NEWTON, which takes long for blocks, for sheets alone.
+fn is_short(feature: usize, solver: usize) -> bool {
+    let solvers = if feature < OF_BLOCKS.len() { 2 } else { 3 };
+    feature % solvers == solver
 }
 
 /// With these features and solvers; how many bodies were made, and how many of them cut.
@@ -282,8 +287,8 @@ fn tools_of_every_kind_go_on_to_the_bit() {
                 ..ToolDefinition::new(shape)
             };
             definition.pose.position = vec3(0.01, 0.05, 0.01);
-            if detection == Detection::DistanceField {
-                definition.resolution = 1e-3;
+            if detection != Detection::Exact {
+                definition.resolution = 2e-3;
             }
             let Ok(tool) = world.create_tool(&definition) else {
                 assert!(detection == Detection::DistanceField && kind < 2);

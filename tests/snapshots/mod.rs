@@ -24,7 +24,7 @@ fn world(threads: u32) -> World {
 
 #[test]
 fn a_world_that_was_saved_goes_on_to_the_bit_whatever_is_done() {
-    go_on_to_the_bit(10..14);
+    go_on_to_the_bit(12..14);
 }
 
 #[test]

@@ -65,7 +65,7 @@ fn together(count: u32) -> Vec<u64> {
 
 #[test]
 fn worlds_on_many_threads_are_those_on_one() {
-    worlds_are_those_on_one(500);
+    worlds_are_those_on_one(300);
 }
 
 /// As many as can be all different.

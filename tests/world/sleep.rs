@@ -153,6 +153,7 @@ fn what_rests_falls_asleep_where_it_belongs() {
 
 /// A ball that presses it wakes what moves, and no more; it feels what it would have felt, and tissue goes where it would have gone.
 #[test]
+#[ignore = "long"]
 fn a_tool_wakes_what_it_moves() {
     let mut asleep = slab(SLEEP, 1, |_| ());
     let mut awake = slab(AWAKE, 1, |_| ());
@@ -347,6 +348,16 @@ fn any_number_of_threads_leads_to_the_same_state() {
 
 #[test]
 fn every_solver_storage_and_model_sleeps() {
+    every_solver_storage_and_model_sleeps_of(|change| change != 0 && change != 3);
+}
+
+#[test]
+#[ignore = "long"]
+fn every_solver_storage_and_model_sleeps_in_the_other_cases() {
+    every_solver_storage_and_model_sleeps_of(|change| change == 0 || change == 3);
+}
+
+fn every_solver_storage_and_model_sleeps_of(is_tried: fn(usize) -> bool) {
     type Change = fn(&mut BodyDefinition);
     let changes: [(&str, Change); 5] = [
         ("implicit", |definition| definition.solver = Solver::Implicit),
@@ -361,7 +372,7 @@ fn every_solver_storage_and_model_sleeps() {
         }),
         ("volume", |definition| definition.volume_stiffness = 1000.0),
     ];
-    for (name, change) in changes {
+    for (_, (name, change)) in (0..).zip(changes).filter(|change| is_tried(change.0)) {
         let mut asleep = slab_of(20, SLEEP, 1, change);
         let mut awake = slab_of(20, AWAKE, 1, change);
         for slab in [&mut asleep, &mut awake] {
@@ -415,7 +426,7 @@ fn what_home_springs_and_pressure_hold_up_sleeps() {
 /// Falling asleep and waking a thousand times changes neither where it rests nor its energy.
 #[test]
 fn a_thousand_sleeps_lead_nowhere() {
-    let cells = 6;
+    let cells = 4;
     let mesh = Mesh::block([0.03, 0.03, 0.03], [cells; 3]).expect("a block");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let definition = BodyDefinition {
@@ -491,7 +502,7 @@ fn a_refused_step_wakes_nobody() {
             definition.spring_dampings = Values::Uniform(damping);
         };
         let [mut asked, mut other] = [(); 2].map(|()| {
-            let mut slab = slab(SLEEP, 1, change);
+            let mut slab = slab_of(20, SLEEP, 1, change);
             slab.run(1.5);
             slab
         });
