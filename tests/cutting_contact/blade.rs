@@ -354,7 +354,7 @@ fn whatever_is_asked_of_it_stays_finite() {
 
 #[test]
 #[ignore = "long"]
-fn whatever_is_asked_of_it_stays_finite_in_long_steps() {
+fn whatever_is_asked_of_it_stays_finite_in_the_other_cases() {
     whatever_is_asked_of_it_stays_finite_of(|step, solver| step >= 0.05 || solver != Solver::Verlet);
 }
 
