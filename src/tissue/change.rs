@@ -297,6 +297,7 @@ impl Skin {
         {
             vectors.grow(change.node_count);
         }
+        self.strays.resize(change.node_count, 0.0);
         if let Some(firsts) = &mut self.firsts {
             let first = change.node_count - change.firsts.len();
             for (number, &place) in (first..).zip(&change.firsts) {

@@ -231,13 +231,13 @@ impl Islands {
     }
 
     /// What is searched for contacts in an island: each member with itself, then the near pairs.
-    pub fn searches(&self, island: usize) -> impl Iterator<Item = [usize; 2]> + '_ {
+    pub fn searches(&self, island: usize) -> impl Iterator<Item = [usize; 2]> + Clone + '_ {
         let members = self.members(island).iter();
         members.map(|&place| [place as usize; 2]).chain(self.pairs(island))
     }
 
     /// The near pairs of an island, the lower place first, in order.
-    pub fn pairs(&self, island: usize) -> impl Iterator<Item = [usize; 2]> + '_ {
+    pub fn pairs(&self, island: usize) -> impl Iterator<Item = [usize; 2]> + Clone + '_ {
         let members = if self.is_full { self.members(island) } else { &[] };
         let all = members.iter().enumerate().flat_map(move |(index, &low)| {
             let higher = members[index + 1..].iter();

@@ -81,6 +81,7 @@ impl Tissue {
             ahead: own.ahead().min(others.ahead()),
             motion: own.spread + others.spread + (own.drift - others.drift).length() * moment.duration,
             in_images: a != b && meet_in_images(own, others),
+            again: false,
             measures: Measure::Nothing,
         })
     }
@@ -96,7 +97,7 @@ impl Tissue {
     }
 
     /// Has what is near be known of the pairs of an island, or trees be where surfaces are.
-    fn know_pairs(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
+    fn know_pairs(&mut self, island: usize, bodies: &impl Systems, moment: &Span, again: bool) {
         let Self {
             skins,
             entangled,
@@ -104,28 +105,34 @@ impl Tissue {
             islands,
             ..
         } = self;
-        let mut all = islands.searches(island).enumerate();
-        let holds = all.all(|(number, pair)| {
+        for (number, pair) in islands.searches(island).enumerate() {
             let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
-            search.is_none_or(|search| pairs.holds(number, &search))
-        });
-        if holds {
+            if search.is_none_or(|search| again && search.has_foreseen() || pairs.holds(number, &search)) {
+                continue;
+            }
+            for place in pair {
+                skins[place].iter_mut().for_each(Skin::fit);
+            }
+            let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
+            if search.is_some_and(|search| pairs.renew(number, &search)) {
+                continue;
+            }
+            for &place in islands.members(island) {
+                if let Some(Some(skin)) = skins.get_mut(place as usize) {
+                    skin.fit();
+                }
+            }
+            let (skins, entangled) = (&*skins, &*entangled);
+            let all = islands.searches(island);
+            pairs.find(all.map(|pair| Self::search_by_distance((skins, entangled), pair, bodies, moment)));
             return;
         }
-        for &place in islands.members(island) {
-            if let Some(Some(skin)) = skins.get_mut(place as usize) {
-                skin.fit();
-            }
-        }
-        let (skins, entangled) = (&*skins, &*entangled);
-        let all = islands.searches(island);
-        pairs.find(all.map(|pair| Self::search_by_distance((skins, entangled), pair, bodies, moment)));
     }
 
     /// Adds the contacts that are not known yet, of those that meet; again in the same substep: where impulses have led further than was looked.
     pub(super) fn find(&mut self, island: usize, bodies: &impl Systems, moment: &Span, again: bool) {
         let measures = moment.begins && !again;
-        self.know_pairs(island, bodies, moment);
+        self.know_pairs(island, bodies, moment, again);
         let Self {
             skins,
             clearances,
@@ -149,6 +156,7 @@ impl Tissue {
             if again && search.has_foreseen() {
                 continue;
             }
+            search.again = again;
             let [a, b] = search.parties.map(|party| party.place);
             let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {
                 continue;

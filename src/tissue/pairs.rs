@@ -20,6 +20,9 @@ const LEAST_MARGIN: f32 = 0.05;
 const MOST_MARGIN: f32 = 0.5;
 const SUBSTEPS: f32 = 16.0;
 
+/// Where there is no room for what such a margin lists, this part of it is tried.
+const SHORTER: f32 = 0.25;
+
 /// Features near corners and edges that there is room for, for each of those: of other bodies, and of the same one.
 const ROOM: usize = 4;
 const ROOM_WITH_ITSELF: usize = 24;
@@ -58,8 +61,8 @@ saved! { NearRun { number, first, end, apart, is_outside } }
 struct List {
     first: u32,
     ends: [u32; 3],
-    /// Everything that was no further apart than this is listed, m.
-    within: f32,
+    /// All corners and faces, and all edges, that were no further apart than this are listed, m.
+    within: [f32; 2],
     /// How far the bodies have moved against each other since, at most, m.
     moved: f32,
 }
@@ -70,14 +73,14 @@ saved! { List { first, ends, within, moved } }
 #[derive(Debug, Default)]
 pub(super) struct Pairs {
     is_known: bool,
-    /// Whether there was no room in this step.
-    is_full: bool,
+    /// What part of their margins there is room for in this step; 0: for none.
+    room: f32,
     lists: Vec<List>,
     runs: Vec<NearRun>,
     features: Vec<Near>,
 }
 
-saved! { Pairs { is_known, is_full, lists, runs, features } }
+saved! { Pairs { is_known, room, lists, runs, features } }
 
 /// The list of one pair, to be gone through.
 pub(super) struct Known<'a> {
@@ -112,7 +115,7 @@ impl Pairs {
 
     /// A step of an island begins.
     pub fn forget(&mut self) {
-        (self.is_known, self.is_full) = (false, false);
+        (self.is_known, self.room) = (false, 1.0);
     }
 
     /// Takes into account how far bodies went since they were looked at last.
@@ -132,43 +135,60 @@ impl Pairs {
     /// Whether everything that can meet in this search is in the list of the pair.
     pub fn holds(&self, pair: usize, search: &PairSearch) -> bool {
         let list = self.lists.get(pair).filter(|_| self.is_known);
-        list.is_some_and(|list| search.reach() * (1.0 + ROUNDING) + list.moved <= list.within)
+        list.is_some_and(|list| {
+            let mut all = search.reaches().into_iter().zip(list.within);
+            all.all(|(reach, within)| reach * (1.0 + ROUNDING) + list.moved <= within)
+        })
+    }
+
+    /// Lists anew what is near in the search of one pair, by trees that are where the surfaces are: whether there was room.
+    pub fn renew(&mut self, pair: usize, search: &PairSearch) -> bool {
+        let list = self.is_known.then(|| self.list(Some(search))).flatten();
+        let place = self.lists.get_mut(pair);
+        list.zip(place).map(|(list, place)| *place = list).is_some()
     }
 
     /// Lists what is near in each of these searches, by trees that are where the surfaces are; `None`: one that does not meet. Without room nothing is
     /// known in this step.
-    pub fn find<'a>(&mut self, mut searches: impl Iterator<Item = Option<PairSearch<'a>>>) {
-        if self.is_full {
-            return;
+    pub fn find<'a>(&mut self, searches: impl Iterator<Item = Option<PairSearch<'a>>> + Clone) {
+        while self.room > 0.0 {
+            self.lists.clear();
+            self.runs.clear();
+            self.features.clear();
+            let mut lists = searches.clone().map(|search| {
+                let list = self.list(search.as_ref())?;
+                put(&mut self.lists, list)
+            });
+            self.is_known = lists.all(|list| list.is_some());
+            if self.is_known {
+                return;
+            }
+            self.room = if self.room == 1.0 { SHORTER } else { 0.0 };
         }
-        self.lists.clear();
-        self.runs.clear();
-        self.features.clear();
-        self.is_known = searches.try_for_each(|search| self.add(search.as_ref())).is_some();
-        self.is_full = !self.is_known;
+        self.is_known = false;
     }
 
-    fn add(&mut self, search: Option<&PairSearch>) -> Option<()> {
+    fn list(&mut self, search: Option<&PairSearch>) -> Option<List> {
         let first = self.runs.len() as u32;
         let mut list = List {
             first,
             ends: [first; 3],
-            within: 0.0,
+            within: [0.0; 2],
             moved: 0.0,
         };
         if let Some(search) = search {
-            list.within = search.reach() + search.margin();
-            let [a, b] = search.parties;
-            self.corners(search, [a, b], list.within)?;
+            list.within = search.reaches().map(|reach| reach + self.room * search.margin());
+            let ([a, b], [of_corners, of_edges]) = (search.parties, list.within);
+            self.corners(search, [a, b], of_corners)?;
             list.ends[0] = self.runs.len() as u32;
             if !search.is_of_one() {
-                self.corners(search, [b, a], list.within)?;
+                self.corners(search, [b, a], of_corners)?;
             }
             list.ends[1] = self.runs.len() as u32;
-            self.edges(search, list.within)?;
+            self.edges(search, of_edges)?;
             list.ends[2] = self.runs.len() as u32;
         }
-        put(&mut self.lists, list)
+        Some(list)
     }
 
     /// The list of a pair.
@@ -278,6 +298,11 @@ impl PairSearch<'_> {
     /// The same of edges: none is led out of a body.
     pub fn reach_of_edges(&self) -> f32 {
         self.radius + self.ahead + self.motion
+    }
+
+    /// How far apart corners and faces, and edges, are at most that can meet, m.
+    fn reaches(&self) -> [f32; 2] {
+        [self.reach(), self.reach_of_edges()]
     }
 
     /// How much further away than that is listed, m.

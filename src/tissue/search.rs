@@ -7,6 +7,7 @@ use super::clearances::{Clearances, SurfaceFeature};
 use super::link::ContactSide;
 use super::pairs::{Known, Near};
 use super::skin::{Clearance, NONE, PARTED, Skin};
+use super::wound::Wound;
 use crate::contact::sweep::{Corners, Segment, Separation};
 use crate::geometry::Bounds;
 
@@ -63,6 +64,8 @@ pub(super) struct PairSearch<'a> {
     pub motion: f32,
     /// Whether they find each other in images.
     pub in_images: bool,
+    /// Whether it is not the first of the substep: what impulses have led nowhere else is passed over.
+    pub again: bool,
     pub measures: Measure,
 }
 
@@ -92,9 +95,14 @@ impl PairSearch<'_> {
                     if !(run.apart - moved <= reach) {
                         continue;
                     }
-                    let from = From::Known(run.of(features), [moved, reach]);
                     let corner = run.number as usize;
-                    let parties = [of_nodes, of_faces];
+                    let near = run.of(features);
+                    let (parties, node) = ([of_nodes, of_faces], [of_nodes.skin.nodes[corner]]);
+                    let face = |near: &Near| &of_faces.skin.triangles[near.feature as usize];
+                    if !near.iter().any(|near| self.may_find(parties, &node, face(near))) {
+                        continue;
+                    }
+                    let from = From::Known(near, [moved, reach]);
                     let least;
                     (least, run.is_outside) =
                         self.node_with_faces(parties, corner, from, kept.as_deref_mut(), &mut see);
@@ -103,7 +111,14 @@ impl PairSearch<'_> {
             }
             let reach = self.reach_of_edges();
             for run in edges.iter_mut().filter(|run| run.apart - moved <= reach) {
-                let (from, edge) = (From::Known(run.of(features), [moved, reach]), run.number as usize);
+                let edge = run.number as usize;
+                let near = run.of(features);
+                let ends = &first.skin.edges[edge];
+                let other = |near: &Near| &second.skin.edges[near.feature as usize];
+                if !near.iter().any(|near| self.may_find(self.parties, ends, other(near))) {
+                    continue;
+                }
+                let from = From::Known(near, [moved, reach]);
                 run.apart = moved + self.edge_with_edges(edge, from, of_first.as_deref_mut(), &mut see);
             }
         } else {
@@ -121,11 +136,17 @@ impl PairSearch<'_> {
         }
     }
 
-    /// Whether all that may meet now, as impulses have led the nodes, was found before they acted. A surface between two of its own layers meets both, one
-    /// search after the other.
+    /// Whether all that may meet now, as impulses have led the nodes, was found before they acted. Wounds turn as these lead them.
     pub fn has_foreseen(&self) -> bool {
         let strayed: f32 = self.parties.iter().map(|party| party.skin.strayed).sum();
-        !self.is_of_one() && strayed <= self.ahead
+        let is_open = self.is_of_one() && self.parties[0].skin.wound().is_some_and(Wound::is_open);
+        !is_open && strayed <= self.ahead
+    }
+
+    /// Whether two features of these nodes may meet where the searches before it in the substep have not found that they do: impulses have led them
+    /// further than was looked.
+    fn may_find(&self, [a, b]: [Party; 2], nodes: &[u32], others: &[u32]) -> bool {
+        !self.again || a.skin.strayed_of(nodes) + b.skin.strayed_of(others) > self.ahead
     }
 
     pub(super) fn is_of_one(&self) -> bool {
@@ -242,6 +263,7 @@ impl PairSearch<'_> {
                 behind = (height < 0.0).then_some((triangle, start));
             }
             if height >= 0.0
+                && self.may_find([of_nodes, of_faces], &[node], &nodes)
                 && let Some((found, is_ahead)) =
                     self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners), start)
             {
@@ -342,7 +364,7 @@ impl PairSearch<'_> {
                 let start = from_start.offset.length();
                 least = least.min(start);
                 nearest = nearest.min(start);
-                if !meets || start > far {
+                if !meets || start > far || !self.may_find(self.parties, &edge, &other) {
                     continue;
                 }
                 let met = self.approach(second.skin, (edge, &segment), (&other, &corners), from_start);

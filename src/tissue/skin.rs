@@ -53,7 +53,8 @@ pub(crate) struct Skin {
     pub moved: Bounds,
     /// The box of all velocities that were given.
     pub given: Bounds,
-    /// How far impulses have led any node from where it was expected in the substep, m, one time after the other.
+    /// How far impulses have led each node from where it was expected in the substep, m, one time after the other, and the furthest of them.
+    pub strays: Vec<f32>,
     pub strayed: f32,
     /// How long its short edges were at first, m: but for a twentieth all are longer. Those without length do not count.
     pub short: f32,
@@ -78,7 +79,7 @@ pub(crate) struct Skin {
 
 saved! { Skin {
     nodes, edges, triangles, owned, forest, room, is_closed, pierces, flatness, crossings, origin, starts, velocities,
-    expected, changes, drift, spread, moved, given, strayed, short, extent, firsts, travel, meets_bodies,
+    expected, changes, drift, spread, moved, given, strays, strayed, short, extent, firsts, travel, meets_bodies,
     asks_for_images, resolution, images, changing, is_fitted,
 } }
 
@@ -201,12 +202,14 @@ impl Skin {
             spread: 0.0,
             moved: Bounds::EMPTY,
             given: Bounds::EMPTY,
+            strays: memory::filled(0.0, body.node_count())?,
             strayed: 0.0,
             triangles,
             changing,
             is_fitted: true,
         };
         skin.nodes.try_reserve_exact(spare)?;
+        skin.strays.try_reserve_exact(spare)?;
         for values in [&mut skin.triangles, &mut skin.owned] {
             values.try_reserve_exact(2 * spare)?;
         }
@@ -326,7 +329,10 @@ impl Skin {
         if begins {
             self.changes.clear();
         }
-        self.strayed = 0.0;
+        if self.strayed > 0.0 {
+            self.strays.fill(0.0);
+            self.strayed = 0.0;
+        }
         let origin = body.origin;
         self.is_closed &= !body.is_cut_open;
         let (bindings, motion_of) = body.motion();
@@ -345,6 +351,13 @@ impl Skin {
         }
     }
 
+    /// How far impulses have led any of these nodes from where it was expected in the substep, m.
+    pub fn strayed_of(&self, nodes: &[u32]) -> f32 {
+        nodes
+            .iter()
+            .fold(0.0, |strayed, &node| self.strays[node as usize].max(strayed))
+    }
+
     /// Takes nodes to go as impulses have them go by now, and points that are bound to them with those.
     pub fn go_on(&mut self, body: &System, duration: f32) {
         let bindings = body.bindings.as_ref().filter(|_| self.changing.is_some());
@@ -355,15 +368,15 @@ impl Skin {
             let velocity = bound.of(|node| self.velocities.get(node));
             self.velocities.set(bound.node as usize, velocity);
         }
-        let (mut all, mut strayed) = (Bounds::EMPTY, 0.0_f32);
+        let mut all = Bounds::EMPTY;
         for &node in &self.nodes {
             let node = node as usize;
             let velocity = self.velocities.get(node);
-            strayed = strayed.max(velocity.distance_squared(self.expected.get(node)));
+            self.strays[node] += duration * velocity.distance(self.expected.get(node));
+            self.strayed = self.strayed.max(self.strays[node]);
             self.expected.set(node, velocity);
             all = all.with(velocity - self.drift);
         }
-        self.strayed += duration * strayed.sqrt();
         self.spread = self.spread.max(duration * all.magnitudes().length());
     }
 
