@@ -329,10 +329,6 @@ impl Skin {
         if begins {
             self.changes.clear();
         }
-        if self.strayed > 0.0 {
-            self.strays.fill(0.0);
-            self.strayed = 0.0;
-        }
         let origin = body.origin;
         self.is_closed &= !body.is_cut_open;
         let (bindings, motion_of) = body.motion();
@@ -425,6 +421,7 @@ impl Skin {
     ) {
         self.origin = origin;
         self.given = Bounds::EMPTY;
+        self.strayed = 0.0;
         let (mut all, mut moved) = (Bounds::EMPTY, Bounds::EMPTY);
         for &node in self.changing.iter().flat_map(|changing| &changing.movers) {
             let (start, velocity) = motion_of(node as usize);
@@ -448,6 +445,7 @@ impl Skin {
             self.starts.set(node as usize, start);
             self.velocities.set(node as usize, velocity);
             self.expected.set(node as usize, expected);
+            self.strays[node as usize] = 0.0;
             all = all.with(expected);
         }
         self.moved = moved;

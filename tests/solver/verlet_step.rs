@@ -20,6 +20,16 @@ fn swinging(seed: u64) -> Parts {
     parts
 }
 
+/// It falls in steps to this tolerance, m.
+fn in_steps_to(tolerance: f32, parts: &Parts) -> Scene {
+    let definition = WorldDefinition {
+        gravity: GRAVITY,
+        tolerance,
+        ..FREE
+    };
+    Scene::new(parts, definition)
+}
+
 #[test]
 fn a_step_keeps_its_tolerance() {
     a_step_keeps_its_tolerance_of(0.02);
@@ -36,14 +46,7 @@ fn a_step_keeps_its_tolerance_of(damping: f32) {
     parts.node_dampings.fill(damping);
     for tolerance in [1e-3_f32, 1e-4, 1e-5] {
         for h in [1e-3_f32, 1.0 / 60.0, 0.05] {
-            let mut scene = Scene::new(
-                &parts,
-                WorldDefinition {
-                    gravity: GRAVITY,
-                    tolerance,
-                    ..FREE
-                },
-            );
+            let mut scene = in_steps_to(tolerance, &parts);
             for step in 0..4 {
                 let mut reference = parts.reference(GRAVITY);
                 reference.positions = scene.positions();
@@ -71,14 +74,7 @@ fn a_step_keeps_its_tolerance_of(damping: f32) {
 fn a_finer_tolerance_takes_more_substeps() {
     let parts = swinging(22);
     let substeps = [0.0, 1e-3, 1e-5].map(|tolerance| {
-        let mut scene = Scene::new(
-            &parts,
-            WorldDefinition {
-                gravity: GRAVITY,
-                tolerance,
-                ..FREE
-            },
-        );
+        let mut scene = in_steps_to(tolerance, &parts);
         let report = scene.step(0.02);
         assert_eq!(report.error_estimate == 0.0, tolerance == 0.0);
         report.substeps

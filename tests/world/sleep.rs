@@ -384,6 +384,7 @@ fn every_solver_storage_and_model_sleeps_of(is_tried: fn(usize) -> bool) {
             slab.lead(top - 0.002, 0.2);
         }
         let (felt, expected) = (asleep.force(), awake.force());
+        assert!(expected.length() > 0.0, "{name}: nothing is felt");
         assert!(
             felt.distance(expected) <= 0.02 * expected.length(),
             "{name}: {felt} N asleep, {expected} N awake"
