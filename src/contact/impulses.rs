@@ -7,7 +7,7 @@ pub(super) const SWEEPS: u32 = 128;
 const CONVERGED: f32 = 1e-5;
 
 /// The part of how deep something began inside that it is moved out by in a substep, at most.
-pub(crate) const PUSHED_OUT: f32 = 0.2;
+pub(super) const PUSHED_OUT: f32 = 0.2;
 
 /// s: in substeps so short that this is longer than a fifth of it, what is inside is moved out with a speed of its depth over this time. A part of the
 /// depth in each would be the faster the shorter they are, and viscous tissue would ask for ever shorter ones.

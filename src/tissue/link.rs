@@ -6,6 +6,7 @@ use super::skin::Skin;
 use crate::codec::saved;
 use crate::contact::impulses::LEVERAGE;
 use crate::contact::supports::MOST;
+use crate::soa::Vectors;
 use crate::solver::System;
 
 /// A node, edge or face of a body, and a point of it.
@@ -22,6 +23,9 @@ saved! { ContactSide { body, nodes, weights } }
 
 /// Which sides a contact is between, whatever points of them.
 pub(super) type Key = [(usize, [u32; 3]); 2];
+
+/// The part of how much too close its sides began that a contact moves them apart by in a substep, at most: with more, what rests on a tip trembles.
+const MOVED_OUT: f32 = 0.05;
 
 /// A contact over one step: the first side stays clear of the second.
 #[derive(Clone, Copy, Debug)]
@@ -45,10 +49,12 @@ pub(super) struct Link {
     /// What it has given so far, N s.
     impulse: f32,
     friction_impulse: Vec3,
+    /// The same of what moves its sides apart without giving them speed, kg m.
+    push: f32,
 }
 
 saved! { Link {
-    sides, normal, least_speed, depth, is_parted, friction, movers, counts, answers, mass, impulse, friction_impulse,
+    sides, normal, least_speed, depth, is_parted, friction, movers, counts, answers, mass, impulse, friction_impulse, push,
 } }
 
 impl ContactSide {
@@ -136,13 +142,24 @@ impl Link {
             mass: 1.0 / whole.max(leverage),
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
+            push: 0.0,
         })
     }
 
     /// Lets the sides come closer by `gap` within `duration` seconds, and no further; where that is below 0, not closer.
     pub fn allow_gap(&mut self, gap: f32, duration: f32) {
         self.depth = -gap;
-        self.least_speed = -gap.max(0.0) / duration;
+        self.least_speed = self.least_speed_found(duration);
+    }
+
+    /// The least speed that its gap asks for, m/s.
+    pub fn least_speed_found(&self, duration: f32) -> f32 {
+        -(-self.depth).max(0.0) / duration
+    }
+
+    /// Has the sides go faster apart by what brings them nearer beside their way along the normal, m.
+    pub fn turn(&mut self, nearer: f32, duration: f32) {
+        self.least_speed = self.least_speed_found(duration) + nearer.max(0.0) / duration;
     }
 
     /// Whether it has given anything.
@@ -162,38 +179,49 @@ impl Link {
         given += friction - self.friction_impulse;
         self.friction_impulse = friction;
         if given != Vec3::ZERO {
-            self.give(given, skins);
+            self.give(given, skins, |skin| &mut skin.velocities);
         }
         given.length() / self.mass
     }
 
-    fn give(&self, impulse: Vec3, skins: &mut [Option<Skin>]) {
+    /// Adds what its nodes get for an impulse to their values.
+    fn give(&self, impulse: Vec3, skins: &mut [Option<Skin>], values: impl Fn(&mut Skin) -> &mut Vectors) {
         for (index, impulse) in [impulse, -impulse].into_iter().enumerate() {
             if let Some(skin) = &mut skins[self.sides[index].body] {
+                let values = values(skin);
                 for ((node, _), answer) in self.movers(index).zip(&self.answers[index]) {
-                    let mean = skin.velocities.get(node as usize) + impulse * *answer;
-                    skin.velocities.set(node as usize, mean);
+                    let value = values.get(node as usize) + impulse * *answer;
+                    values.set(node as usize, value);
                 }
             }
         }
     }
 
-    /// The displacements, m, that move the sides apart by `way`, m, in a substep of `duration` seconds.
+    /// Moves its sides apart where they began too close, by `most` at most, m, in a substep of `duration` seconds, or no closer than they may come
+    /// otherwise: [`Skin::expected`] has how far each node has been moved.
     ///
     /// Sides that a cut has parted begin too close: they go no further than they were kept from going, so that nothing parts them where nothing
     /// presses.
-    pub fn parting(&self, way: f32, duration: f32) -> impl Iterator<Item = (usize, usize, Vec3)> + '_ {
-        let mut push = way * self.mass;
+    pub fn part(&mut self, most: f32, duration: f32, skins: &mut [Option<Skin>]) {
+        let moved = self.against(skins, |skin| &skin.expected).dot(self.normal);
+        let way = if self.depth > 0.0 {
+            most.min(MOVED_OUT * self.depth)
+        } else if moved < 0.0 {
+            let speed = self.velocity(skins).dot(self.normal);
+            (self.least_speed - speed).min(0.0) * duration
+        } else {
+            return;
+        };
+        let mut push = (self.push + (way - moved) * self.mass).max(0.0);
+        if self.depth > 0.0 {
+            push = push.min(way * self.mass);
+        }
         if self.is_parted {
             push = push.min(self.impulse * duration);
         }
-        let push = self.normal * push;
-        (0..2).flat_map(move |side| {
-            let sign = [1.0, -1.0][side];
-            let (body, movers) = (self.sides[side].body, self.movers[side]);
-            (0..self.counts[side] as usize)
-                .map(move |place| (body, movers[place].0 as usize, push * self.answers[side][place] * sign))
-        })
+        let more = self.normal * (push - self.push);
+        self.push = push;
+        self.give(more, skins, |skin| &mut skin.expected);
     }
 
     /// The nodes that move a side, with their parts of it.
@@ -208,11 +236,24 @@ impl Link {
 
     /// Of the first side against the second, m/s.
     fn velocity(&self, skins: &[Option<Skin>]) -> Vec3 {
+        self.against(skins, |skin| &skin.velocities)
+    }
+
+    /// What the first side has more of these values than the second.
+    fn against(&self, skins: &[Option<Skin>], values: impl Fn(&Skin) -> &Vectors) -> Vec3 {
         let [first, second] = [0, 1].map(|side| match &skins[self.sides[side].body] {
-            Some(skin) => weighted(self.movers(side), |node| skin.velocities.get(node)),
+            Some(skin) => weighted(self.movers(side), |node| values(skin).get(node)),
             None => Vec3::ZERO,
         });
         first - second
+    }
+
+    /// The nodes that move both sides, with the places of their bodies.
+    pub fn all_movers(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        (0..2).flat_map(move |side| {
+            self.movers(side)
+                .map(move |(node, _)| (self.sides[side].body, node as usize))
+        })
     }
 
     /// Which sides it is between, whatever points of them.
@@ -240,7 +281,7 @@ impl Link {
 
     /// Has nodes receive so many times what it gives.
     pub fn give_share(&self, share: f32, skins: &mut [Option<Skin>]) {
-        self.give(self.given() * share, skins);
+        self.give(self.given() * share, skins, |skin| &mut skin.velocities);
     }
 
     /// Takes it to have given so many times what it gave.

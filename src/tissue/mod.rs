@@ -18,6 +18,7 @@ mod link;
 mod lockstep;
 mod narrow_phase;
 mod pairs;
+mod passing;
 mod plan;
 mod search;
 mod skin;
@@ -40,10 +41,12 @@ use self::touches::Touches;
 use self::touching::TouchingPairs;
 use self::warm_start::{Pushes, give_again};
 
+use glam::Vec3;
+
 use crate::base::{Count, Result, Stage, Stopwatch, memory};
 use crate::codec::saved;
 use crate::contact::Contacts;
-use crate::contact::impulses::{Effort, PUSHED_OUT, Sweep, relax};
+use crate::contact::impulses::{Effort, Sweep, relax};
 use crate::geometry::Bounds;
 use crate::solver::{Span, System, Systems};
 
@@ -60,6 +63,12 @@ const EFFORT: Effort = Effort {
 /// How fast one contact moves what began too close apart at most, as a part of the smaller body's extent, 1/s. The bodies keep about this speed, so
 /// it bounds the energy that they gain.
 const PARTING_SPEED: f32 = 0.3;
+
+/// So often contacts whose sides would pass each other are solved again.
+const LACKS: u32 = 8;
+
+/// So many times contacts part their sides in turn: each knows where those before it have moved them.
+const PARTINGS: u32 = 4;
 
 /// What moves three corners, each of them bound to four nodes at most.
 const MOST_MOVERS: usize = 12;
@@ -338,19 +347,23 @@ impl Tissue {
     fn solve(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) -> bool {
         let mut first = None;
         let mut has_begun = false;
+        let mut lacks = 0;
         for _ in 0..SEARCHES {
             let known = self.links.len();
+            let (mut searches, mut lack) = (true, false);
             if has_begun {
                 self.go_on(island, bodies, moment);
-                if self.has_foreseen(island, bodies, moment) {
-                    break;
-                }
+                lack = lacks < LACKS && self.hold_sides(moment);
+                lacks += u32::from(lack);
+                searches = !self.has_foreseen(island, bodies, moment);
             }
-            let watch = Stopwatch::start(moment.profile);
-            self.find(island, bodies, moment, has_begun);
-            watch.stop(moment.profile, Stage::NarrowPhase);
-            watch.take_off(moment.profile, Stage::ContactSolver);
-            if self.links.len() == known && (has_begun || !self.bonds.act()) {
+            if searches {
+                let watch = Stopwatch::start(moment.profile);
+                self.find(island, bodies, moment, has_begun);
+                watch.stop(moment.profile, Stage::NarrowPhase);
+                watch.take_off(moment.profile, Stage::ContactSolver);
+            }
+            if self.links.len() == known && !lack && (has_begun || !self.bonds.act()) {
                 break;
             }
             let Self {
@@ -374,7 +387,11 @@ impl Tissue {
             if recalled > 0.0 {
                 first = Some(first.map_or(recalled, |first: f32| first.max(recalled)));
             }
-            first = Some(relax(EFFORT, first, |sweep| {
+            let effort = Effort {
+                goes_on_later: !lack,
+                ..EFFORT
+            };
+            first = Some(relax(effort, first, |sweep| {
                 let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
                 let changes = links.map(|link| link.solve(skins));
                 let mut changed = changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment));
@@ -399,16 +416,35 @@ impl Tissue {
         }
     }
 
-    /// Moves what began too close apart, without giving it speed.
-    fn part(&self, bodies: &mut impl Systems, duration: f32) {
-        for link in self.links.iter().filter(|link| link.depth > 0.0) {
-            let extents = link
-                .sides
-                .map(|side| self.skins[side.body].as_ref().map_or(0.0, |skin| skin.extent));
-            let most = PARTING_SPEED * extents[0].min(extents[1]) * duration;
-            for (place, node, displacement) in link.parting(most.min(PUSHED_OUT * link.depth), duration) {
-                if let Some(body) = bodies.at_mut(place) {
-                    body.part_substep(node, displacement);
+    /// Moves what began too close apart, without giving it speed, and nothing past what is beside it.
+    fn part(&mut self, bodies: &mut impl Systems, duration: f32) {
+        let Self { links, skins, .. } = self;
+        if links.iter().all(|link| link.depth <= 0.0) {
+            return;
+        }
+        // What was expected is known by now: the nodes' ways take its place.
+        for link in links.iter() {
+            for (place, node) in link.all_movers() {
+                if let Some(skin) = &mut skins[place] {
+                    skin.expected.set(node, Vec3::ZERO);
+                }
+            }
+        }
+        for _ in 0..PARTINGS {
+            for link in links.iter_mut() {
+                let extents = link
+                    .sides
+                    .map(|side| skins[side.body].as_ref().map_or(0.0, |skin| skin.extent));
+                let most = PARTING_SPEED * extents[0].min(extents[1]) * duration;
+                link.part(most, duration, skins);
+            }
+        }
+        for (place, node) in links.iter().flat_map(Link::all_movers) {
+            if let (Some(skin), Some(body)) = (&mut skins[place], bodies.at_mut(place)) {
+                let way = skin.expected.get(node);
+                if way != Vec3::ZERO {
+                    body.part_substep(node, way);
+                    skin.expected.set(node, Vec3::ZERO);
                 }
             }
         }

@@ -3,6 +3,7 @@
 mod attach_tissue;
 mod candidates;
 mod changed;
+mod crumpled;
 mod degenerate;
 mod detection_exact;
 mod doors;

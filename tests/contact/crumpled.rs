@@ -1,0 +1,105 @@
+//! Sheets without thickness that meet themselves as they crumple.
+
+use glam::{DVec3, Vec3};
+use sinew::mesh::Mesh;
+use sinew::{BodyContact, BodyDefinition, Shape, Solver, ToolDefinition, Values, World, WorldDefinition};
+
+use crate::support::bodies::Random;
+
+/// Of a cell, m.
+const CELL: f32 = 0.01;
+const CELLS: u32 = 8;
+
+/// A sheet in slight folds falls upright onto the ground, faster at its top: a thickness of 0 still keeps its layers apart.
+#[test]
+fn a_sheet_without_thickness_does_not_pass_itself() {
+    nothing_passes(Solver::Verlet, &[0.5]);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_sheet_without_thickness_does_not_pass_itself_with_implicit() {
+    nothing_passes(Solver::Implicit, &[0.1, 0.5]);
+}
+
+fn nothing_passes(solver: Solver, speeds: &[f32]) {
+    for &speed in speeds {
+        let mut world = World::new(WorldDefinition::default()).expect("a world");
+        let ground = ToolDefinition {
+            friction: 0.3,
+            ..ToolDefinition::new(Shape::Plane)
+        };
+        world.create_tool(&ground).expect("the ground");
+        let size = CELL * CELLS as f32;
+        let mut mesh = Mesh::cloth([size; 2], [CELLS; 2]).expect("a cloth");
+        let middle = 0.5 * size + 0.02;
+        for place in &mut mesh.positions {
+            *place = Vec3::new(place.z, place.x + middle, 0.004 * (60.0 * place.x).sin());
+        }
+        let mass = 5e-5;
+        let body = world
+            .create_body(&BodyDefinition {
+                masses: Values::Uniform(mass),
+                stiffnesses: Values::Uniform(30.0),
+                node_dampings: Values::Uniform(2.0 * mass),
+                solver,
+                contact: BodyContact {
+                    with_itself: true,
+                    thickness: 0.0,
+                    friction: 0.2,
+                    ..BodyContact::default()
+                },
+                ..BodyDefinition::of(&mesh)
+            })
+            .expect("a sheet");
+        let mut random = Random::new(5);
+        let velocities: Vec<Vec3> = mesh
+            .positions
+            .iter()
+            .map(|place| {
+                let aside = 0.1 * random.signed();
+                Vec3::new(-10.0 * place.x, -1.0 - 5.0 * (place.y - middle), aside) * speed
+            })
+            .collect();
+        let body_mut = world.body_mut(body).expect("the sheet");
+        body_mut.set_velocities(&velocities).expect("velocities");
+        let (mut is_folded, limit) = (false, f64::from(CELL).powi(2));
+        for frame in 0..15 {
+            let report = world.step(1.0 / 60.0).expect("a step");
+            let what = format!("{solver:?}, {speed} m/s, frame {frame}");
+            let places: Vec<DVec3> = world
+                .body(body)
+                .expect("the sheet")
+                .positions()
+                .iter()
+                .map(|place| place.as_dvec3())
+                .collect();
+            assert_eq!(crossings(&places, &mesh.triangles), 0, "{what}");
+            assert_eq!(report.crossings, 0, "{what}");
+            // Corners that were two cells apart or more have come together.
+            is_folded |= (0..places.len()).any(|a| {
+                let apart = |b: usize| mesh.positions[a].distance(mesh.positions[b]) > 2.0 * CELL;
+                (0..a).any(|b| places[a].distance_squared(places[b]) < 0.1 * limit && apart(b))
+            });
+        }
+        assert!(is_folded, "{solver:?}, {speed} m/s: nothing met");
+    }
+}
+
+/// How often edges pass through triangles that they share no corner with.
+fn crossings(places: &[DVec3], triangles: &[[u32; 3]]) -> usize {
+    let at = |node: u32| places[node as usize];
+    let volume = |a: DVec3, b: DVec3, c: DVec3, d: DVec3| (b - a).cross(c - a).dot(d - a);
+    let edges = || triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let passes = |[from, to]: [u32; 2], triangle: &[u32; 3]| {
+        let ([p, q], [a, b, c]) = ([at(from), at(to)], triangle.map(at));
+        let turns = [volume(p, q, a, b), volume(p, q, b, c), volume(p, q, c, a)];
+        let is_within = turns.iter().all(|turn| *turn > 0.0) || turns.iter().all(|turn| *turn < 0.0);
+        is_within && volume(a, b, c, p) * volume(a, b, c, q) < 0.0
+    };
+    let of = |triangle: &[u32; 3]| {
+        let others = edges().filter(|edge| edge.iter().all(|node| !triangle.contains(node)));
+        others.filter(|&edge| passes(edge, triangle)).count()
+    };
+    triangles.iter().map(of).sum()
+}
