@@ -22,7 +22,7 @@ impl Tissue {
     /// Asks more of contacts where any has sides that end nearer than they are to, as fast as they go now: whether any has.
     pub(super) fn hold_sides(&mut self, moment: &Span) -> bool {
         let Self { links, skins, .. } = self;
-        let end_of = |link: &Link| End::of(link, skins, moment.duration);
+        let end_of = |link: &Link| SidesEnd::of(link, skins, moment.duration);
         let lacks = moment.drifts && links.iter().any(|link| end_of(link).is_some_and(|end| end.lacks));
         for link in links.iter_mut().filter(|_| lacks) {
             if let Some(end) = end_of(link) {
@@ -34,14 +34,14 @@ impl Tissue {
 }
 
 /// How the sides of a contact end a substep.
-struct End {
+struct SidesEnd {
     /// By how much they are nearer to each other than as fast as they go along the normal, m.
     nearer: f32,
     /// Whether they are too near.
     lacks: bool,
 }
 
-impl End {
+impl SidesEnd {
     /// `None`: the solver has nothing to look after.
     fn of(link: &Link, skins: &[Option<Skin>], duration: f32) -> Option<Self> {
         let [first, second] = &link.sides;
