@@ -154,7 +154,7 @@ impl Link {
 
     /// The least speed that its gap asks for, m/s.
     pub fn least_speed_found(&self, duration: f32) -> f32 {
-        -(-self.depth).max(0.0) / duration
+        self.depth.min(0.0) / duration
     }
 
     /// Has the sides go faster apart by what brings them nearer beside their way along the normal, m.

@@ -1,4 +1,4 @@
-//! Keeps sides that press each other from passing each other as they turn.
+//! Keeps the sides of contacts from passing each other as they turn.
 //!
 //! A contact asks for velocities along the normal that it was found with. What turns meanwhile, or what few sweeps leave, takes its sides nearer than
 //! that by little: but where they keep apart by little too they would pass, and of an open surface nothing tells afterwards which side was which.
@@ -42,7 +42,7 @@ struct SidesEnd {
 }
 
 impl SidesEnd {
-    /// `None`: the solver has nothing to look after.
+    /// `None` of two closed bodies.
     fn of(link: &Link, skins: &[Option<Skin>], duration: f32) -> Option<Self> {
         let [first, second] = &link.sides;
         let (own, others) = (skins[first.body].as_ref()?, skins[second.body].as_ref()?);
@@ -50,19 +50,20 @@ impl SidesEnd {
         if first.body != second.body && own.is_closed && others.is_closed {
             return None;
         }
-        let shift = shift(own, others);
-        let at = |skin: &Skin, node: u32| skin.starts.get(node as usize);
-        let way = |skin: &Skin, node: u32| (skin.expected.get(node as usize) - others.drift) * duration;
-        let ends = [first.nodes[0], first.nodes[1]];
+        let seen = (shift(own, others), others.drift);
+        let ways = [0, 1].map(|end| own.way(first.nodes[end], seen, duration));
         let segment = Segment {
-            ends: ends.map(|node| at(own, node) + shift),
-            steps: ends.map(|node| way(own, node)),
+            ends: ways.map(|(start, _)| start),
+            steps: ways.map(|(_, step)| step),
             radius: 0.0,
         };
+        let ways = second
+            .nodes
+            .map(|node| others.way(node, (Vec3::ZERO, others.drift), duration));
         let is_edge = second.nodes[1] == second.nodes[2];
         let corners = Corners {
-            points: second.nodes.map(|node| at(others, node)),
-            steps: second.nodes.map(|node| way(others, node)),
+            points: ways.map(|(start, _)| start),
+            steps: ways.map(|(_, step)| step),
             count: if is_edge { 2 } else { 3 },
         };
         // As the contact takes them: its points of both, along its normal.

@@ -510,9 +510,7 @@ impl PairSearch<'_> {
 
     /// Where a node begins and how far it goes, as seen from the other body, which goes with `drift`.
     pub(super) fn way(&self, party: Party, node: u32, shift: Vec3, drift: Vec3) -> (Vec3, Vec3) {
-        let node = node as usize;
-        let place = party.skin.starts.get(node) + shift;
-        (place, (party.skin.expected.get(node) - drift) * self.dt)
+        party.skin.way(node, (shift, drift), self.dt)
     }
 
     /// The corners of an edge or a face in its own body's coordinates, and how far they leave its drift.

@@ -347,6 +347,16 @@ impl Skin {
         }
     }
 
+    /// Where a node begins and how far it goes in a substep of `duration` seconds, as seen from a body that goes with `drift` and whose coordinates begin
+    /// `shift` before its own.
+    pub fn way(&self, node: u32, (shift, drift): (Vec3, Vec3), duration: f32) -> (Vec3, Vec3) {
+        let node = node as usize;
+        (
+            self.starts.get(node) + shift,
+            (self.expected.get(node) - drift) * duration,
+        )
+    }
+
     /// How far impulses have led any of these nodes from where it was expected in the substep, m.
     pub fn strayed_of(&self, nodes: &[u32]) -> f32 {
         nodes
