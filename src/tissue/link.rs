@@ -39,6 +39,8 @@ pub(super) struct Link {
     pub depth: f32,
     /// Whether they were one until a cut parted them.
     pub is_parted: bool,
+    /// Whether they only come near: another takes its place where there is no room for both.
+    pub is_ahead: bool,
     pub friction: f32,
     /// The nodes that move each side, so many of them, with their parts of it. They are the side's own but where it is bound to others.
     movers: [[(u32, f32); MOST]; 2],
@@ -54,7 +56,7 @@ pub(super) struct Link {
 }
 
 saved! { Link {
-    sides, normal, least_speed, depth, is_parted, friction, movers, counts, answers, mass, impulse, friction_impulse, push,
+    sides, normal, least_speed, depth, is_parted, is_ahead, friction, movers, counts, answers, mass, impulse, friction_impulse, push,
 } }
 
 impl ContactSide {
@@ -135,6 +137,7 @@ impl Link {
             least_speed: 0.0,
             depth: 0.0,
             is_parted: false,
+            is_ahead: false,
             friction: 0.0,
             movers,
             counts,

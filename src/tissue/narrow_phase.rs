@@ -149,6 +149,8 @@ impl Tissue {
         known.clear();
         known.extend(0..links.len() as u32);
         known.sort_unstable_by_key(|&link| key(&links[link as usize]));
+        // Without room for all, what only comes near gives way to what meets.
+        let mut replaced = links.len()..links.capacity();
         for (number, [a, b]) in islands.searches(island).enumerate() {
             let Some(mut search) = Self::search((skins, entangled), [a, b], bodies, moment) else {
                 continue;
@@ -181,16 +183,22 @@ impl Tissue {
                 let is_known = known
                     .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
                     .is_ok();
-                if is_known || links.len() == links.capacity() || are_joined(bonds, bodies, &touch.sides) {
+                if is_known || are_joined(bonds, bodies, &touch.sides) {
                     return;
                 }
                 let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });
                 if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides) {
                     link.friction = friction;
-                    link.is_parted = touch.is_parted;
+                    (link.is_parted, link.is_ahead) = (touch.is_parted, touch.is_ahead);
                     link.allow_gap(touch.gap, moment.duration);
                     pushes.recall(&mut link);
-                    links.push(link);
+                    if links.len() < links.capacity() {
+                        links.push(link);
+                    } else if !link.is_ahead
+                        && let Some(place) = replaced.find(|&place| links[place].is_ahead)
+                    {
+                        links[place] = link;
+                    }
                 }
             });
         }
@@ -235,5 +243,41 @@ fn near(skin: &Skin, other: &Skin, radius: f32) -> Bounds {
     Bounds {
         min: (others.min + shift - margin).max(own.min),
         max: (others.max + shift + margin).min(own.max),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::link::Link;
+    use super::super::pairs::tests::world;
+    use crate::mesh::Mesh;
+    use crate::{Solver, World};
+
+    fn links(world: &mut World) -> &mut Vec<Link> {
+        &mut world.tissue.as_mut().expect("it meets itself").links
+    }
+
+    #[test]
+    fn what_only_comes_near_gives_way_to_what_meets() {
+        let sheet = Mesh::cloth([0.1; 2], [8; 2]).expect("a cloth");
+        let (mut world, _) = world(&sheet, Solver::Verlet, 0.002);
+        let mut seen = 0;
+        for _ in 0..40 {
+            let before = world.save().expect("a snapshot");
+            world.step(1e-3).expect("a step");
+            let found = links(&mut world);
+            let meeting = found.iter().filter(|link| !link.is_ahead).count();
+            if meeting < found.len() && meeting > 4 {
+                let mut other = World::load(&before, 1, None).expect("the snapshot");
+                // Room for some of what meets.
+                *links(&mut other) = Vec::with_capacity(meeting / 2);
+                other.step(1e-3).expect("a step");
+                let found = links(&mut other);
+                assert_eq!(found.len(), found.capacity());
+                assert!(found.iter().all(|link| !link.is_ahead));
+                seen += 1;
+            }
+        }
+        assert!(seen > 10, "{seen}");
     }
 }

@@ -95,6 +95,15 @@ impl NearRun {
         &mut features[self.first as usize..self.end as usize]
     }
 
+    /// Has edges that met nothing, as they were flat, be compared again after bodies have moved so far.
+    fn compare_flat(&mut self, features: &mut [Near], moved: f32) {
+        for near in self.of(features) {
+            if near.apart == f32::INFINITY {
+                (near.apart, self.apart) = (moved, self.apart.min(moved));
+            }
+        }
+    }
+
     /// How far away anything is at most that it can meet, m, after bodies have moved so far: only what may be inside another is led out of it.
     pub fn reach(&self, search: &PairSearch, moved: f32) -> f32 {
         if self.is_outside && self.apart > moved {
@@ -128,6 +137,12 @@ impl Pairs {
                 let (a, b) = (&first.moved, &second.moved);
                 let most = (a.max - b.min).abs().max((b.max - a.min).abs()).length();
                 list.moved += most * (1.0 + ROUNDING);
+                if first.has_bent || second.has_bent {
+                    let edges = &mut self.runs[list.ends[1] as usize..list.ends[2] as usize];
+                    edges
+                        .iter_mut()
+                        .for_each(|run| run.compare_flat(&mut self.features, list.moved));
+                }
             }
         }
     }
@@ -340,7 +355,7 @@ fn put<T>(values: &mut Vec<T>, value: T) -> Option<()> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::change::tests::meets_itself;
     use super::*;
     use crate::cutting::Sweep;
@@ -348,7 +363,7 @@ mod tests {
     use crate::random::Random;
     use crate::{BodyId, Solver, World, WorldDefinition};
 
-    fn world(mesh: &Mesh, solver: Solver, thickness: f32) -> (World, BodyId) {
+    pub fn world(mesh: &Mesh, solver: Solver, thickness: f32) -> (World, BodyId) {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let mut definition = meets_itself(mesh);
         definition.contact.thickness = thickness;

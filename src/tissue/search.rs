@@ -43,6 +43,8 @@ pub(super) struct PairTouch {
     pub gap: f32,
     /// Whether they were one until a cut parted them.
     pub is_parted: bool,
+    /// Whether they only come near.
+    pub is_ahead: bool,
 }
 
 /// Where those features come from that may be near a corner or an edge.
@@ -287,7 +289,7 @@ impl PairSearch<'_> {
             touched[0] = is_near.then_some((false, nearest.0, triangle, (start, Clearance::of(radius))));
         }
         for place in 0..FACES {
-            let Some((_, _, triangle, (found, clearance))) = touched[place] else {
+            let Some((is_ahead, _, triangle, (found, clearance))) = touched[place] else {
                 break;
             };
             let is_shared = |(_, _, _, (other, _)): &FeatureMet<usize>| {
@@ -306,7 +308,7 @@ impl PairSearch<'_> {
                 },
             ];
             let offset = if is_behind { found.offset } else { -found.offset };
-            self.show(sides, offset, (clearance, shift), see);
+            self.show(sides, (offset, is_ahead), (clearance, shift), see);
         }
         (least, !is_behind)
     }
@@ -405,7 +407,7 @@ impl PairSearch<'_> {
             }
         }
         self.measure(kept, SurfaceFeature::Edge(index), nearest);
-        for (_, _, other, (found, clearance)) in touched.into_iter().flatten() {
+        for (is_ahead, _, other, (found, clearance)) in touched.into_iter().flatten() {
             let sides = [
                 ContactSide::of_edge(first.place, edge, found.along),
                 ContactSide {
@@ -414,7 +416,7 @@ impl PairSearch<'_> {
                     weights: found.weights,
                 },
             ];
-            self.show(sides, -found.offset, (clearance, shift), see);
+            self.show(sides, (-found.offset, is_ahead), (clearance, shift), see);
         }
         least
     }
@@ -476,11 +478,11 @@ impl PairSearch<'_> {
         Some(((found, clearance), is_ahead))
     }
 
-    /// Shows what meets in this direction, of sides that keep so far apart, and in coordinates so far apart.
+    /// Shows what meets in this direction, or only comes near, of sides that keep so far apart, and in coordinates so far apart.
     pub(super) fn show(
         &self,
         sides: [ContactSide; 2],
-        offset: Vec3,
+        (offset, is_ahead): (Vec3, bool),
         (clearance, shift): (Clearance, Vec3),
         see: &mut impl FnMut(PairTouch),
     ) {
@@ -491,6 +493,7 @@ impl PairSearch<'_> {
                 normal,
                 gap: apart.dot(normal) - clearance.radius,
                 is_parted: clearance.is_parted,
+                is_ahead,
             });
         }
     }

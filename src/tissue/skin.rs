@@ -35,6 +35,10 @@ pub(crate) struct Skin {
     pub pierces: Vec<bool>,
     /// Where they need not meet others, as the step begins.
     pub(super) flatness: Flatness,
+    /// How far nodes have gone against each other since it was measured, at most, m.
+    bent: f32,
+    /// Whether it is measured anew in this substep.
+    pub(super) has_bent: bool,
     /// How many times edges pass through tissue, as that was looked for last.
     pub crossings: u32,
     /// Where the body's coordinates begin.
@@ -78,7 +82,7 @@ pub(crate) struct Skin {
 }
 
 saved! { Skin {
-    nodes, edges, triangles, owned, forest, room, is_closed, pierces, flatness, crossings, origin, starts, velocities,
+    nodes, edges, triangles, owned, forest, room, is_closed, pierces, flatness, bent, has_bent, crossings, origin, starts, velocities,
     expected, changes, drift, spread, moved, given, strays, strayed, short, extent, firsts, travel, meets_bodies,
     asks_for_images, resolution, images, changing, is_fitted,
 } }
@@ -187,6 +191,8 @@ impl Skin {
             images: None,
             nodes,
             flatness: Flatness::new(body.node_count() + spare, edges.len() + 3 * spare)?,
+            bent: 0.0,
+            has_bent: false,
             edges,
             owned,
             forest,
@@ -342,8 +348,13 @@ impl Skin {
         if let Some(wound) = changing.as_mut().and_then(|changing| changing.wound.as_mut()) {
             wound.turn(triangles, starts);
         }
-        if begins {
+        // Edges that were flat let others in by half as much: by a quarter of what is kept apart.
+        self.bent += (self.moved.max - self.moved.min).length();
+        let thickness = body.contact.thickness.min(0.5 * WITH_ITSELF * self.short);
+        self.has_bent = self.bent > thickness.max(self.least_thickness());
+        if begins || self.has_bent {
             self.flatness.measure(&self.starts, &self.triangles, &self.edges);
+            self.bent = 0.0;
         }
     }
 

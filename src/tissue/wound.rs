@@ -193,7 +193,7 @@ impl PairSearch<'_> {
                         weights: over.weights,
                     },
                 ];
-                self.show(sides, normal, (Clearance::of(0.0), Vec3::ZERO), see);
+                self.show(sides, (normal, false), (Clearance::of(0.0), Vec3::ZERO), see);
             }
         }
     }
@@ -270,7 +270,7 @@ impl PairSearch<'_> {
                         weights: found.weights,
                     },
                 ];
-                self.show(sides, normal, (Clearance::of(0.0), Vec3::ZERO), see);
+                self.show(sides, (normal, false), (Clearance::of(0.0), Vec3::ZERO), see);
             }
         }
     }
