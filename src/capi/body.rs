@@ -61,7 +61,7 @@ impl sinew_vec3_view {
 pub(super) unsafe fn with_body(
     world: *const sinew_world,
     body: sinew_body_id,
-    call: impl FnOnce(&Body) -> Result<()>,
+    mut call: impl FnMut(&Body) -> Result<()>,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe { with_world(world, |world| call(world.body(body.id())?)) }
@@ -74,7 +74,7 @@ pub(super) unsafe fn with_body(
 pub(super) unsafe fn with_body_mut(
     world: *mut sinew_world,
     body: sinew_body_id,
-    call: impl FnOnce(&mut Body) -> Result<()>,
+    mut call: impl FnMut(&mut Body) -> Result<()>,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe { with_world_mut(world, |world| call(world.body_mut(body.id())?)) }

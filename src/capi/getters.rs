@@ -15,7 +15,7 @@ use crate::world::World;
 ///
 /// # Safety
 /// As of what calls it.
-unsafe fn is_there(world: *const sinew_world, has: impl FnOnce(&World) -> bool) -> u32 {
+unsafe fn is_there(world: *const sinew_world, mut has: impl FnMut(&World) -> bool) -> u32 {
     let mut is_there = false;
     // SAFETY: the same contract.
     unsafe {

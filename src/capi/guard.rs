@@ -21,77 +21,61 @@ impl sinew_world {
             faulty: AtomicBool::new(false),
         }
     }
-
-    fn check(&self) -> Result<()> {
-        if self.faulty.load(Ordering::Acquire) {
-            return Err(Error::Internal(
-                "the world met a fault inside the library earlier: it can only be destroyed".into(),
-            ));
-        }
-        Ok(())
-    }
 }
 
-/// Runs `call`; a panic becomes an error, and every error a status with its message kept.
-pub(super) fn guard(call: impl FnOnce() -> Result<()>) -> sinew_status {
-    match caught(call) {
-        Ok(()) => SINEW_STATUS_OK,
-        Err(error) => fail(error),
-    }
+/// Runs `call` once; a panic becomes an error, and every error a status with its message kept.
+pub(super) fn guard(mut call: impl FnMut() -> Result<()>) -> sinew_status {
+    answer(&mut call, None)
 }
 
-/// Runs `call` with a world to look at.
+/// Runs `call` once with a world to look at.
 ///
 /// # Safety
 /// `world` is NULL or a world that is not destroyed, and that nobody changes meanwhile.
-pub(super) unsafe fn with_world(world: *const sinew_world, call: impl FnOnce(&World) -> Result<()>) -> sinew_status {
+pub(super) unsafe fn with_world(world: *const sinew_world, mut call: impl FnMut(&World) -> Result<()>) -> sinew_status {
     // SAFETY: the caller vouches for the world where the pointer is not NULL.
-    let Some(handle) = (unsafe { world.as_ref() }) else {
-        return fail(Error::invalid("world is NULL"));
-    };
-    guard(|| {
-        handle.check()?;
-        watched(&handle.faulty, || call(&handle.world))
-    })
+    match unsafe { world.as_ref() } {
+        Some(sinew_world { world, faulty }) => answer(&mut || call(world), Some(faulty)),
+        None => fail(Error::invalid("world is NULL")),
+    }
 }
 
-/// Runs `call` with a world to change.
+/// Runs `call` once with a world to change.
 ///
 /// # Safety
 /// `world` is NULL or a world that is not destroyed, and that nobody else uses meanwhile.
 pub(super) unsafe fn with_world_mut(
     world: *mut sinew_world,
-    call: impl FnOnce(&mut World) -> Result<()>,
+    mut call: impl FnMut(&mut World) -> Result<()>,
 ) -> sinew_status {
     // SAFETY: the caller vouches for the world where the pointer is not NULL.
-    let Some(handle) = (unsafe { world.as_mut() }) else {
-        return fail(Error::invalid("world is NULL"));
-    };
-    guard(|| {
-        handle.check()?;
-        watched(&handle.faulty, || call(&mut handle.world))
-    })
+    match unsafe { world.as_mut() } {
+        Some(sinew_world { world, faulty }) => answer(&mut || call(world), Some(faulty)),
+        None => fail(Error::invalid("world is NULL")),
+    }
 }
 
-/// Runs `call` and marks the world faulty where it panics.
-fn watched(faulty: &AtomicBool, call: impl FnOnce() -> Result<()>) -> Result<()> {
-    let result = caught(call);
-    if matches!(result, Err(Error::Internal(_))) {
+/// Runs `call`, and marks its world faulty where it panics. Of hundreds of calls there is but this one copy.
+fn answer(call: &mut dyn FnMut() -> Result<()>, faulty: Option<&AtomicBool>) -> sinew_status {
+    if faulty.is_some_and(|faulty| faulty.load(Ordering::Acquire)) {
+        return fail(Error::Internal(
+            "the world met a fault inside the library earlier: it can only be destroyed".into(),
+        ));
+    }
+    // What a panic leaves half done is inside a world, which is marked faulty and never looked at again.
+    let result = catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let reason = text.or(panic.downcast_ref::<&str>().copied());
+        let reason = reason.unwrap_or("no reason given");
+        Err(Error::Internal(format!("a fault inside the library: {reason}")))
+    });
+    let Err(error) = result else {
+        return SINEW_STATUS_OK;
+    };
+    if let (Error::Internal(_), Some(faulty)) = (&error, faulty) {
         faulty.store(true, Ordering::Release);
     }
-    result
-}
-
-fn caught(call: impl FnOnce() -> Result<()>) -> Result<()> {
-    // What a panic leaves half done is inside a world, which is marked faulty and never looked at again.
-    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|panic| {
-        let reason = panic
-            .downcast_ref::<&str>()
-            .copied()
-            .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
-            .unwrap_or("no reason given");
-        Err(Error::Internal(format!("a fault inside the library: {reason}")))
-    })
+    fail(error)
 }
 
 #[cfg(test)]

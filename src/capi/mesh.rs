@@ -132,7 +132,7 @@ impl sinew_mesh_view {
 ///
 /// # Safety
 /// `out` is NULL or writable.
-pub(super) unsafe fn create(out: *mut *mut sinew_mesh, make: impl FnOnce() -> Result<LoadedMesh>) -> sinew_status {
+pub(super) unsafe fn create(out: *mut *mut sinew_mesh, mut make: impl FnMut() -> Result<LoadedMesh>) -> sinew_status {
     guard(|| {
         // SAFETY: the same contract.
         let out = unsafe { memory::output("out", out) }?;

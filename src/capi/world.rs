@@ -270,7 +270,7 @@ pub unsafe extern "C" fn sinew_world_step(
 pub(super) unsafe fn step_and_report<Report: Into<sinew_step_report>>(
     world: *mut sinew_world,
     report: *mut sinew_step_report,
-    step: impl FnOnce(&mut World) -> Result<Report>,
+    mut step: impl FnMut(&mut World) -> Result<Report>,
 ) -> sinew_status {
     // SAFETY: the same contract.
     unsafe {
