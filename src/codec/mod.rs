@@ -19,7 +19,7 @@ use xxhash_rust::xxh3::Xxh3Default;
 
 pub(crate) use bytes::{Reader, Writer};
 pub(crate) use saved::{
-    Saved, floats_into, least_of_field, saved, saved_enum, shape_of_field, shape_of_name, shape_with,
+    Saved, floats_into, least_of_field, load_count, saved, saved_enum, shape_of_field, shape_of_name, shape_with,
 };
 
 use crate::base::{Error, Result};

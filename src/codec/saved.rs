@@ -297,6 +297,15 @@ impl<T: Saved> Saved for Box<T> {
     }
 }
 
+/// How many values come next that take so many bytes each, at least.
+pub(crate) fn load_count(from: &mut Reader, least: usize) -> Result<usize> {
+    let count = usize::load(from)?;
+    if count > from.left() / least {
+        return Err(from.refusal("more is announced than there is"));
+    }
+    Ok(count)
+}
+
 /// With its room: no step is to ask for memory after loading that it would not have asked for before.
 impl<T: Saved> Saved for Vec<T> {
     const SHAPE: u64 = shape_with(T::SHAPE, 2);
@@ -311,10 +320,7 @@ impl<T: Saved> Saved for Vec<T> {
     }
 
     fn load(from: &mut Reader) -> Result<Self> {
-        let (count, room) = (usize::load(from)?, usize::load(from)?);
-        if count > from.left() / T::LEAST {
-            return Err(from.refusal("more is announced than there is"));
-        }
+        let (count, room) = (load_count(from, T::LEAST)?, usize::load(from)?);
         let mut values = from.reserved(room.max(count))?;
         T::load_all(count, &mut values, from)?;
         Ok(values)
@@ -332,10 +338,7 @@ impl<T: Saved> Saved for Box<[T]> {
     }
 
     fn load(from: &mut Reader) -> Result<Self> {
-        let count = usize::load(from)?;
-        if count > from.left() / T::LEAST {
-            return Err(from.refusal("more is announced than there is"));
-        }
+        let count = load_count(from, T::LEAST)?;
         let mut values = from.reserved(count)?;
         T::load_all(count, &mut values, from)?;
         Ok(values.into_boxed_slice())

@@ -1,7 +1,7 @@
 //! A linked list whose elements are allocated one by one.
 
 use crate::base::{Error, Result, memory};
-use crate::codec::{Reader, Saved, Writer};
+use crate::codec::{Reader, Saved, Writer, load_count};
 
 /// An element on the heap: an array of one, because its memory can be asked for in a way that may be refused.
 type Owned<T> = Box<[ListElement<T>; 1]>;
@@ -106,10 +106,7 @@ impl<T: Saved> Saved for Chain<T> {
     }
 
     fn load(from: &mut Reader) -> Result<Self> {
-        let count = usize::load(from)?;
-        if count > from.left() / T::LEAST {
-            return Err(from.refusal("more is announced than there is"));
-        }
+        let count = load_count(from, T::LEAST)?;
         from.will_take(count.checked_mul(size_of::<ListElement<T>>()))?;
         let mut values = memory::reserved(count)?;
         T::load_all(count, &mut values, from)?;
