@@ -29,6 +29,15 @@ fn a_sheet_without_thickness_does_not_pass_itself_with_implicit() {
     nothing_passes(Solver::Implicit, 0.0, &[0.1, 0.5], 15);
 }
 
+#[test]
+#[ignore = "long"]
+fn a_sheet_that_crumples_within_a_step_does_not_pass_itself_at_other_speeds() {
+    for (thickness, speed) in [(5e-4, 4.0), (2e-3, 15.0), (2e-3, 30.0)] {
+        nothing_passes(Solver::Verlet, thickness, &[speed], 4);
+        nothing_passes(Solver::Implicit, thickness, &[speed], 4);
+    }
+}
+
 fn nothing_passes(solver: Solver, thickness: f32, speeds: &[f32], frames: u32) {
     for &speed in speeds {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
