@@ -64,8 +64,14 @@ const EFFORT: Effort = Effort {
 /// it bounds the energy that they gain.
 const PARTING_SPEED: f32 = 0.3;
 
-/// So often contacts whose sides would pass each other are solved again.
+/// So often contacts whose sides would pass each other are solved again, and until they are solved: between sides that nearly face each other what is
+/// missing travels slowly.
 const LACKS: u32 = 8;
+const EFFORT_AGAIN: Effort = Effort {
+    sweeps: 512,
+    goes_on_later: false,
+    ..EFFORT
+};
 
 /// So many times contacts part their sides in turn: each knows where those before it have moved them.
 const PARTINGS: u32 = 4;
@@ -387,10 +393,7 @@ impl Tissue {
             if recalled > 0.0 {
                 first = Some(first.map_or(recalled, |first: f32| first.max(recalled)));
             }
-            let effort = Effort {
-                goes_on_later: !lack,
-                ..EFFORT
-            };
+            let effort = if lack { EFFORT_AGAIN } else { EFFORT };
             first = Some(relax(effort, first, |sweep| {
                 let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
                 let changes = links.map(|link| link.solve(skins));

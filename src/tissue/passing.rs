@@ -16,7 +16,7 @@ use crate::solver::Span;
 const NEAR: f32 = 0.5;
 
 /// They may end nearer than they are to by this part of the least thickness.
-const ALLOWED: f32 = 0.05;
+const ALLOWED: f32 = 0.01;
 
 impl Tissue {
     /// Asks more of contacts where any has sides that end nearer than they are to, as fast as they go now: whether any has.
