@@ -3,14 +3,14 @@
 //! `cargo run --release --example cloth`
 //!
 //! ```text
-//! time [s]  lowest node [mm]  kinetic energy [mJ]
+//! time [s]  lowest node [cm]  kinetic energy [mJ]
 //!     0.00                 0                  0.0
-//!     0.33              -171                  0.7
-//!     0.67              -177                  0.0
-//!     1.00              -177                  0.0
-//!     1.33              -176                  0.0
-//!     1.67              -176                  0.0
-//!     2.00              -176                  0.0
+//!     0.33               -17                  0.7
+//!     0.67               -18                  0.0
+//!     1.00               -18                  0.0
+//!     1.33               -18                  0.0
+//!     1.67               -18                  0.0
+//!     2.00               -18                  0.0
 //! ```
 #![allow(clippy::print_stdout)]
 
@@ -41,7 +41,7 @@ fn main() -> Result<()> {
     ball.friction = 0.5;
     world.create_tool(&ball)?;
 
-    println!("time [s]  lowest node [mm]  kinetic energy [mJ]");
+    println!("time [s]  lowest node [cm]  kinetic energy [mJ]");
     for frame in 0..=120 {
         if frame % 20 == 0 {
             let body = world.body(cloth)?;
@@ -51,7 +51,7 @@ fn main() -> Result<()> {
                 .map(|place| place.y)
                 .fold(f32::INFINITY, f32::min);
             let kinetic = body.energy(world.gravity()).kinetic;
-            println!("{:8.2}  {:16.0}  {:19.1}", world.time(), 1e3 * lowest, 1e3 * kinetic);
+            println!("{:8.2}  {:16.0}  {:19.1}", world.time(), 1e2 * lowest, 1e3 * kinetic);
         }
         world.step(1.0 / 60.0)?;
     }
