@@ -127,7 +127,7 @@ impl Pairs {
         (self.is_known, self.room) = (false, 1.0);
     }
 
-    /// Takes into account how far bodies went since they were looked at last.
+    /// Takes into account how far bodies went since they were looked at last, and which have bent.
     pub fn advance(&mut self, pairs: impl Iterator<Item = [usize; 2]>, skins: &[Option<Skin>]) {
         if !self.is_known {
             return;
@@ -139,9 +139,9 @@ impl Pairs {
                 list.moved += most * (1.0 + ROUNDING);
                 if first.has_bent || second.has_bent {
                     let edges = &mut self.runs[list.ends[1] as usize..list.ends[2] as usize];
-                    edges
-                        .iter_mut()
-                        .for_each(|run| run.compare_flat(&mut self.features, list.moved));
+                    for run in edges {
+                        run.compare_flat(&mut self.features, list.moved);
+                    }
                 }
             }
         }

@@ -348,7 +348,7 @@ impl Skin {
         if let Some(wound) = changing.as_mut().and_then(|changing| changing.wound.as_mut()) {
             wound.turn(triangles, starts);
         }
-        // Edges that were flat let others in by half as much: by a quarter of what is kept apart.
+        // Edges that were flat let others in by up to half of this: they are not passed over once that is a quarter of what is kept apart.
         self.bent += (self.moved.max - self.moved.min).length();
         let thickness = body.contact.thickness.min(0.5 * WITH_ITSELF * self.short);
         self.has_bent = self.bent > thickness.max(self.least_thickness());
