@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::skin::{NONE, Skin};
+use super::skin::{ELSEWHERE, NONE, Skin, ends_of, number_of};
 use super::wound::Wound;
 use crate::base::{Result, memory};
 use crate::codec::saved;
@@ -27,8 +27,6 @@ pub(super) struct Changing {
     pub movers: Vec<u32>,
     /// For each of the body's numbers what it is to the skin.
     roles: Vec<u8>,
-    /// The edges of each triangle.
-    sides: Vec<[u32; 3]>,
     /// The triangles of each edge: the first one is that which it is looked at with.
     triangles: Vec<[u32; 2]>,
     /// Numbers of the body as it was made are below.
@@ -37,7 +35,7 @@ pub(super) struct Changing {
     pub wound: Option<Wound>,
 }
 
-saved! { Changing { movers, roles, sides, triangles, first_later, wound } }
+saved! { Changing { movers, roles, triangles, first_later, wound } }
 
 /// A body's surface as it is to be, and what moves it.
 pub(crate) struct SurfaceToBe<'a> {
@@ -70,17 +68,14 @@ pub(crate) struct SkinChange {
 }
 
 impl Changing {
-    /// For a body's skin with these edges and triangles, each of which is looked at with those that it owns.
-    pub fn new(body: &System, nodes: &[u32], edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> Result<Self> {
+    /// For a body's skin with so many edges and these of each triangle, marked.
+    pub fn new(body: &System, nodes: &[u32], edges: usize, sides: &[[u32; 3]]) -> Result<Self> {
         let spare = body.spare_nodes();
-        let mut sides = memory::reserved(triangles.len() + 2 * spare)?;
-        let mut of_edge = memory::reserved(edges.len() + 3 * spare)?;
-        of_edge.resize(edges.len(), HOLE);
-        for (number, &triangle) in (0..).zip(triangles) {
-            let own = ends_of(triangle).map(|ends| edges.binary_search(&ends).map_or(NONE, |edge| edge as u32));
-            sides.push(own);
-            for edge in own.into_iter().filter(|&edge| edge != NONE) {
-                join(&mut of_edge[edge as usize], number);
+        let mut of_edge = memory::reserved(edges + 3 * spare)?;
+        of_edge.resize(edges, HOLE);
+        for (number, &own) in (0..).zip(sides) {
+            for side in own.into_iter().filter(|&side| side != NONE) {
+                join(&mut of_edge[number_of(side) as usize], number);
             }
         }
         let mut roles = memory::reserved(body.node_count() + spare)?;
@@ -92,11 +87,10 @@ impl Changing {
         Ok(Self {
             movers: Vec::new(),
             roles,
-            sides,
             triangles: of_edge,
             first_later: body.node_count() as u32,
             wound: if wound {
-                Some(Wound::new(body, triangles.len())?)
+                Some(Wound::new(body, sides.len())?)
             } else {
                 None
             },
@@ -108,18 +102,12 @@ impl Changing {
         self.roles.get(number as usize).is_some_and(|role| role & TAKEN != 0)
     }
 
-    /// The edges of each triangle.
-    pub fn sides(&self) -> &[[u32; 3]] {
-        &self.sides
-    }
-
-    /// Those edges of a triangle that are looked at with it.
-    fn owned(&self, triangle: usize) -> [u32; 3] {
-        let is_first = |edge: u32| {
-            let of_edge = self.triangles.get(edge as usize);
-            of_edge.is_some_and(|of_edge| of_edge[0] as usize == triangle)
-        };
-        self.sides[triangle].map(|edge| if is_first(edge) { edge } else { NONE })
+    /// An edge of a triangle, marked where it is looked at with another.
+    fn marked(&self, triangle: u32, edge: u32) -> u32 {
+        match self.triangles.get(edge as usize) {
+            Some(of_edge) if of_edge[0] == triangle => edge,
+            _ => edge | ELSEWHERE,
+        }
     }
 }
 
@@ -182,16 +170,12 @@ impl Skin {
         self.flatness.reserve(change.node_count, self.edges.len() + edges)?;
         let triangles = change.triangles.len();
         self.triangles.try_reserve(triangles)?;
-        self.owned.try_reserve(triangles)?;
-        if let Some(images) = &mut self.images {
-            images.reserve(triangles)?;
-        }
+        self.sides.try_reserve(triangles)?;
         if let Some(changing) = &mut self.changing {
             changing.movers.try_reserve(change.movers.len())?;
             changing
                 .roles
                 .try_reserve(change.node_count.saturating_sub(changing.roles.len()))?;
-            changing.sides.try_reserve(triangles)?;
             changing.triangles.try_reserve(edges)?;
             if let Some(wound) = &mut changing.wound {
                 wound.reserve(triangles, change.bared.len())?;
@@ -224,7 +208,7 @@ impl Skin {
         // The edges that there were.
         let mut old = memory::reserved(3 * changed.len())?;
         for &(number, _) in changed {
-            let edges = changing.sides[number].into_iter().filter(|&edge| edge != NONE);
+            let edges = self.sides(number).into_iter().filter(|&edge| edge != NONE);
             old.extend(edges.map(|edge| (self.edges[edge as usize], edge)));
         }
         memory::sort_once(&mut old);
@@ -322,11 +306,10 @@ impl Skin {
         for &(number, corners, sides) in &change.triangles {
             if number < self.triangles.len() {
                 self.triangles[number] = corners;
-                changing.sides[number] = sides;
+                self.sides[number] = sides;
             } else {
                 self.triangles.push(corners);
-                changing.sides.push(sides);
-                self.owned.push([NONE; 3]);
+                self.sides.push(sides);
             }
             for corner in corners {
                 let role = &mut changing.roles[corner as usize];
@@ -336,14 +319,12 @@ impl Skin {
                     self.nodes.push(corner);
                 }
             }
-            if let Some(images) = &mut self.images {
-                images.set_edges(number, sides);
-            }
         }
         let whose = change.edges.iter().flat_map(|&(_, _, of_edge)| of_edge);
         let changed = change.triangles.iter().map(|&(number, ..)| number as u32);
         for triangle in whose.filter(|&triangle| triangle != NONE).chain(changed) {
-            self.owned[triangle as usize] = changing.owned(triangle as usize);
+            let sides = self.sides[triangle as usize].map(number_of);
+            self.sides[triangle as usize] = sides.map(|edge| changing.marked(triangle, edge));
         }
         if let Some(wound) = &mut changing.wound {
             wound.bare(&change.bared, &self.triangles, change.node_count);
@@ -360,11 +341,6 @@ fn join(of_edge: &mut [u32; 2], triangle: u32) {
     if let Some(place) = of_edge.iter_mut().find(|of| **of == NONE) {
         *place = triangle;
     }
-}
-
-/// The ends of a triangle's sides, the lower first.
-fn ends_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
-    [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
 }
 
 /// Where a number is, of those that there are and then these, if nodes are at `places`.

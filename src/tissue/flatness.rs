@@ -5,7 +5,6 @@ use glam::Vec3;
 use super::skin::NONE;
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::soa::Vectors;
 
 /// Two edges may come nearer to each other by this part of what is kept off before corners stop them: then these alone meet.
 const FLAT: f32 = 0.25;
@@ -48,6 +47,7 @@ impl Ridge {
         turn: f32::INFINITY,
         length: 0.0,
     };
+    const FLAT: Self = Self { turn: 0.0, length: 0.0 };
 
     /// How far another edge can enter the surface between its corners before one of its own ends touches that, m: as it turns about this edge, or
     /// further on where the other is longer.
@@ -88,17 +88,22 @@ impl Flatness {
         memory::reserve(&mut self.ridges, edges)
     }
 
-    /// Measures a surface with its nodes at these places. Without room nothing counts as flat.
-    pub fn measure(&mut self, places: &Vectors, triangles: &[[u32; 3]], edges: &[[u32; 2]]) {
+    /// Forgets what was measured.
+    pub fn clear(&mut self) {
+        self.ridges.clear();
+    }
+
+    /// Measures a surface with so many numbers of nodes, which are at these places: flat is what was so each time since the last was forgotten. Without
+    /// room nothing counts as flat.
+    pub fn measure(&mut self, nodes: usize, triangles: &[[u32; 3]], edges: &[[u32; 2]], at: impl Fn(u32) -> Vec3) {
         let Self { fans, ridges } = self;
-        fans.clear();
-        ridges.clear();
-        if fans.capacity() < places.len() || ridges.capacity() < edges.len() {
+        if fans.capacity() < nodes || ridges.capacity() < edges.len() {
             return;
         }
-        fans.resize(places.len(), Fan::default());
+        fans.clear();
+        fans.resize(nodes, Fan::default());
         for triangle in triangles {
-            let [a, b, c] = triangle.map(|node| places.get(node as usize));
+            let [a, b, c] = triangle.map(&at);
             let normal = (b - a).cross(c - a).normalize_or_zero();
             for &node in triangle {
                 let fan = &mut fans[node as usize];
@@ -110,16 +115,18 @@ impl Flatness {
             let fan = &mut fans[node as usize];
             fan.edges = fan.edges.saturating_add(1);
         }
-        ridges.extend(edges.iter().map(|edge| {
+        ridges.resize(edges.len(), Ridge::FLAT);
+        for (ridge, edge) in ridges.iter_mut().zip(edges) {
             if edge[0] == NONE {
-                return Ridge::UNKNOWN;
+                *ridge = Ridge::UNKNOWN;
+                continue;
             }
-            let [a, b] = edge.map(|node| node as usize);
-            Ridge {
-                turn: fans[a].turn().max(fans[b].turn()),
-                length: places.get(a).distance(places.get(b)),
-            }
-        }));
+            let [a, b] = edge.map(|node| fans[node as usize].turn());
+            *ridge = Ridge {
+                turn: ridge.turn.max(a).max(b),
+                length: at(edge[0]).distance(at(edge[1])),
+            };
+        }
     }
 
     /// An edge by its number.
@@ -135,13 +142,8 @@ mod tests {
 
     fn measured(places: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<[u32; 2]>, Flatness) {
         let edges = edges(triangles, &[]).expect("memory");
-        let mut vectors = Vectors::zeros(places.len()).expect("memory");
-        places
-            .iter()
-            .enumerate()
-            .for_each(|(node, &place)| vectors.set(node, place));
         let mut flatness = Flatness::new(places.len(), edges.len()).expect("memory");
-        flatness.measure(&vectors, triangles, &edges);
+        flatness.measure(places.len(), triangles, &edges, |node| places[node as usize]);
         (edges, flatness)
     }
 
@@ -204,5 +206,31 @@ mod tests {
         triangles.iter_mut().step_by(2).for_each(|triangle| triangle.swap(0, 1));
         let (edges, flatness) = measured(&cloth.positions, &triangles);
         assert!((0..edges.len()).all(|edge| flatness.of(edge).turn > 0.5));
+    }
+    #[test]
+    fn what_bends_meanwhile_is_not_flat() {
+        let cloth = Mesh::cloth([0.4; 2], [4; 2]).expect("a cloth");
+        let edges = edges(&cloth.triangles, &[]).expect("memory");
+        let middle = (0..).zip(&cloth.positions).find(|(_, place)| place.length() < 1e-6);
+        let (middle, _) = middle.expect("a node in the middle");
+        let turn_after = |bends: &[f32]| {
+            let mut flatness = Flatness::new(cloth.positions.len(), edges.len()).expect("memory");
+            for &bend in bends {
+                let at = |node: u32| {
+                    cloth.positions[node as usize] + if node == middle { bend * Vec3::Y } else { Vec3::ZERO }
+                };
+                flatness.measure(cloth.positions.len(), &cloth.triangles, &edges, at);
+            }
+            let edge = edges
+                .iter()
+                .position(|edge| edge.contains(&middle))
+                .expect("an edge there");
+            flatness.of(edge).turn
+        };
+        assert!(turn_after(&[0.0]) < 1e-3);
+        let bent = turn_after(&[0.02]);
+        assert!(bent > 0.1, "{bent}");
+        assert_eq!(turn_after(&[0.02, 0.0]), bent);
+        assert_eq!(turn_after(&[0.0, 0.02]), bent);
     }
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::skin::{NONE, Skin};
-use crate::base::{Result, memory};
+use crate::base::Result;
 use crate::codec::saved;
 use crate::contact::image_space::Drawn;
 use crate::geometry::Bounds;
@@ -15,13 +15,11 @@ const PIECE: f32 = 8.0;
 #[derive(Debug)]
 pub(super) struct Images {
     drawn: Drawn,
-    /// The edges of each triangle: the one that an edge is looked at with by its tree may not be seen.
-    edges: Vec<[u32; 3]>,
     /// Metres.
     pixel: f32,
 }
 
-saved! { Images { drawn, edges, pixel } }
+saved! { Images { drawn, pixel } }
 
 impl Images {
     /// Room for those of a surface.
@@ -36,43 +34,10 @@ impl Images {
         let spare = room.saturating_sub(skin.triangles.len());
         let triangles = triangles.chain(std::iter::repeat_n([Vec3::ZERO; 3], spare));
         let drawn = Drawn::reserved(skin.resolution, &skin.forest.bounds(), triangles)?;
-        let mut edges = memory::reserved(skin.triangles.len() + spare)?;
-        if let Some(changing) = &skin.changing {
-            edges.extend_from_slice(changing.sides());
-            return Ok(Self {
-                drawn,
-                edges,
-                pixel: skin.resolution,
-            });
-        }
-        let number = |a: u32, b: u32| {
-            skin.edges
-                .binary_search(&[a.min(b), a.max(b)])
-                .map_or(NONE, |edge| edge as u32)
-        };
-        edges.extend(
-            skin.triangles
-                .iter()
-                .map(|&[a, b, c]| [number(a, b), number(b, c), number(c, a)]),
-        );
         Ok(Self {
             drawn,
-            edges,
             pixel: skin.resolution,
         })
-    }
-
-    /// Makes room for so many triangles more.
-    pub fn reserve(&mut self, triangles: usize) -> Result<()> {
-        Ok(self.edges.try_reserve(triangles)?)
-    }
-
-    /// A triangle, known or the next one, has these edges now.
-    pub fn set_edges(&mut self, triangle: usize, edges: [u32; 3]) {
-        match self.edges.get_mut(triangle) {
-            Some(known) => *known = edges,
-            None => self.edges.push(edges),
-        }
     }
 
     /// Draws what of the surface lies within `part`, where it is as a substep begins.
@@ -93,10 +58,10 @@ impl Images {
         });
     }
 
-    /// Those edges of a triangle, or none, that come within `reach` of a box.
+    /// Those edges of a triangle, or none, that come within `reach` of a box: the triangle that an edge is looked at with by its tree may not be seen.
     pub fn edges_near(&self, skin: &Skin, triangle: usize, bounds: &Bounds, reach: f32) -> [u32; 3] {
         let around = bounds.extended(reach);
-        self.edges[triangle].map(|edge| {
+        skin.sides(triangle).map(|edge| {
             let is_near = skin.edges.get(edge as usize).is_some_and(|ends| {
                 let ends = ends.map(|node| skin.starts.get(node as usize));
                 Bounds::of(ends.into_iter()).overlaps(&around)

@@ -12,11 +12,13 @@ use super::skin::Skin;
 use crate::contact::sweep::{Corners, Segment};
 use crate::solver::Span;
 
-/// Sides that end nearer than this part of what they keep off are looked after.
-const NEAR: f32 = 0.5;
+/// Sides that end nearer than this part of what they keep off are looked after; the second is of two closed bodies: what is inside one of them is known
+/// to be, and led out.
+const NEAR: [f32; 2] = [0.5, 0.2];
 
-/// They may end nearer than they are to by this part of the least thickness.
+/// They may end nearer than they are to by this part of the least thickness, and those of two closed bodies by a part of how near that is.
 const ALLOWED: f32 = 0.01;
+const ALLOWED_OF_CLOSED: f32 = 0.1;
 
 impl Tissue {
     /// Asks more of contacts where any has sides that end nearer than they are to, as fast as they go now: whether any has.
@@ -42,14 +44,10 @@ struct SidesEnd {
 }
 
 impl SidesEnd {
-    /// `None` of two closed bodies.
     fn of(link: &Link, skins: &[Option<Skin>], duration: f32) -> Option<Self> {
         let [first, second] = &link.sides;
         let (own, others) = (skins[first.body].as_ref()?, skins[second.body].as_ref()?);
-        // What is inside a closed surface is known to be, and led out.
-        if first.body != second.body && own.is_closed && others.is_closed {
-            return None;
-        }
+        let are_closed = first.body != second.body && own.is_closed && others.is_closed;
         let seen = (shift(own, others), others.drift);
         let ways = [0, 1].map(|end| own.way(first.nodes[end], seen, duration));
         let segment = Segment {
@@ -83,9 +81,12 @@ impl SidesEnd {
         };
         let wanted = began + link.least_speed_found(duration) * duration;
         let least = own.least_thickness().min(others.least_thickness());
+        let of_way = if are_closed { ALLOWED_OF_CLOSED * wanted } else { 0.0 };
         Some(Self {
             nearer: ended - is,
-            lacks: is < NEAR * (began + link.depth) && wanted - is > ALLOWED * least,
+            lacks: !(are_closed && began <= 0.0)
+                && is < NEAR[usize::from(are_closed)] * (began + link.depth)
+                && wanted - is > of_way.max(ALLOWED * least),
         })
     }
 }

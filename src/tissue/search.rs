@@ -15,6 +15,9 @@ use crate::geometry::Bounds;
 /// seen most squarely.
 const SAME: f32 = 1e-4;
 
+/// A corner lies over a face that it is seen from this squarely, as a cosine.
+const SQUARELY: f32 = 0.7;
+
 /// A corner meets so many faces at most. With the closest alone, a corner in a fold would be pushed out of one face into the next, and tremble; with
 /// three, so would a tip in a hole of its shape, where eight triangles meet.
 const FACES: usize = 8;
@@ -264,8 +267,8 @@ impl PairSearch<'_> {
                 nearest = (distance, height.abs());
                 behind = (height < 0.0).then_some((triangle, start));
             }
-            if height >= 0.0
-                && self.may_find([of_nodes, of_faces], &[node], &nodes)
+            // Of a crushed solid a face may come from its inner side at what is outside.
+            if self.may_find([of_nodes, of_faces], &[node], &nodes)
                 && let Some((found, is_ahead)) =
                     self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners), start)
             {
@@ -273,6 +276,20 @@ impl PairSearch<'_> {
             }
             distance
         });
+        // Where solids are crushed their surface folds through itself: a face over which it lies tells better.
+        if let Some((_, inner)) = &behind
+            && self.measures != Measure::Reductions
+        {
+            let lies_over = |(is_ahead, _, face, (found, _)): &FeatureMet<usize>| {
+                let corners = self.corners(of_faces, &of_faces.skin.triangles[*face]);
+                let squarely = SQUARELY * found.offset.length();
+                let is_alike = found.offset.dot(inner.offset) >= squarely * inner.offset.length();
+                !is_ahead && is_alike && height(&corners, found) >= squarely
+            };
+            if touched.iter().flatten().any(lies_over) {
+                behind = None;
+            }
+        }
         // What was made within another is led out as far as its thickness asks for; what lies flush on it by rounding touches it.
         let flush = of_nodes.skin.least_thickness().min(of_faces.skin.least_thickness());
         let nearest_there = match behind {
@@ -292,13 +309,19 @@ impl PairSearch<'_> {
             let Some((is_ahead, _, triangle, (found, clearance))) = touched[place] else {
                 break;
             };
-            let is_shared = |(_, _, _, (other, _)): &FeatureMet<usize>| {
-                (other.offset - found.offset).length() <= SAME * found.offset.length()
+            let nodes = of_faces.skin.triangles[triangle];
+            let is_shared = |(_, _, nearer, (other, _)): &FeatureMet<usize>| {
+                if self.is_of_one() {
+                    return (other.offset - found.offset).length() <= SAME * found.offset.length();
+                }
+                // Where a nearer face has the point too, it has points that are nearer.
+                let others = &of_faces.skin.triangles[*nearer];
+                let mut parts = nodes.iter().zip(found.weights);
+                parts.all(|(node, weight)| weight == 0.0 || others.contains(node))
             };
             if touched[..place].iter().flatten().any(is_shared) {
                 continue;
             }
-            let nodes = of_faces.skin.triangles[triangle];
             let sides = [
                 ContactSide::of_node(of_nodes.place, node),
                 ContactSide {

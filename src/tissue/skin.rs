@@ -24,8 +24,8 @@ pub(crate) struct Skin {
     pub nodes: Vec<u32>,
     pub edges: Vec<[u32; 2]>,
     pub triangles: Vec<[u32; 3]>,
-    /// The edges that are looked at with a triangle: each with one.
-    pub(super) owned: Vec<[u32; 3]>,
+    /// The edges of each triangle, marked with [`ELSEWHERE`] where they are looked at with another.
+    pub(super) sides: Vec<[u32; 3]>,
     pub(super) forest: Forest,
     /// How many nodes, edges and triangles it has, and cuts may add to it.
     pub room: usize,
@@ -82,7 +82,7 @@ pub(crate) struct Skin {
 }
 
 saved! { Skin {
-    nodes, edges, triangles, owned, forest, room, is_closed, pierces, flatness, bent, has_bent, crossings, origin, starts, velocities,
+    nodes, edges, triangles, sides, forest, room, is_closed, pierces, flatness, bent, has_bent, crossings, origin, starts, velocities,
     expected, changes, drift, spread, moved, given, strays, strayed, short, extent, firsts, travel, meets_bodies,
     asks_for_images, resolution, images, changing, is_fitted,
 } }
@@ -124,6 +124,9 @@ impl Clearance {
 /// No edge.
 pub(super) const NONE: u32 = u32::MAX;
 
+/// An edge of a triangle that is looked at with another.
+pub(super) const ELSEWHERE: u32 = 1 << 31;
+
 /// How many pixels a mean edge is long, where it is not said how fine images are; and the longest extent at most.
 const PIXELS_OF_EDGE: f32 = 2.0;
 const PIXELS: f32 = 1024.0;
@@ -133,15 +136,14 @@ impl Skin {
     pub fn new(body: &System) -> Result<Self> {
         let triangles = body.own_surface()?;
         let edges = mesh::edges(&triangles, &[])?;
-        let mut owned = memory::filled([NONE; 3], triangles.len())?;
+        let mut sides = memory::filled([NONE; 3], triangles.len())?;
         let mut is_taken = memory::filled(false, edges.len())?;
-        for (of_triangle, &[a, b, c]) in owned.iter_mut().zip(&triangles) {
-            for (place, [a, b]) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
-                if let Ok(edge) = edges.binary_search(&[a.min(b), a.max(b)])
-                    && !is_taken[edge]
-                {
+        for (sides, &triangle) in sides.iter_mut().zip(&triangles) {
+            for (side, ends) in sides.iter_mut().zip(ends_of(triangle)) {
+                if let Ok(edge) = edges.binary_search(&ends) {
+                    let mark = if is_taken[edge] { ELSEWHERE } else { 0 };
+                    *side = edge as u32 | mark;
                     is_taken[edge] = true;
-                    of_triangle[place] = edge as u32;
                 }
             }
         }
@@ -166,7 +168,7 @@ impl Skin {
             }
         }
         let changing = if body.may_be_cut.is_some() {
-            Some(memory::boxed(Changing::new(body, &nodes, &edges, &triangles)?)?)
+            Some(memory::boxed(Changing::new(body, &nodes, edges.len(), &sides)?)?)
         } else {
             None
         };
@@ -194,7 +196,7 @@ impl Skin {
             bent: 0.0,
             has_bent: false,
             edges,
-            owned,
+            sides,
             forest,
             is_closed: mesh::is_closed(&triangles)?,
             pierces,
@@ -216,7 +218,7 @@ impl Skin {
         };
         skin.nodes.try_reserve_exact(spare)?;
         skin.strays.try_reserve_exact(spare)?;
-        for values in [&mut skin.triangles, &mut skin.owned] {
+        for values in [&mut skin.triangles, &mut skin.sides] {
             values.try_reserve_exact(2 * spare)?;
         }
         skin.edges.try_reserve_exact(3 * spare)?;
@@ -353,8 +355,18 @@ impl Skin {
         let thickness = body.contact.thickness.min(0.5 * WITH_ITSELF * self.short);
         self.has_bent = self.bent > thickness.max(self.least_thickness());
         if begins || self.has_bent {
-            self.flatness.measure(&self.starts, &self.triangles, &self.edges);
+            self.measure_flatness(duration);
             self.bent = 0.0;
+        }
+    }
+
+    /// As the substep begins and as it ends: what bends the other way in it may be flat then or now.
+    fn measure_flatness(&mut self, duration: f32) {
+        let (starts, expected) = (&self.starts, &self.expected);
+        self.flatness.clear();
+        for time in [0.0, duration] {
+            let at = |node: u32| starts.get(node as usize) + expected.get(node as usize) * time;
+            self.flatness.measure(starts.len(), &self.triangles, &self.edges, at);
         }
     }
 
@@ -500,9 +512,14 @@ impl Skin {
         self.forest.near(bounds, reach, see);
     }
 
-    /// The edges that are looked at with a triangle, as numbers.
+    /// The edges of a triangle, as numbers.
+    pub fn sides(&self, triangle: usize) -> [u32; 3] {
+        self.sides[triangle].map(number_of)
+    }
+
+    /// Those that are looked at with it: each edge is with one.
     pub fn owned(&self, triangle: usize) -> [u32; 3] {
-        self.owned[triangle]
+        self.sides[triangle].map(|side| if side & ELSEWHERE == 0 { side } else { NONE })
     }
 
     /// These edges, whether they pass through tissue, and how the surface turns there.
@@ -513,6 +530,16 @@ impl Skin {
             (self.edges[edge], self.pierces[edge], self.flatness.of(edge))
         })
     }
+}
+
+/// The ends of a triangle's sides, the lower first.
+pub(super) fn ends_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
+}
+
+/// The number of an edge of a triangle, marked or not.
+pub(super) fn number_of(side: u32) -> u32 {
+    if side == NONE { NONE } else { side & !ELSEWHERE }
 }
 
 /// The length that all but a twentieth are longer than, of those that are above 0.

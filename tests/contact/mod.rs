@@ -4,6 +4,7 @@ mod attach_tissue;
 mod candidates;
 mod changed;
 mod crumpled;
+mod crushed;
 mod degenerate;
 mod detection_exact;
 mod doors;

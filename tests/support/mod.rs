@@ -5,6 +5,7 @@
 
 pub mod bodies;
 pub mod change_lists;
+pub mod crossings;
 pub mod euler;
 pub mod hanging;
 pub mod held_block;
