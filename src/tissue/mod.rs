@@ -64,8 +64,8 @@ const EFFORT: Effort = Effort {
 /// it bounds the energy that they gain.
 const PARTING_SPEED: f32 = 0.3;
 
-/// So often contacts whose sides would pass each other are solved again, and until they are solved: between sides that nearly face each other what is
-/// missing travels slowly.
+/// Contacts whose sides would pass each other are solved again, so often and with so many sweeps in a substep: between sides that nearly face each
+/// other what is missing travels slowly.
 const LACKS: u32 = 8;
 const EFFORT_AGAIN: Effort = Effort {
     sweeps: 512,
@@ -353,13 +353,13 @@ impl Tissue {
     fn solve(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) -> bool {
         let mut first = None;
         let mut has_begun = false;
-        let mut lacks = 0;
+        let (mut lacks, mut again) = (0, EFFORT_AGAIN);
         for _ in 0..SEARCHES {
             let known = self.links.len();
             let (mut searches, mut lack) = (true, false);
             if has_begun {
                 self.go_on(island, bodies, moment);
-                lack = lacks < LACKS && self.hold_sides(moment);
+                lack = lacks < LACKS && again.sweeps > 0 && self.hold_sides(moment);
                 lacks += u32::from(lack);
                 searches = !self.has_foreseen(island, bodies, moment);
             }
@@ -393,8 +393,9 @@ impl Tissue {
             if recalled > 0.0 {
                 first = Some(first.map_or(recalled, |first: f32| first.max(recalled)));
             }
-            let effort = if lack { EFFORT_AGAIN } else { EFFORT };
+            let effort = if lack { again } else { EFFORT };
             first = Some(relax(effort, first, |sweep| {
+                again.sweeps -= u32::from(lack);
                 let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
                 let changes = links.map(|link| link.solve(skins));
                 let mut changed = changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment));

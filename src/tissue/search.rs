@@ -309,19 +309,13 @@ impl PairSearch<'_> {
             let Some((is_ahead, _, triangle, (found, clearance))) = touched[place] else {
                 break;
             };
-            let nodes = of_faces.skin.triangles[triangle];
-            let is_shared = |(_, _, nearer, (other, _)): &FeatureMet<usize>| {
-                if self.is_of_one() {
-                    return (other.offset - found.offset).length() <= SAME * found.offset.length();
-                }
-                // Where a nearer face has the point too, it has points that are nearer.
-                let others = &of_faces.skin.triangles[*nearer];
-                let mut parts = nodes.iter().zip(found.weights);
-                parts.all(|(node, weight)| weight == 0.0 || others.contains(node))
+            let is_shared = |(_, _, _, (other, _)): &FeatureMet<usize>| {
+                (other.offset - found.offset).length() <= SAME * found.offset.length()
             };
             if touched[..place].iter().flatten().any(is_shared) {
                 continue;
             }
+            let nodes = of_faces.skin.triangles[triangle];
             let sides = [
                 ContactSide::of_node(of_nodes.place, node),
                 ContactSide {
