@@ -6,7 +6,7 @@ use std::hash::{BuildHasherDefault, DefaultHasher};
 use super::features::HOLE;
 use crate::base::{Result, memory};
 use crate::codec::{Reader, Saved, Writer, shape_of_name};
-use crate::mesh::TRIANGLE_EDGES;
+use crate::mesh;
 
 /// How many triangles have each edge of a surface.
 #[derive(Debug)]
@@ -159,11 +159,7 @@ impl EdgeUses {
     }
 }
 
-/// The ends of a triangle's edges, the lower first.
+/// The ends of a triangle's edges that have a length, the lower first.
 fn ends_of(face: [u32; 3]) -> impl Iterator<Item = [u32; 2]> {
-    let edges = TRIANGLE_EDGES.map(|ends| ends.map(|corner| face[corner]));
-    edges
-        .into_iter()
-        .filter(|[a, b]| a != b)
-        .map(|[a, b]| [a.min(b), a.max(b)])
+    mesh::ends_of(face).into_iter().filter(|[a, b]| a != b)
 }

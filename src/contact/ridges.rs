@@ -5,7 +5,7 @@ use glam::Vec3;
 use crate::base::{Result, memory};
 use crate::geometry::Bounds;
 use crate::geometry::tree::Tree;
-use crate::mesh::ClosedSurface;
+use crate::mesh::{ClosedSurface, ends_of};
 
 /// The turn of a surface at a convex edge from which that is a ridge, rad: less is how a smooth surface is divided into triangles.
 const RIDGE: f32 = 0.7;
@@ -32,10 +32,7 @@ impl Ridges {
         let centre = |face: usize| corners(face).iter().sum::<Vec3>() / 3.0;
         let mut edges: Vec<([u32; 2], u32)> = memory::reserved(3 * triangles.len())?;
         for (face, corners) in (0..).zip(triangles) {
-            for side in 0..3 {
-                let [a, b] = [corners[side], corners[(side + 1) % 3]];
-                edges.push(([a.min(b), a.max(b)], face));
-            }
+            edges.extend(ends_of(*corners).map(|ends| (ends, face)));
         }
         edges.sort_unstable();
         let mut turns = memory::filled(0.0_f32, triangles.len())?;

@@ -23,8 +23,8 @@ pub(crate) use closed::FURTHEST;
 pub use file::{MeshFormat, load};
 pub use tidy::{LoadedMesh, NO_NODE, TidyReport, tidy};
 pub(crate) use topology::{
-    CELL_DIAGONALS, CELL_EDGES, TETRAHEDRON_EDGES, TRIANGLE_EDGES, cell_boundary, element_edges, outer_faces, pack,
-    turn_outward, unpack,
+    CELL_DIAGONALS, CELL_EDGES, TETRAHEDRON_EDGES, TRIANGLE_EDGES, cell_boundary, element_edges, ends_of, outer_faces,
+    pack, turn_outward, unpack,
 };
 pub use topology::{boundary, edges, is_closed};
 

@@ -202,6 +202,11 @@ pub(crate) fn pack<const N: usize>(element: &[u32; N], ends: [usize; 2]) -> u64 
     u64::from(a.min(b)) << 32 | u64::from(a.max(b))
 }
 
+/// The ends of a triangle's edges, the lower first.
+pub(crate) fn ends_of(triangle: [u32; 3]) -> [[u32; 2]; 3] {
+    TRIANGLE_EDGES.map(|ends| unpack(pack(&triangle, ends)))
+}
+
 /// The nodes of an edge.
 pub(crate) fn unpack(edge: u64) -> [u32; 2] {
     [(edge >> 32) as u32, edge as u32]

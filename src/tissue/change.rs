@@ -2,12 +2,13 @@
 
 use glam::Vec3;
 
-use super::skin::{ELSEWHERE, NONE, Skin, ends_of, number_of};
+use super::skin::{ELSEWHERE, NONE, Skin, number_of};
 use super::wound::Wound;
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::contact::SurfaceChange;
 use crate::geometry::forest::Later;
+use crate::mesh::ends_of;
 use crate::nodes::{Bound, NewNode};
 use crate::soa::Vectors;
 use crate::solver::System;

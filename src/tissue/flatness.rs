@@ -207,6 +207,7 @@ mod tests {
         let (edges, flatness) = measured(&cloth.positions, &triangles);
         assert!((0..edges.len()).all(|edge| flatness.of(edge).turn > 0.5));
     }
+
     #[test]
     fn what_bends_meanwhile_is_not_flat() {
         let cloth = Mesh::cloth([0.4; 2], [4; 2]).expect("a cloth");

@@ -12,9 +12,9 @@ use super::skin::Skin;
 use crate::contact::sweep::{Corners, Segment};
 use crate::solver::Span;
 
-/// Sides that end nearer than this part of what they keep off are looked after; the second is of two closed bodies: what is inside one of them is known
-/// to be, and led out.
-const NEAR: [f32; 2] = [0.5, 0.2];
+/// Sides that end nearer than this part of what they keep off are looked after. What is inside a closed body is known to be, and led out.
+const NEAR: f32 = 0.5;
+const NEAR_OF_CLOSED: f32 = 0.2;
 
 /// They may end nearer than they are to by this part of the least thickness, and those of two closed bodies by a part of how near that is.
 const ALLOWED: f32 = 0.01;
@@ -81,12 +81,15 @@ impl SidesEnd {
         };
         let wanted = began + link.least_speed_found(duration) * duration;
         let least = own.least_thickness().min(others.least_thickness());
-        let of_way = if are_closed { ALLOWED_OF_CLOSED * wanted } else { 0.0 };
+        let is_inside = are_closed && began <= 0.0;
+        let (near, allowed) = if are_closed {
+            (NEAR_OF_CLOSED, (ALLOWED_OF_CLOSED * wanted).max(ALLOWED * least))
+        } else {
+            (NEAR, ALLOWED * least)
+        };
         Some(Self {
             nearer: ended - is,
-            lacks: !(are_closed && began <= 0.0)
-                && is < NEAR[usize::from(are_closed)] * (began + link.depth)
-                && wanted - is > of_way.max(ALLOWED * least),
+            lacks: !is_inside && is < near * (began + link.depth) && wanted - is > allowed,
         })
     }
 }

@@ -139,7 +139,7 @@ impl Skin {
         let mut sides = memory::filled([NONE; 3], triangles.len())?;
         let mut is_taken = memory::filled(false, edges.len())?;
         for (sides, &triangle) in sides.iter_mut().zip(&triangles) {
-            for (side, ends) in sides.iter_mut().zip(ends_of(triangle)) {
+            for (side, ends) in sides.iter_mut().zip(mesh::ends_of(triangle)) {
                 if let Ok(edge) = edges.binary_search(&ends) {
                     let mark = if is_taken[edge] { ELSEWHERE } else { 0 };
                     *side = edge as u32 | mark;
@@ -530,11 +530,6 @@ impl Skin {
             (self.edges[edge], self.pierces[edge], self.flatness.of(edge))
         })
     }
-}
-
-/// The ends of a triangle's sides, the lower first.
-pub(super) fn ends_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
-    [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
 }
 
 /// The number of an edge of a triangle, marked or not.
