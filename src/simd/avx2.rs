@@ -1,7 +1,6 @@
 //! Eight lanes of x86-64's AVX2, with fused multiply-add.
 
 use std::arch::x86_64::*;
-use std::array::from_fn;
 
 use glam::Vec3;
 
@@ -71,7 +70,7 @@ impl Lanes for Avx2Lanes {
     #[inline(always)]
     unsafe fn add_to_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
         unsafe {
-            let [x, y, z] = vectors.map(|vector| vector.0);
+            let [Self(x), Self(y), Self(z)] = vectors;
             let none = _mm256_setzero_ps();
             let (low_xy, high_xy) = (_mm256_unpacklo_ps(x, y), _mm256_unpackhi_ps(x, y));
             let (low_z, high_z) = (_mm256_unpacklo_ps(z, none), _mm256_unpackhi_ps(z, none));
@@ -114,14 +113,31 @@ impl Lanes for Avx2Lanes {
         half_tensions: [Self; N],
     ) -> ([Self; N], [Self; N]) {
         unsafe {
-            let guesses = squares.map(|square| _mm256_rsqrt_ps(square.0));
-            let roots: [__m256; N] = from_fn(|n| _mm256_mul_ps(squares[n].0, guesses[n]));
-            // Newton's step: 1 / length = guess * corrections / 2.
-            let corrections: [__m256; N] = from_fn(|n| _mm256_fnmadd_ps(roots[n], guesses[n], _mm256_set1_ps(3.0)));
-            let tensions: [__m256; N] = from_fn(|n| _mm256_mul_ps(half_tensions[n].0, guesses[n]));
-            let pulls = from_fn(|n| Self(_mm256_fnmadd_ps(tensions[n], corrections[n], stiffnesses[n].0)));
-            let halves = guesses.map(|guess| _mm256_mul_ps(guess, _mm256_set1_ps(0.5)));
-            let inverses = from_fn(|n| Self(_mm256_mul_ps(halves[n], corrections[n])));
+            // One stage after the other for all: each is a long chain of operations. No closures: one may be compiled on its own, without these
+            // instructions.
+            let mut guesses = squares;
+            for guess in &mut guesses {
+                guess.0 = _mm256_rsqrt_ps(guess.0);
+            }
+            // Newton's step: 1 / length = guess * correction / 2.
+            let mut corrections = squares;
+            for (root, guess) in corrections.iter_mut().zip(&guesses) {
+                root.0 = _mm256_mul_ps(root.0, guess.0);
+            }
+            for (root, guess) in corrections.iter_mut().zip(&guesses) {
+                root.0 = _mm256_fnmadd_ps(root.0, guess.0, _mm256_set1_ps(3.0));
+            }
+            let mut pulls = half_tensions;
+            for (tension, guess) in pulls.iter_mut().zip(&guesses) {
+                tension.0 = _mm256_mul_ps(tension.0, guess.0);
+            }
+            for ((tension, correction), stiffness) in pulls.iter_mut().zip(&corrections).zip(&stiffnesses) {
+                tension.0 = _mm256_fnmadd_ps(tension.0, correction.0, stiffness.0);
+            }
+            let mut inverses = guesses;
+            for (guess, correction) in inverses.iter_mut().zip(&corrections) {
+                guess.0 = _mm256_mul_ps(_mm256_mul_ps(guess.0, _mm256_set1_ps(0.5)), correction.0);
+            }
             (pulls, inverses)
         }
     }
@@ -133,7 +149,11 @@ impl Lanes for Avx2Lanes {
         let first = links.as_ptr().cast::<f32>();
         unsafe {
             // Neighbour, stiffness, rest length, and so on: no place is taken twice where the three loads are blended.
-            let [a, b, c] = [0, 8, 16].map(|place| _mm256_loadu_ps(first.add(place)));
+            let [a, b, c] = [
+                _mm256_loadu_ps(first),
+                _mm256_loadu_ps(first.add(8)),
+                _mm256_loadu_ps(first.add(16)),
+            ];
             let neighbours = _mm256_blend_ps::<0b0010_0100>(_mm256_blend_ps::<0b1001_0010>(a, b), c);
             let stiffnesses = _mm256_blend_ps::<0b0100_1001>(_mm256_blend_ps::<0b0010_0100>(a, b), c);
             let rest_lengths = _mm256_blend_ps::<0b1001_0010>(_mm256_blend_ps::<0b0100_1001>(a, b), c);

@@ -1,7 +1,6 @@
 //! Sixteen lanes of x86-64's AVX-512.
 
 use std::arch::x86_64::*;
-use std::array::from_fn;
 
 use glam::Vec3;
 
@@ -75,7 +74,7 @@ impl Lanes for Avx512Lanes {
     #[inline(always)]
     unsafe fn add_to_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
         unsafe {
-            let [x, y, z] = vectors.map(|vector| vector.0);
+            let [Self(x), Self(y), Self(z)] = vectors;
             let none = _mm512_setzero_ps();
             let (low_xy, high_xy) = (_mm512_unpacklo_ps(x, y), _mm512_unpackhi_ps(x, y));
             let (low_z, high_z) = (_mm512_unpacklo_ps(z, none), _mm512_unpackhi_ps(z, none));
@@ -116,14 +115,31 @@ impl Lanes for Avx512Lanes {
         half_tensions: [Self; N],
     ) -> ([Self; N], [Self; N]) {
         unsafe {
-            let guesses = squares.map(|square| _mm512_rsqrt14_ps(square.0));
-            let roots: [__m512; N] = from_fn(|n| _mm512_mul_ps(squares[n].0, guesses[n]));
-            // Newton's step: 1 / length = guess * corrections / 2.
-            let corrections: [__m512; N] = from_fn(|n| _mm512_fnmadd_ps(roots[n], guesses[n], _mm512_set1_ps(3.0)));
-            let tensions: [__m512; N] = from_fn(|n| _mm512_mul_ps(half_tensions[n].0, guesses[n]));
-            let pulls = from_fn(|n| Self(_mm512_fnmadd_ps(tensions[n], corrections[n], stiffnesses[n].0)));
-            let halves = guesses.map(|guess| _mm512_mul_ps(guess, _mm512_set1_ps(0.5)));
-            let inverses = from_fn(|n| Self(_mm512_mul_ps(halves[n], corrections[n])));
+            // One stage after the other for all: each is a long chain of operations. No closures: one may be compiled on its own, without these
+            // instructions.
+            let mut guesses = squares;
+            for guess in &mut guesses {
+                guess.0 = _mm512_rsqrt14_ps(guess.0);
+            }
+            // Newton's step: 1 / length = guess * correction / 2.
+            let mut corrections = squares;
+            for (root, guess) in corrections.iter_mut().zip(&guesses) {
+                root.0 = _mm512_mul_ps(root.0, guess.0);
+            }
+            for (root, guess) in corrections.iter_mut().zip(&guesses) {
+                root.0 = _mm512_fnmadd_ps(root.0, guess.0, _mm512_set1_ps(3.0));
+            }
+            let mut pulls = half_tensions;
+            for (tension, guess) in pulls.iter_mut().zip(&guesses) {
+                tension.0 = _mm512_mul_ps(tension.0, guess.0);
+            }
+            for ((tension, correction), stiffness) in pulls.iter_mut().zip(&corrections).zip(&stiffnesses) {
+                tension.0 = _mm512_fnmadd_ps(tension.0, correction.0, stiffness.0);
+            }
+            let mut inverses = guesses;
+            for (guess, correction) in inverses.iter_mut().zip(&corrections) {
+                guess.0 = _mm512_mul_ps(_mm512_mul_ps(guess.0, _mm512_set1_ps(0.5)), correction.0);
+            }
             (pulls, inverses)
         }
     }

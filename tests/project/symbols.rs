@@ -60,3 +60,27 @@ fn the_shared_library_is_called_by_its_version() {
     );
     assert_eq!(soname, Some(expected));
 }
+
+#[test]
+fn no_arithmetic_of_a_kernel_is_a_function_of_its_own() {
+    if !installed("nm") {
+        return skip("the functions of kernels: nm is not installed");
+    }
+    let output = succeed(Command::new("nm").arg(Library::get().shared()));
+    let symbols = String::from_utf8_lossy(&output.stdout);
+    // Called one by one springs take ten times as long. The library is built here with as little between its parts as in a program of someone else's.
+    let has = |name: &str| symbols.lines().any(|line| line.contains(name));
+    assert!(
+        has("run_avx512") || cfg!(not(target_arch = "x86_64")),
+        "kernels are seen"
+    );
+    for width in [256, 512] {
+        for operation in ["add", "sub", "mul", "fmadd", "fmsub", "fnmadd"] {
+            let name = format!("_mm{width}_{operation}_ps");
+            assert!(
+                !has(&name),
+                "{name} is called: from a closure that is compiled on its own?"
+            );
+        }
+    }
+}

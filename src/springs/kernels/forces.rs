@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::columns::Columns;
 use super::layout::{ColumnEnds, RunColumn, SpringMaterial};
-use super::quantities::{Change, Force, HalfEnergy, Quantity, SpringLanes, Ways, difference};
+use super::quantities::{Change, Force, HalfEnergy, LinkColumn, NodePlaces, Quantity, SpringLanes, Ways, difference};
 use crate::order::LANES;
 use crate::simd::{ChosenKernel, Lanes, WithLanes, prefetch};
 use crate::soa::{Places, TileForces, Vectors, View};
@@ -174,32 +174,6 @@ impl<Q: Quantity> WithLanes for TileLinks<'_, Q> {
 /// The forces on some nodes side by side; NaN where a spring's ends coincide.
 #[derive(Clone, Copy)]
 struct ForceLanes<L>([L; 3]);
-
-/// Where some nodes are, and their second vectors, side by side.
-#[derive(Clone, Copy)]
-struct NodePlaces<L> {
-    position: [L; 3],
-    second: [L; 3],
-}
-
-impl<L: Copy> NodePlaces<L> {
-    /// Second vectors are not asked for.
-    #[inline(always)]
-    fn still(position: [L; 3]) -> Self {
-        Self {
-            position,
-            second: position,
-        }
-    }
-}
-
-/// A column of springs: what they are like, where they lead, and which lanes have one.
-#[derive(Clone, Copy)]
-struct LinkColumn<L> {
-    spring: SpringLanes<L>,
-    there: NodePlaces<L>,
-    lanes: u32,
-}
 
 impl KernelTile<'_> {
     /// The runs of the nodes of a block, or of a part of it, as wide as `L`, whose springs share their parameters.
@@ -488,8 +462,9 @@ impl<L: Lanes> ForceLanes<L> {
     /// From and to three lists that have these lanes.
     #[inline(always)]
     unsafe fn load(axes: [*mut f32; 3], place: usize) -> Self {
+        let [x, y, z] = axes;
         // SAFETY: the caller's promise.
-        Self(axes.map(|axis| unsafe { L::load(axis.add(place)) }))
+        Self(unsafe { [L::load(x.add(place)), L::load(y.add(place)), L::load(z.add(place))] })
     }
 
     #[inline(always)]
@@ -517,13 +492,21 @@ impl<L: Lanes> ForceLanes<L> {
     ) {
         // SAFETY: the same contract.
         unsafe {
-            let ways = Ways {
-                ways: links.map(|links| difference(links.there.position, here.position)),
-                differences: links.map(|links| difference(links.there.second, here.second)),
-                springs: links.map(|links| links.spring),
-                lanes: links.map(|links| links.lanes),
-            };
-            Q::add(&mut self.0, ways, tangent);
+            // Written out, as in `runs`.
+            let [mut ways, mut differences] = [[here.position; N], [here.second; N]];
+            for (n, links) in links.iter().enumerate() {
+                ways[n] = difference(links.there.position, here.position);
+                differences[n] = difference(links.there.second, here.second);
+            }
+            Q::add(
+                &mut self.0,
+                Ways {
+                    ways,
+                    differences,
+                    links,
+                },
+                tangent,
+            );
         }
     }
 }
@@ -551,11 +534,11 @@ unsafe fn gather_near<L: Lanes>(places: Places, window: usize, indices: *const u
         match places.records {
             Some(records) => L::records_near(records.wrapping_add(window), indices),
             None => {
-                let [x, y, z] = places.axes.map(|axis| axis.wrapping_add(window));
+                let [x, y, z] = places.axes;
                 [
-                    L::gather_near(x, indices),
-                    L::gather_near(y, indices),
-                    L::gather_near(z, indices),
+                    L::gather_near(x.wrapping_add(window), indices),
+                    L::gather_near(y.wrapping_add(window), indices),
+                    L::gather_near(z.wrapping_add(window), indices),
                 ]
             }
         }

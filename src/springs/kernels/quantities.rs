@@ -16,13 +16,37 @@ pub(super) struct SpringLanes<L> {
     pub damping: L,
 }
 
-/// Columns of springs seen from one end: the ways to the other, the differences of what else is known of both ends, the
-/// springs, and which lanes have one.
+/// Where some nodes are, and their second vectors, side by side.
+#[derive(Clone, Copy)]
+pub(super) struct NodePlaces<L> {
+    pub position: [L; 3],
+    pub second: [L; 3],
+}
+
+impl<L: Copy> NodePlaces<L> {
+    /// Second vectors are not asked for.
+    #[inline(always)]
+    pub fn still(position: [L; 3]) -> Self {
+        Self {
+            position,
+            second: position,
+        }
+    }
+}
+
+/// A column of springs: what they are like, where they lead, and which lanes have one.
+#[derive(Clone, Copy)]
+pub(super) struct LinkColumn<L> {
+    pub spring: SpringLanes<L>,
+    pub there: NodePlaces<L>,
+    pub lanes: u32,
+}
+
+/// Columns of springs seen from one end: the ways to the other, and the differences of what else is known of both ends.
 pub(super) struct Ways<L, const N: usize> {
     pub ways: [[L; 3]; N],
     pub differences: [[L; 3]; N],
-    pub springs: [SpringLanes<L>; N],
-    pub lanes: [u32; N],
+    pub links: [LinkColumn<L>; N],
 }
 
 /// A sum over the springs of a node.
@@ -50,9 +74,11 @@ impl<L: Lanes, const N: usize> Ways<L, N> {
     unsafe fn pulls(&self) -> ([L; N], [L; N]) {
         // SAFETY: the caller's promise.
         unsafe {
-            let squares = self.ways.map(|way| dot(way, way));
-            let stiffnesses = self.springs.map(|spring| spring.stiffness);
-            let half_tensions = self.springs.map(|spring| spring.half_tension);
+            let [mut squares, mut stiffnesses, mut half_tensions] = [[L::splat(0.0); N]; 3];
+            for (n, (&way, links)) in self.ways.iter().zip(&self.links).enumerate() {
+                squares[n] = dot(way, way);
+                (stiffnesses[n], half_tensions[n]) = (links.spring.stiffness, links.spring.half_tension);
+            }
             L::pulls(squares, stiffnesses, half_tensions)
         }
     }
@@ -86,11 +112,11 @@ impl<const DAMPED: bool> Quantity for Force<DAMPED> {
                 for n in 0..N {
                     let rate = dot(ways.ways[n], ways.differences[n]);
                     let rate = rate.multiply(inverses[n]).multiply(inverses[n]);
-                    factors[n] = rate.multiply_add(ways.springs[n].damping, factors[n]);
+                    factors[n] = rate.multiply_add(ways.links[n].spring.damping, factors[n]);
                 }
             }
-            for (n, factor) in factors.into_iter().enumerate() {
-                add_scaled(sums, ways.ways[n], factor, ways.lanes[n]);
+            for (n, &factor) in factors.iter().enumerate() {
+                add_scaled(sums, ways.ways[n], factor, ways.links[n].lanes);
             }
         }
     }
@@ -113,7 +139,7 @@ impl<const DAMPED: bool> Quantity for Change<DAMPED> {
         unsafe {
             let (pulls, inverses) = ways.pulls();
             for n in 0..N {
-                let spring = ways.springs[n];
+                let spring = ways.links[n].spring;
                 let across = L::splat(tangent.floor).greater(pulls[n]);
                 let mut along = spring.stiffness.subtract(across);
                 if DAMPED {
@@ -121,9 +147,9 @@ impl<const DAMPED: bool> Quantity for Change<DAMPED> {
                 }
                 let lengthening = dot(ways.ways[n], ways.differences[n]);
                 let factor = lengthening.multiply(inverses[n]).multiply(inverses[n]).multiply(along);
-                add_scaled(sums, ways.ways[n], factor, ways.lanes[n]);
+                add_scaled(sums, ways.ways[n], factor, ways.links[n].lanes);
                 // A comparison drops what is NaN: here it has been seen.
-                add_scaled(sums, ways.differences[n], across, ways.lanes[n]);
+                add_scaled(sums, ways.differences[n], across, ways.links[n].lanes);
             }
         }
     }
@@ -146,12 +172,16 @@ impl Quantity for HalfEnergy {
         // SAFETY: the same contract.
         unsafe {
             let (_, inverses) = ways.pulls();
-            for (n, inverse) in inverses.into_iter().enumerate() {
+            for (n, &inverse) in inverses.iter().enumerate() {
                 let square = dot(ways.ways[n], ways.ways[n]);
-                let stretch = square.multiply(inverse).subtract(ways.springs[n].rest_length);
-                let force = stretch.multiply(ways.springs[n].stiffness).multiply(L::splat(0.25));
+                let stretch = square.multiply(inverse).subtract(ways.links[n].spring.rest_length);
+                let force = stretch
+                    .multiply(ways.links[n].spring.stiffness)
+                    .multiply(L::splat(0.25));
                 let energy = force.multiply(stretch);
-                sums[0] = energy.where_set(ways.lanes[n]).multiply_add(L::splat(1.0), sums[0]);
+                sums[0] = energy
+                    .where_set(ways.links[n].lanes)
+                    .multiply_add(L::splat(1.0), sums[0]);
             }
         }
     }
