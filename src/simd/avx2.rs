@@ -23,6 +23,50 @@ unsafe fn spread(mask: u32) -> __m256 {
     }
 }
 
+/// `Lanes::pulls` from a guess of 1 over a root, with one step of Newton's.
+///
+/// One stage after the other for all: each is a long chain of operations. No closures: one may be compiled on its own, without the kernel's
+/// instructions.
+macro_rules! pulls_by_newton {
+    ($guess:ident, $multiply:ident, $subtract_product:ident, $splat:ident) => {
+        #[inline(always)]
+        unsafe fn pulls<const N: usize>(
+            squares: [Self; N],
+            stiffnesses: [Self; N],
+            half_tensions: [Self; N],
+        ) -> ([Self; N], [Self; N]) {
+            unsafe {
+                let mut guesses = squares;
+                for guess in &mut guesses {
+                    guess.0 = $guess(guess.0);
+                }
+                // Newton's step: 1 / length = guess * correction / 2.
+                let mut corrections = squares;
+                for (root, guess) in corrections.iter_mut().zip(&guesses) {
+                    root.0 = $multiply(root.0, guess.0);
+                }
+                for (root, guess) in corrections.iter_mut().zip(&guesses) {
+                    root.0 = $subtract_product(root.0, guess.0, $splat(3.0));
+                }
+                let mut pulls = half_tensions;
+                for (tension, guess) in pulls.iter_mut().zip(&guesses) {
+                    tension.0 = $multiply(tension.0, guess.0);
+                }
+                for ((tension, correction), stiffness) in pulls.iter_mut().zip(&corrections).zip(&stiffnesses) {
+                    tension.0 = $subtract_product(tension.0, correction.0, stiffness.0);
+                }
+                let mut inverses = guesses;
+                for (guess, correction) in inverses.iter_mut().zip(&corrections) {
+                    guess.0 = $multiply($multiply(guess.0, $splat(0.5)), correction.0);
+                }
+                (pulls, inverses)
+            }
+        }
+    };
+}
+
+pub(super) use pulls_by_newton;
+
 // SAFETY of every block: the caller promises the instructions, and that what pointers lead to is there; no load or store
 // here asks for more than the alignment of a number.
 #[allow(clippy::undocumented_unsafe_blocks)]
@@ -106,41 +150,7 @@ impl Lanes for Avx2Lanes {
         Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
     }
 
-    #[inline(always)]
-    unsafe fn pulls<const N: usize>(
-        squares: [Self; N],
-        stiffnesses: [Self; N],
-        half_tensions: [Self; N],
-    ) -> ([Self; N], [Self; N]) {
-        unsafe {
-            // One stage after the other for all: each is a long chain of operations. No closures: one may be compiled on its own, without these
-            // instructions.
-            let mut guesses = squares;
-            for guess in &mut guesses {
-                guess.0 = _mm256_rsqrt_ps(guess.0);
-            }
-            // Newton's step: 1 / length = guess * correction / 2.
-            let mut corrections = squares;
-            for (root, guess) in corrections.iter_mut().zip(&guesses) {
-                root.0 = _mm256_mul_ps(root.0, guess.0);
-            }
-            for (root, guess) in corrections.iter_mut().zip(&guesses) {
-                root.0 = _mm256_fnmadd_ps(root.0, guess.0, _mm256_set1_ps(3.0));
-            }
-            let mut pulls = half_tensions;
-            for (tension, guess) in pulls.iter_mut().zip(&guesses) {
-                tension.0 = _mm256_mul_ps(tension.0, guess.0);
-            }
-            for ((tension, correction), stiffness) in pulls.iter_mut().zip(&corrections).zip(&stiffnesses) {
-                tension.0 = _mm256_fnmadd_ps(tension.0, correction.0, stiffness.0);
-            }
-            let mut inverses = guesses;
-            for (guess, correction) in inverses.iter_mut().zip(&corrections) {
-                guess.0 = _mm256_mul_ps(_mm256_mul_ps(guess.0, _mm256_set1_ps(0.5)), correction.0);
-            }
-            (pulls, inverses)
-        }
-    }
+    pulls_by_newton!(_mm256_rsqrt_ps, _mm256_mul_ps, _mm256_fnmadd_ps, _mm256_set1_ps);
 
     #[inline(always)]
     unsafe fn pull_eight(sight: Sight, links: &EightLinks) -> Option<Vec3> {

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::Lanes;
 use super::Record;
-use super::avx2::{Avx2Lanes, add_record, four_at, four_near, record, twice};
+use super::avx2::{Avx2Lanes, add_record, four_at, four_near, pulls_by_newton, record, twice};
 use super::lanes::instructions;
 use super::link_batches::{EightLinks, Sight};
 
@@ -108,41 +108,7 @@ impl Lanes for Avx512Lanes {
         multiply_add(factor, summand) = _mm512_fmadd_ps;
     }
 
-    #[inline(always)]
-    unsafe fn pulls<const N: usize>(
-        squares: [Self; N],
-        stiffnesses: [Self; N],
-        half_tensions: [Self; N],
-    ) -> ([Self; N], [Self; N]) {
-        unsafe {
-            // One stage after the other for all: each is a long chain of operations. No closures: one may be compiled on its own, without these
-            // instructions.
-            let mut guesses = squares;
-            for guess in &mut guesses {
-                guess.0 = _mm512_rsqrt14_ps(guess.0);
-            }
-            // Newton's step: 1 / length = guess * correction / 2.
-            let mut corrections = squares;
-            for (root, guess) in corrections.iter_mut().zip(&guesses) {
-                root.0 = _mm512_mul_ps(root.0, guess.0);
-            }
-            for (root, guess) in corrections.iter_mut().zip(&guesses) {
-                root.0 = _mm512_fnmadd_ps(root.0, guess.0, _mm512_set1_ps(3.0));
-            }
-            let mut pulls = half_tensions;
-            for (tension, guess) in pulls.iter_mut().zip(&guesses) {
-                tension.0 = _mm512_mul_ps(tension.0, guess.0);
-            }
-            for ((tension, correction), stiffness) in pulls.iter_mut().zip(&corrections).zip(&stiffnesses) {
-                tension.0 = _mm512_fnmadd_ps(tension.0, correction.0, stiffness.0);
-            }
-            let mut inverses = guesses;
-            for (guess, correction) in inverses.iter_mut().zip(&corrections) {
-                guess.0 = _mm512_mul_ps(_mm512_mul_ps(guess.0, _mm512_set1_ps(0.5)), correction.0);
-            }
-            (pulls, inverses)
-        }
-    }
+    pulls_by_newton!(_mm512_rsqrt14_ps, _mm512_mul_ps, _mm512_fnmadd_ps, _mm512_set1_ps);
 
     #[inline(always)]
     unsafe fn pull_eight(sight: Sight, links: &EightLinks) -> Option<Vec3> {
