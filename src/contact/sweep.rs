@@ -134,6 +134,13 @@ impl Separation {
     pub fn is_across(&self) -> bool {
         self.inside && self.along > 0.0 && self.along < 1.0
     }
+
+    /// Whether two edges that are `edges` from end to end come closest further than `margin` from all ends, m.
+    pub fn is_across_beyond(&self, margin: f32, edges: [Vec3; 2]) -> bool {
+        let shares = [self.along, self.weights[1]].map(|share| share.min(1.0 - share));
+        let is_beyond = |(edge, share): (Vec3, f32)| (edge * share).length_squared() > margin * margin;
+        self.is_across() && edges.into_iter().zip(shares).all(is_beyond)
+    }
 }
 
 impl Corners {

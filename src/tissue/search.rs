@@ -15,6 +15,13 @@ use crate::geometry::Bounds;
 /// seen most squarely.
 const SAME: f32 = 1e-4;
 
+/// Faces that meet a corner in points, and from directions, less than this part of the distance from each other hold it alike: the closest one does.
+const ALIKE: f32 = 0.05;
+
+/// Edges need not meet that come closest nearer than this part of what they keep apart to an end of one of them: its corner meets faces there. With a
+/// quarter what lies on a tip trembles.
+const NEAR_END: f32 = 0.05;
+
 /// A corner lies over a face that it is seen from this squarely, as a cosine.
 const SQUARELY: f32 = 0.7;
 
@@ -305,26 +312,30 @@ impl PairSearch<'_> {
             touched = [None; FACES];
             touched[0] = is_near.then_some((false, nearest.0, triangle, (start, Clearance::of(radius))));
         }
+        let side_of = |triangle: usize, found: &Separation| ContactSide {
+            body: of_faces.place,
+            nodes: of_faces.skin.triangles[triangle],
+            weights: found.weights,
+        };
+        let place_of = |side: &ContactSide| side.weighted(|node| of_faces.skin.starts.get(node));
         for place in 0..FACES {
             let Some((is_ahead, _, triangle, (found, clearance))) = touched[place] else {
                 break;
             };
-            let is_shared = |(_, _, _, (other, _)): &FeatureMet<usize>| {
-                (other.offset - found.offset).length() <= SAME * found.offset.length()
+            let side = side_of(triangle, &found);
+            let is_alike = |(_, _, closer, (other, _)): &FeatureMet<usize>| {
+                let most = ALIKE * found.offset.length();
+                (other.offset - found.offset).length() <= most
+                    && place_of(&side_of(*closer, other)).distance(place_of(&side)) <= most
             };
-            if touched[..place].iter().flatten().any(is_shared) {
+            if touched[..place].iter().flatten().any(is_alike) {
                 continue;
             }
-            let nodes = of_faces.skin.triangles[triangle];
-            let sides = [
-                ContactSide::of_node(of_nodes.place, node),
-                ContactSide {
-                    body: of_faces.place,
-                    nodes,
-                    weights: found.weights,
-                },
-            ];
-            let offset = if is_behind { found.offset } else { -found.offset };
+            let mut offset = if is_behind { found.offset } else { -found.offset };
+            if is_solid && offset == Vec3::ZERO {
+                offset = outwards(&self.corners(of_faces, &side.nodes));
+            }
+            let sides = [ContactSide::of_node(of_nodes.place, node), side];
             self.show(sides, (offset, is_ahead), (clearance, shift), see);
         }
         (least, !is_behind)
@@ -390,9 +401,11 @@ impl PairSearch<'_> {
                 let Some(((found, clearance), is_ahead)) = met else {
                     continue;
                 };
-                // At an end of either it is a node that meets.
+                // At an end of either it is a corner that meets.
+                let edges = [segment.ends[1] - segment.ends[0], corners.points[1] - corners.points[0]];
+                let is_across = found.is_across_beyond(NEAR_END * clearance.radius, edges);
                 let is_known = touched.iter().flatten().any(|(_, _, edge, _)| *edge == other);
-                if found.is_across() && !is_known {
+                if is_across && !is_known {
                     keep_closest(&mut touched, (is_ahead, start, other, (found, clearance)));
                 }
             }
@@ -571,8 +584,13 @@ fn keep_closest<Feature: Copy + PartialOrd>(closest: &mut [Option<FeatureMet<Fea
 
 /// How far above a face what is compared with it begins, m; below 0 on its inner side.
 fn height(face: &Corners, start: &Separation) -> f32 {
+    -start.offset.dot(outwards(face))
+}
+
+/// The normal of a face as the substep begins.
+fn outwards(face: &Corners) -> Vec3 {
     let [a, b, c] = face.points;
-    -start.offset.dot((b - a).cross(c - a).normalize_or_zero())
+    (b - a).cross(c - a).normalize_or_zero()
 }
 
 /// From the coordinates of one body to those of another.
