@@ -62,6 +62,15 @@ impl Contacts {
         (slices as u32).clamp(1, SLICES)
     }
 
+    /// Whether a tool goes further in a substep than it may in a slice, whatever the body does.
+    pub(super) fn has_fast_tool(&self, meeting: &Meeting) -> bool {
+        met(meeting.tools, self.filter).any(|tool| {
+            let travel = tool.speed(meeting.dt) * meeting.substep;
+            let sweep = tool.sweep(meeting.origin);
+            sweep.is_some_and(|sweep| travel > sweep.thickness * SLICE_TRAVEL)
+        })
+    }
+
     /// How fast what is near moves against the tool at most, m/s.
     fn closing_speed(&self, meeting: &Meeting, tool: &ToolPath) -> f32 {
         let motion = tool.motion(meeting.start, meeting.end, meeting.dt, meeting.origin);

@@ -215,10 +215,10 @@ impl Contacts {
         self.holds.begin_step();
     }
 
-    /// Makes room for contacts within equations, where the body has such, and if `drags` for their friction: for how many.
-    pub fn reserve_holds(&mut self, drags: bool) -> Result<usize> {
+    /// Makes room for contacts within equations, where the body has such: for how many.
+    pub fn reserve_holds(&mut self) -> Result<usize> {
         let count = self.together.min(HELD);
-        self.holds.reserve(count, drags)?;
+        self.holds.reserve(count)?;
         Ok(count)
     }
 
@@ -424,9 +424,8 @@ impl Contacts {
     }
 
     /// Finds the contacts that the equation of the substep is to know of: all that may touch with these velocities, or are open by
-    /// no more than the slack. `stiffness_of` tells how stiff a node is, N/m; `drags`: friction belongs to the equation too.
-    /// `false`: something goes too far to tell.
-    pub fn foresee(&mut self, mut meeting: Meeting, drags: bool, stiffness_of: impl Fn(usize) -> f32) -> bool {
+    /// no more than the slack. `stiffness_of` tells how stiff a node is, N/m. `false`: something goes too far to tell.
+    pub fn foresee(&mut self, mut meeting: Meeting, is_long: bool, stiffness_of: impl Fn(usize) -> f32) -> bool {
         self.holds.clear();
         self.clear_contacts();
         if meeting.tools.is_empty() {
@@ -436,7 +435,9 @@ impl Contacts {
         if self.candidates.near().is_empty() {
             return true;
         }
-        if self.needed_slices(&meeting) > 1 {
+        // Nodes of pressed tissue that have become fast, as those of stiff tissue do, are still pressed.
+        let goes_on = !is_long && self.holds.have_pressed() && !self.has_fast_tool(&meeting);
+        if !goes_on && self.needed_slices(&meeting) > 1 {
             return false;
         }
         let slice = Slice::ahead(&meeting);
@@ -445,7 +446,7 @@ impl Contacts {
         self.constraints.truncate(HELD);
         let way = |node: usize| meeting.velocities.get(node) * meeting.substep;
         let slot = |place: usize| meeting.tools[place].slot;
-        let over = (meeting.substep, meeting.bindings, drags);
+        let over = (meeting.substep, meeting.bindings, &*meeting.pins);
         self.holds.begin(&self.constraints, slot, over, stiffness_of, way);
         true
     }

@@ -227,6 +227,35 @@ impl Grips {
         }
     }
 
+    /// Shows each node what acts on it with these pushes, N.
+    pub fn show_forces(&self, push_of: impl Fn(usize) -> DVec3, mut add: impl FnMut(usize, DVec3)) {
+        for grip in &self.grips {
+            let node = grip.node as usize;
+            add(node, grip.answer(push_of(node)).force);
+        }
+    }
+
+    /// Shows each node the product of their stiffness with the vectors.
+    pub fn show_products(&self, vector_of: impl Fn(usize) -> DVec3, mut add: impl FnMut(usize, DVec3)) {
+        for grip in &self.grips {
+            let node = grip.node as usize;
+            add(node, grip.drag.stiffness * vector_of(node));
+        }
+    }
+
+    /// Shows by how much the energy of each changes where the pushes grow by these vectors, J.
+    pub fn show_changes(
+        &self,
+        push_of: impl Fn(usize) -> DVec3,
+        vector_of: impl Fn(usize) -> DVec3,
+        mut add: impl FnMut(f64),
+    ) {
+        for grip in self.grips.iter().filter(|grip| grip.most > 0.0) {
+            let (push, more) = (push_of(grip.node as usize), vector_of(grip.node as usize));
+            add(grip.change(push, more));
+        }
+    }
+
     /// The force on the tissue of this one for each N that presses its node.
     pub fn per_force(&self, place: usize) -> DVec3 {
         let grip = &self.grips[place];
@@ -309,6 +338,36 @@ impl NodeFriction {
         }
     }
 
+    /// What it would do with so much slip if it could do any amount, N, and whether it can do that.
+    fn wanted(&self, slip: DVec3) -> (DVec3, bool) {
+        let wanted = self.multiplier - slip * self.stiffness;
+        (wanted, self.holds_on || wanted.length() <= self.most)
+    }
+
+    /// By how much its energy changes where the node is pushed so far, m, and then by `more`, J: as a product with the way while it goes on sticking
+    /// or slipping, so that nothing small is found as a difference of what is large.
+    fn change(&self, push: DVec3, more: DVec3) -> f64 {
+        let (slip, more) = (self.across(self.slip + push), self.across(more));
+        let [(before, stuck), (after, sticks)] = [slip, slip + more].map(|slip| self.wanted(slip));
+        let along = -more.dot(before + after);
+        match (stuck, sticks) {
+            (true, true) => 0.5 * along,
+            (false, false) => self.most * along / (before.length() + after.length()),
+            _ => {
+                let energy = |wanted: DVec3, sticks: bool| {
+                    let size = wanted.length();
+                    let twice = if sticks {
+                        size * size
+                    } else {
+                        self.most * (2.0 * size - self.most)
+                    };
+                    0.5 * twice / self.stiffness
+                };
+                energy(after, sticks) - energy(before, stuck)
+            }
+        }
+    }
+
     /// With the node pushed so far, m.
     fn answer(&self, push: DVec3) -> Drag {
         let slip = self.across(self.slip + push);
@@ -325,16 +384,16 @@ impl NodeFriction {
                 direction * direction.z,
             )
         };
-        let wanted = self.multiplier - slip * self.stiffness;
-        let size = wanted.length();
+        let (wanted, sticks) = self.wanted(slip);
         let across = DMat3::IDENTITY - along(self.normal);
-        if size <= self.most || self.holds_on {
+        if sticks {
             return Drag {
                 force: wanted,
                 stiffness: across * self.stiffness,
                 slip,
             };
         }
+        let size = wanted.length();
         let part = self.most / size;
         Drag {
             force: wanted * part,

@@ -2,9 +2,9 @@
 //! tissue into the tool first and only then have it stopped, with too small a force.
 //!
 //! An augmented Lagrangian (Hestenes 1969, Powell 1969): each contact pushes with a multiplier and a stiffness, and never pulls;
-//! what it has come to do becomes its multiplier. As long as multipliers stay there is a convex function to minimise. In long steps
-//! [friction](super::grip) belongs to it too; in short ones friction, and in all what is left of a penetration, is a matter of contact's
-//! own impulses.
+//! what it has come to do becomes its multiplier. As long as multipliers stay there is a convex function to minimise.
+//! [Friction](super::grip) belongs to it too: an impulse after the equation would move nodes of stiff tissue back against hardly any force. What is
+//! left of a penetration is a matter of contact's own impulses.
 
 use std::ops::Range;
 
@@ -18,10 +18,13 @@ use super::hold::{Answer, Hold};
 use super::supports::{MOST, Supports};
 use crate::base::{Result, StateHasher};
 use crate::codec::saved;
-use crate::nodes::Bindings;
+use crate::nodes::{Bindings, Pins};
 
 /// How much stiffer a contact is than its nodes: the more, the faster its multiplier is found, and the worse what lies between.
 pub(super) const STIFFER: f32 = 3.0;
+
+/// So many nodes have friction in an equation at most; beyond that it acts after it.
+const GRIPPED: usize = 1024;
 
 /// The part of a node in a hold.
 #[derive(Clone, Copy, Debug)]
@@ -70,8 +73,8 @@ pub(crate) struct Holds {
 saved! { Holds { holds, shares, order, last, settled, grips } }
 
 impl Holds {
-    /// Makes room for so many contacts, and for friction of as many nodes if that belongs to them.
-    pub fn reserve(&mut self, count: usize, drags: bool) -> Result<()> {
+    /// Makes room for so many contacts, and for the friction of their nodes.
+    pub fn reserve(&mut self, count: usize) -> Result<()> {
         self.holds.try_reserve(count.saturating_sub(self.holds.len()))?;
         let shares = MOST * count;
         self.shares.try_reserve(shares.saturating_sub(self.shares.len()))?;
@@ -79,7 +82,7 @@ impl Holds {
         for pushes in [&mut self.last, &mut self.settled] {
             pushes.try_reserve(count.saturating_sub(pushes.len()))?;
         }
-        self.grips.reserve(if drags { count } else { 0 })
+        self.grips.reserve(count.min(GRIPPED))
     }
 
     /// Begins a step anew.
@@ -184,12 +187,12 @@ impl Holds {
     }
 
     /// Begins anew with these contacts over `duration` seconds, of nodes that are as stiff as `stiffness_of` tells, N/m; infinite
-    /// where they are held. Without a push each node goes the way of `way_of`. Friction belongs to them where `drags` says so.
+    /// where they are held. Without a push each node goes the way of `way_of`.
     pub(super) fn begin(
         &mut self,
         constraints: &[Constraint],
         slot_of: impl Fn(usize) -> usize,
-        (duration, bindings, drags): (f32, Option<&Bindings>, bool),
+        (duration, bindings, pins): (f32, Option<&Bindings>, &Pins),
         stiffness_of: impl Fn(usize) -> f32,
         way_of: impl Fn(usize) -> Vec3,
     ) {
@@ -221,7 +224,9 @@ impl Holds {
                 hold.nodes[place] = node;
                 free[place] = constraint.starts[place].as_dvec3() + way.as_dvec3();
                 softness += share * share / stiffness;
-                if drags && constraint.friction > 0.0 && share > 0.0 && stiffness.is_finite() {
+                // What is wedged in between a tool and the axes that hold a node would be dragged without bound.
+                let drags = constraint.friction > 0.0 && share > 0.0 && stiffness.is_finite();
+                if drags && !pins.partial_axes_of(node).any() {
                     let grip = NodeFriction {
                         node,
                         tool: constraint.tool,
@@ -363,6 +368,11 @@ impl Holds {
             .filter(|(_, hold)| hold.answer.force > 0.0)
     }
 
+    /// Whether one pushed at the end of the last equation.
+    pub(super) fn have_pressed(&self) -> bool {
+        !self.last.is_empty()
+    }
+
     /// Whether a contact pushes.
     pub fn are_pressed(&self) -> bool {
         self.holds.iter().any(|hold| hold.answer.force != 0.0)
@@ -374,6 +384,7 @@ impl Holds {
             let answer = hold.answer_to(&push_of);
             hold.share_out(&answer, answer.force, &mut add);
         }
+        self.grips.show_forces(push_of, add);
     }
 
     /// Shows each node the product of the contacts' stiffness with the vectors.
@@ -384,6 +395,7 @@ impl Holds {
                 add(node as usize, hold.answer.meets.normal * product);
             }
         }
+        self.grips.show_products(vector_of, add);
     }
 
     /// Shows by how much the energy of each contact changes where the pushes grow by these vectors, J.
@@ -410,6 +422,7 @@ impl Holds {
                 add(0.5 * growth * (before.force + after.force) / hold.stiffness);
             }
         }
+        self.grips.show_changes(push_of, vector_of, add);
     }
 
     /// Shows each node that is pressed, with the diagonal block of its contacts' stiffness: xx, yy, zz, yz, zx, xy.

@@ -310,7 +310,7 @@ impl System {
     /// Makes room for contacts within equations, where it has such.
     pub fn reserve_holds(&mut self) -> Result<()> {
         if let (Some(contacts), Some(implicit)) = (&mut self.contacts, &mut self.implicit) {
-            implicit.reserve_contacts(contacts.reserve_holds(implicit.has_small_budget())?)?;
+            implicit.reserve_contacts(contacts.reserve_holds()?)?;
             if self.node_room > 0 {
                 implicit.reserve_nodes(self.node_room)?;
             }

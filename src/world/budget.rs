@@ -25,8 +25,8 @@ const GROWTH: u32 = 4;
 /// The part of the time that work is planned for.
 const PLANNED: f64 = 0.7;
 
-/// How much of the pace of earlier steps is kept where a step was faster.
-const KEPT: f64 = 0.9;
+/// The pace is the second slowest of so many steps: one that something else on the machine held up is no measure of the next.
+const STEPS: usize = 8;
 
 /// What a step of bounded work did.
 ///
@@ -61,24 +61,28 @@ pub struct BudgetReport {
 /// How fast this machine has worked lately. It decides nothing but how much work is allowed.
 #[derive(Debug, Default)]
 pub(super) struct WorkPace {
-    /// s; 0: not known.
-    unit: f64,
+    /// How long a unit of work took in each of the last steps, s; 0: not known.
+    units: [f64; STEPS],
+    next: usize,
     last_work: u32,
 }
 
 impl WorkPace {
     /// How much work fits into so many seconds.
     fn work(&self, seconds: f64) -> u32 {
-        if self.unit == 0.0 {
+        let mut units = self.units;
+        units.sort_unstable_by(f64::total_cmp);
+        let unit = units[STEPS - 2];
+        if unit == 0.0 {
             return FIRST_WORK;
         }
-        let fits = (PLANNED * seconds / self.unit).min(f64::from(u32::MAX - 1)) as u32;
+        let fits = (PLANNED * seconds / unit).min(f64::from(u32::MAX - 1)) as u32;
         fits.clamp(1, self.last_work.max(FIRST_WORK).saturating_mul(GROWTH))
     }
 
     fn note(&mut self, seconds: f64, report: &BudgetReport) {
-        let unit = seconds / f64::from(report.work_done.max(1));
-        self.unit = unit.max(KEPT * self.unit + (1.0 - KEPT) * unit);
+        self.units[self.next] = seconds / f64::from(report.work_done.max(1));
+        self.next = (self.next + 1) % STEPS;
         self.last_work = report.work;
     }
 }
@@ -177,5 +181,36 @@ impl World {
             Some(body.system().carry.limit_by_energy(stable))
         });
         known.fold(f32::INFINITY, f32::min)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_late_step_does_not_slow_those_after_it_down() {
+        let mut world = World::new(crate::WorldDefinition::default()).expect("a world");
+        let mut report = world.step_with_budget(0.01, 100).expect("a step");
+        let mut pace = WorkPace::default();
+        let mut step = |pace: &mut WorkPace, unit: f64| {
+            let work = pace.work(1e-2);
+            (report.work, report.work_done) = (work, work);
+            pace.note(unit * f64::from(work), &report);
+            work
+        };
+        assert_eq!(step(&mut pace, 1e-5), FIRST_WORK);
+        for _ in 0..10 {
+            step(&mut pace, 1e-5);
+        }
+        let fits = (PLANNED * 1e-2 / 1e-5) as u32;
+        assert_eq!(step(&mut pace, 1e-3), fits);
+        for _ in 0..10 {
+            assert_eq!(step(&mut pace, 1e-5), fits);
+        }
+        // A machine that has become slower is another matter.
+        step(&mut pace, 1e-4);
+        step(&mut pace, 1e-4);
+        assert!(step(&mut pace, 1e-4) <= fits / 10 + 1);
     }
 }

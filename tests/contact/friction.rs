@@ -2,7 +2,8 @@
 
 use crate::support::tissue::*;
 use glam::{DVec3, Quat, Vec3};
-use sinew::Shape;
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Material, Model, Shape, Solver};
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
@@ -127,4 +128,64 @@ fn a_spinning_ball_drags_sideways() {
     );
     let (_, smooth) = spun(0.0);
     assert!(smooth.length() < 1e-4 * least, "{smooth}");
+}
+
+/// The force on a tool that is pressed 6 mm into stiff tissue off its middle, and rests there, N; and by how much more energy than its work there was
+/// at most, J.
+fn pressed(solver: Solver, shape: Shape, friction: f32) -> (f64, f64) {
+    const FRAME: f32 = 1.0 / 60.0;
+    const SIZE: [f32; 3] = [0.05, 0.025, 0.025];
+    let mut world = world(Vec3::ZERO);
+    let mesh = Mesh::block(SIZE, [6, 3, 3]).expect("a block");
+    let definition = BodyDefinition {
+        material: Some(Material {
+            model: Model::Tetrahedra,
+            young_modulus: 2.5e5,
+            poisson_ratio: 0.3,
+            density: 1000.0,
+            ..Default::default()
+        }),
+        damping_rate: 3.0,
+        solver,
+        ..BodyDefinition::of(&mesh)
+    };
+    let body = world.create_body(&definition).expect("a body");
+    for (node, place) in (0..).zip(&mesh.positions) {
+        if place.y < -0.49 * SIZE[1] {
+            world.body_mut(body).expect("a body").pin(node).expect("a pin");
+        }
+    }
+    let start = Vec3::new(0.0025, 0.5 * SIZE[1] + 0.003, 0.001);
+    let tool = tool(&mut world, shape, friction, start, Quat::IDENTITY);
+    let (mut work, mut gain, mut force) = (0.0, 0.0_f64, 0.0);
+    for frame in 1..=18 {
+        let way = Vec3::new(0.0, -0.006 / 12.0, 0.0);
+        let place = start + way * frame.min(12) as f32;
+        let before = world.pose(tool).expect("a tool").position;
+        world.set_pose(tool, place, None).expect("a pose");
+        world.step(FRAME).expect("a step");
+        force = f64::from(world.wrench(tool).expect("a tool").0.y);
+        work -= force * f64::from(place.y - before.y);
+        let energy = world.body(body).expect("a body").energy(Vec3::ZERO);
+        gain = gain.max(energy.kinetic + energy.elastic - work);
+    }
+    (force, gain)
+}
+
+/// Friction is no less for solved equations, whose nodes are held by stiff tissue.
+#[test]
+fn solved_equations_press_stiff_tissue_as_substeps_do() {
+    let half_extents = Vec3::new(0.004, 0.003, 0.004);
+    for (shape, friction) in [
+        (Shape::Sphere { radius: 0.003 }, 0.3),
+        (Shape::Box { half_extents }, 0.3),
+    ] {
+        let (expected, _) = pressed(Solver::Verlet, shape, friction);
+        for solver in [Solver::Implicit, Solver::Newton] {
+            let what = format!("{solver:?}, {shape:?}, friction {friction}");
+            let (force, gain) = pressed(solver, shape, friction);
+            assert!((force / expected - 1.0).abs() < 0.08, "{what}: {force} N of {expected}");
+            assert!(gain < 0.03 * 0.006 * expected, "{what}: {gain} J");
+        }
+    }
 }
