@@ -91,8 +91,7 @@ impl sinew_attachment_def {
         let other_names = ["other_nodes", "other_triangles", "other_weights"];
         let arrays = (self.nodes, self.triangles, self.weights);
         let other_arrays = (self.other_nodes, self.other_triangles, self.other_weights);
-        // SAFETY: the same contract.
-        let ends = unsafe { ends(names, arrays, self.count)? };
+        let ends = ends(names, arrays, self.count)?;
         let (body, limit) = (self.body.id(), self.force_limit);
         let (nodes, triangles, weights) = other_arrays;
         let is_given = !(nodes.is_null() && triangles.is_null() && weights.is_null());
@@ -107,8 +106,7 @@ impl sinew_attachment_def {
                 "tool is given beside other or its nodes or points".to_owned(),
             ));
         }
-        // SAFETY: the same contract.
-        let others = unsafe { self::ends(other_names, other_arrays, self.count)? }.anchors()?;
+        let others = self::ends(other_names, other_arrays, self.count)?.anchors()?;
         world.attach_to_body(body, &ends.anchors()?, self.other.id(), &others, limit)
     }
 }
@@ -141,17 +139,13 @@ unsafe fn ends<'a>(
         if nodes.is_null() && count > 0 {
             return Err(Error::invalid(format!("{of_nodes} and {of_triangles} are NULL")));
         }
-        // SAFETY: the same contract.
-        return unsafe { memory::array(of_nodes, nodes, count) }.map(AttachedEnds::Nodes);
+        return memory::array(of_nodes, nodes, count).map(AttachedEnds::Nodes);
     }
     if !nodes.is_null() {
         return Err(Error::invalid(format!("{of_nodes} is given beside points")));
     }
-    // SAFETY: the same contract.
-    let (triangles, weights): (&[u32], &[[f32; 3]]) = unsafe {
-        let triangles = memory::array(of_triangles, triangles, count)?;
-        (triangles, memory::array(of_weights, weights.cast(), count)?)
-    };
+    let triangles = memory::array(of_triangles, triangles, count)?;
+    let weights = memory::array(of_weights, weights.cast::<[f32; 3]>(), count)?;
     let mut points = reserved(count)?;
     let pairs = triangles.iter().zip(weights);
     points.extend(pairs.map(|(&triangle, &weights)| SurfacePoint { triangle, weights }));
@@ -161,8 +155,7 @@ unsafe fn ends<'a>(
 /// Fills an attachment definition with its defaults; `struct_size` is sizeof(sinew_attachment_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_def_init(def: *mut sinew_attachment_def, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_attachment_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_attachment_def::defaults()))
 }
 
 /// Attaches nodes or surface points of a body to a tool or to a body, each by its own attachment.
@@ -177,17 +170,14 @@ pub unsafe extern "C" fn sinew_attachment_create(
     def: *const sinew_attachment_def,
     out_attachments: *mut sinew_attachment_id,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let def = memory::definition("def", def, sinew_attachment_def::defaults())?;
-            let out = memory::output_array("out_attachments", out_attachments, def.count)?;
-            for (out, id) in out.iter_mut().zip(def.create(world)?) {
-                *out = id.into();
-            }
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let def = memory::definition("def", def, sinew_attachment_def::defaults())?;
+        let out = memory::output_array("out_attachments", out_attachments, def.count)?;
+        for (out, id) in out.iter_mut().zip(def.create(world)?) {
+            *out = id.into();
+        }
+        Ok(())
+    })
 }
 
 /// Releases an attachment or cuts a suture; its nodes keep their velocities.
@@ -198,8 +188,7 @@ pub unsafe extern "C" fn sinew_attachment_release(
     world: *mut sinew_world,
     attachment: sinew_attachment_id,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.release(attachment.id())) }
+    with_world_mut(world, |world| world.release(attachment.id()))
 }
 
 /// Writes the force [N] of an attachment on its body, averaged over the last step.
@@ -211,13 +200,10 @@ pub unsafe extern "C" fn sinew_attachment_get_force(
     attachment: sinew_attachment_id,
     out_force: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let held = world.attachment_force(attachment.id())?;
-            memory::write("out_force", out_force.cast::<[f32; 3]>(), held.to_array())
-        })
-    }
+    with_world(world, |world| {
+        let held = world.attachment_force(attachment.id())?;
+        memory::write("out_force", out_force.cast::<[f32; 3]>(), held.to_array())
+    })
 }
 
 /// Writes the attachments that broke in the last step because of their force_limit.
@@ -230,13 +216,10 @@ pub unsafe extern "C" fn sinew_world_get_broken_attachments(
     capacity: usize,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let found = world.slipped().iter().map(|&id| id.into());
-            memory::write_found(found, ("out_attachments", out_attachments, capacity), out_count)
-        })
-    }
+    with_world(world, |world| {
+        let found = world.slipped().iter().map(|&id| id.into());
+        memory::write_found(found, ("out_attachments", out_attachments, capacity), out_count)
+    })
 }
 
 /// Writes the total force and torque on several tools, averaged over the last step, in world axes.
@@ -252,14 +235,11 @@ pub unsafe extern "C" fn sinew_world_get_total_wrench(
     out_force: *mut f32,
     out_torque: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let given = memory::array("tools", tools, count)?;
-            let point = memory::vector("point", point)?;
-            let mut tools = reserved(count)?;
-            tools.extend(given.iter().map(|tool| tool.id()));
-            write_wrench(world.wrench_about(&tools, point)?, out_force, out_torque)
-        })
-    }
+    with_world(world, |world| {
+        let given = memory::array("tools", tools, count)?;
+        let point = memory::vector("point", point)?;
+        let mut tools = reserved(count)?;
+        tools.extend(given.iter().map(|tool| tool.id()));
+        write_wrench(world.wrench_about(&tools, point)?, out_force, out_torque)
+    })
 }

@@ -109,8 +109,7 @@ impl sinew_blade_def {
 /// Fills a blade definition with its defaults; `struct_size` is sizeof(sinew_blade_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_def_init(def: *mut sinew_blade_def, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_blade_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_blade_def::defaults()))
 }
 
 /// Creates a blade: an edge that cuts bodies with spare_nodes as its pose moves.
@@ -124,22 +123,18 @@ pub unsafe extern "C" fn sinew_blade_create(
     def: *const sinew_blade_def,
     out: *mut sinew_blade_id,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let out = memory::output("out", out)?;
-            let def = memory::definition("def", def, sinew_blade_def::defaults())?;
-            *out = world.create_blade(&def.definition())?.into();
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let out = memory::output("out", out)?;
+        let def = memory::definition("def", def, sinew_blade_def::defaults())?;
+        *out = world.create_blade(&def.definition())?.into();
+        Ok(())
+    })
 }
 
 /// Destroys a blade; its cuts remain.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_destroy(world: *mut sinew_world, blade: sinew_blade_id) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.destroy_blade(blade.id())) }
+    with_world_mut(world, |world| world.destroy_blade(blade.id()))
 }
 
 /// Moves a blade to a new pose during the next step, along a line at constant speed.
@@ -152,14 +147,11 @@ pub unsafe extern "C" fn sinew_blade_set_pose(
     position: *const f32,
     orientation: *const f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let position = memory::vector("position", position)?;
-            let orientation = memory::optional_orientation("orientation", orientation)?;
-            world.set_blade_pose(blade.id(), position, orientation)
-        })
-    }
+    with_world_mut(world, |world| {
+        let position = memory::vector("position", position)?;
+        let orientation = memory::optional_orientation("orientation", orientation)?;
+        world.set_blade_pose(blade.id(), position, orientation)
+    })
 }
 
 /// Sets the collision category and mask of a blade; bodies outside of them let go of it.
@@ -171,8 +163,7 @@ pub unsafe extern "C" fn sinew_blade_set_collision(
     mask: u32,
 ) -> sinew_status {
     let filter = CollisionFilter { category, mask };
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.set_blade_collision_filter(blade.id(), filter)) }
+    with_world_mut(world, |world| world.set_blade_collision_filter(blade.id(), filter))
 }
 
 /// Writes the cuts of a blade and the load on it in the last step.
@@ -182,21 +173,18 @@ pub unsafe extern "C" fn sinew_blade_get_report(
     blade: sinew_blade_id,
     out: *mut sinew_blade_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let told = world.blade_report(blade.id())?;
-            memory::report("out", out)?.fill(sinew_blade_report {
-                struct_size: size_of::<sinew_blade_report>(),
-                force: told.force.to_array(),
-                torque: told.torque.to_array(),
-                work: told.work,
-                length: told.length,
-                lag: told.lag,
-                status: told.refused.as_ref().map_or(SINEW_STATUS_OK, status_of),
-                area: told.area,
-            });
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let told = world.blade_report(blade.id())?;
+        memory::report("out", out)?.fill(sinew_blade_report {
+            struct_size: size_of::<sinew_blade_report>(),
+            force: told.force.to_array(),
+            torque: told.torque.to_array(),
+            work: told.work,
+            length: told.length,
+            lag: told.lag,
+            status: told.refused.as_ref().map_or(SINEW_STATUS_OK, status_of),
+            area: told.area,
+        });
+        Ok(())
+    })
 }

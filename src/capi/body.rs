@@ -63,8 +63,7 @@ pub(super) unsafe fn with_body(
     body: sinew_body_id,
     mut call: impl FnMut(&Body) -> Result<()>,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world(world, |world| call(world.body(body.id())?)) }
+    with_world(world, |world| call(world.body(body.id())?))
 }
 
 /// Runs `call` with a body to change.
@@ -76,8 +75,7 @@ pub(super) unsafe fn with_body_mut(
     body: sinew_body_id,
     mut call: impl FnMut(&mut Body) -> Result<()>,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| call(world.body_mut(body.id())?)) }
+    with_world_mut(world, |world| call(world.body_mut(body.id())?))
 }
 
 /// Creates a body in a world, and copies everything that `def` points to.
@@ -89,24 +87,20 @@ pub unsafe extern "C" fn sinew_body_create(
     def: *const sinew_body_def,
     out: *mut sinew_body_id,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let out = memory::output("out", out)?;
-            let def = memory::definition("def", def, sinew_body_def::defaults())?;
-            let body = def.placed(|definition| world.create_body(definition))?;
-            world.body_mut(body)?.set_gravity_scale(def.gravity_scale)?;
-            *out = body.into();
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let out = memory::output("out", out)?;
+        let def = memory::definition("def", def, sinew_body_def::defaults())?;
+        let body = def.placed(|definition| world.create_body(definition))?;
+        world.body_mut(body)?.set_gravity_scale(def.gravity_scale)?;
+        *out = body.into();
+        Ok(())
+    })
 }
 
 /// Destroys a body and ends the views of it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_destroy(world: *mut sinew_world, body: sinew_body_id) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.destroy_body(body.id())) }
+    with_world_mut(world, |world| world.destroy_body(body.id()))
 }
 
 /// Adds a force [N], 3 floats, to a node for the whole next step; cleared when that succeeds.
@@ -119,12 +113,9 @@ pub unsafe extern "C" fn sinew_body_apply_force(
     node: u32,
     force: *const f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            body.apply_force(node, memory::vector("force", force)?)
-        })
-    }
+    with_body_mut(world, body, |body| {
+        body.apply_force(node, memory::vector("force", force)?)
+    })
 }
 
 /// Adds forces [N], 3 * count floats, to nodes for the whole next step; see sinew_body_apply_force.
@@ -138,13 +129,10 @@ pub unsafe extern "C" fn sinew_body_apply_forces(
     forces: *const f32,
     count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            let nodes = memory::array("nodes", nodes, count)?;
-            body.apply_forces(nodes, memory::array("forces", forces.cast(), count)?)
-        })
-    }
+    with_body_mut(world, body, |body| {
+        let nodes = memory::array("nodes", nodes, count)?;
+        body.apply_forces(nodes, memory::array("forces", forces.cast(), count)?)
+    })
 }
 
 /// Writes a view of the node positions [m] without copying.
@@ -157,12 +145,9 @@ pub unsafe extern "C" fn sinew_body_get_positions(
     body: sinew_body_id,
     out: *mut sinew_vec3_view,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            memory::write("out", out, sinew_vec3_view::of(body.positions()))
-        })
-    }
+    with_body(world, body, |body| {
+        memory::write("out", out, sinew_vec3_view::of(body.positions()))
+    })
 }
 
 /// Writes a view of the node velocities [m/s] at the time of the positions.
@@ -175,12 +160,9 @@ pub unsafe extern "C" fn sinew_body_get_velocities(
     body: sinew_body_id,
     out: *mut sinew_vec3_view,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            memory::write("out", out, sinew_vec3_view::of(body.velocities()))
-        })
-    }
+    with_body(world, body, |body| {
+        memory::write("out", out, sinew_vec3_view::of(body.velocities()))
+    })
 }
 
 /// Writes 1 if the surface of a body is closed, else 0.
@@ -192,12 +174,9 @@ pub unsafe extern "C" fn sinew_body_is_closed(
     body: sinew_body_id,
     out: *mut u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            memory::write("out", out, u32::from(body.is_closed()))
-        })
-    }
+    with_body(world, body, |body| {
+        memory::write("out", out, u32::from(body.is_closed()))
+    })
 }
 
 /// Sets the collision category and mask of a body from the next step on.
@@ -210,13 +189,10 @@ pub unsafe extern "C" fn sinew_body_set_collision(
     category: u32,
     mask: u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            body.set_collision_filter(CollisionFilter { category, mask });
-            Ok(())
-        })
-    }
+    with_body_mut(world, body, |body| {
+        body.set_collision_filter(CollisionFilter { category, mask });
+        Ok(())
+    })
 }
 
 /// Moves all nodes to new positions [m], 3 * node_count floats, without a sweep.
@@ -229,14 +205,11 @@ pub unsafe extern "C" fn sinew_body_set_positions(
     positions: *const f32,
     node_count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            let own = body.positions().as_ptr_range();
-            let positions = memory::array_apart("positions", positions.cast(), node_count, own)?;
-            body.set_positions(&positions)
-        })
-    }
+    with_body_mut(world, body, |body| {
+        let own = body.positions().as_ptr_range();
+        let positions = memory::array_apart("positions", positions.cast(), node_count, own)?;
+        body.set_positions(&positions)
+    })
 }
 
 /// Sets the velocities [m/s] of all nodes, 3 * node_count floats.
@@ -249,14 +222,11 @@ pub unsafe extern "C" fn sinew_body_set_velocities(
     velocities: *const f32,
     node_count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            let own = body.published_velocities();
-            let velocities = memory::array_apart("velocities", velocities.cast(), node_count, own)?;
-            body.set_velocities(&velocities)
-        })
-    }
+    with_body_mut(world, body, |body| {
+        let own = body.published_velocities();
+        let velocities = memory::array_apart("velocities", velocities.cast(), node_count, own)?;
+        body.set_velocities(&velocities)
+    })
 }
 
 /// Pins a node at its current position; no effect on a pinned node.
@@ -264,8 +234,7 @@ pub unsafe extern "C" fn sinew_body_set_velocities(
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_pin(world: *mut sinew_world, body: sinew_body_id, node: u32) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body_mut(world, body, |body| body.pin(node)) }
+    with_body_mut(world, body, |body| body.pin(node))
 }
 
 /// Pins a node along some axes and frees it along the others.
@@ -282,17 +251,14 @@ pub unsafe extern "C" fn sinew_body_pin_axes(
     axes: u32,
 ) -> sinew_status {
     const AXES: [u32; 3] = [SINEW_AXIS_X, SINEW_AXIS_Y, SINEW_AXIS_Z];
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            if axes & !AXES.iter().sum::<u32>() != 0 {
-                return Err(Error::invalid(format!(
-                    "axes is {axes}: must be a sum of SINEW_AXIS_X, _Y and _Z"
-                )));
-            }
-            body.pin_axes(node, AXES.map(|axis| axes & axis != 0))
-        })
-    }
+    with_body_mut(world, body, |body| {
+        if axes & !AXES.iter().sum::<u32>() != 0 {
+            return Err(Error::invalid(format!(
+                "axes is {axes}: must be a sum of SINEW_AXIS_X, _Y and _Z"
+            )));
+        }
+        body.pin_axes(node, AXES.map(|axis| axes & axis != 0))
+    })
 }
 
 /// Unpins a node along all axes; it keeps the velocity of its pin.
@@ -300,8 +266,7 @@ pub unsafe extern "C" fn sinew_body_pin_axes(
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or its mass is 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_unpin(world: *mut sinew_world, body: sinew_body_id, node: u32) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body_mut(world, body, |body| body.unpin(node)) }
+    with_body_mut(world, body, |body| body.unpin(node))
 }
 
 /// Moves a pinned node along a line to a position [m], 3 floats, during the next step.
@@ -316,12 +281,9 @@ pub unsafe extern "C" fn sinew_body_move_pin(
     node: u32,
     position: *const f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            body.move_pin(node, memory::vector("position", position)?)
-        })
-    }
+    with_body_mut(world, body, |body| {
+        body.move_pin(node, memory::vector("position", position)?)
+    })
 }
 
 /// Writes the reaction force [N] on a pinned node, 3 floats, averaged over the last step.
@@ -336,12 +298,9 @@ pub unsafe extern "C" fn sinew_body_get_pin_force(
     node: u32,
     force: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            memory::write("force", force.cast::<[f32; 3]>(), body.pin_force(node)?.to_array())
-        })
-    }
+    with_body(world, body, |body| {
+        memory::write("force", force.cast::<[f32; 3]>(), body.pin_force(node)?.to_array())
+    })
 }
 
 /// Connects two nodes by a spring without damping.
@@ -362,8 +321,7 @@ pub unsafe extern "C" fn sinew_body_add_spring(
     // Only a number can mean the current distance: NaN and -infinity are refused as lengths.
     let current = rest_length < 0.0 && rest_length.is_finite();
     let rest_length = (!current).then_some(rest_length);
-    // SAFETY: the same contract.
-    unsafe { with_body_mut(world, body, |body| body.add_spring(a, b, stiffness, rest_length)) }
+    with_body_mut(world, body, |body| body.add_spring(a, b, stiffness, rest_length))
 }
 
 /// Sets the overpressure [Pa] of the cavities at rest volume from the next step on.
@@ -377,8 +335,7 @@ pub unsafe extern "C" fn sinew_body_set_pressure(
     body: sinew_body_id,
     pressure: f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body_mut(world, body, |body| body.set_pressure(pressure)) }
+    with_body_mut(world, body, |body| body.set_pressure(pressure))
 }
 
 /// Removes the spring between two nodes, and the tetrahedra and the bending that have this edge.
@@ -393,6 +350,5 @@ pub unsafe extern "C" fn sinew_body_remove_spring(
     a: u32,
     b: u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body_mut(world, body, |body| body.remove_spring(a, b)) }
+    with_body_mut(world, body, |body| body.remove_spring(a, b))
 }

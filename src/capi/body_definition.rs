@@ -232,81 +232,78 @@ impl sinew_body_def {
         let springs = self.spring_count;
         let nodes = self.node_count;
         let tetrahedra = self.tetrahedron_count;
-        // SAFETY: the same contract.
-        unsafe {
-            let directions = memory::optional_array("fibre_directions", self.fibre_directions.cast(), tetrahedra)?;
-            Ok(BodyDefinition {
-                positions: memory::array("positions", self.positions.cast(), nodes)?,
-                rest_positions: memory::optional_array("rest_positions", self.rest_positions.cast(), nodes)?,
-                masses: values("masses", self.masses, nodes, self.node_mass)?,
-                node_dampings: values("node_dampings", self.node_dampings, nodes, self.node_damping)?,
-                damping_rate: self.damping_rate,
-                springs: memory::optional_array("springs", self.springs.cast(), springs)?,
-                stiffnesses: values("stiffnesses", self.stiffnesses, springs, self.stiffness)?,
-                rest_lengths: memory::optional_array("rest_lengths", self.rest_lengths, springs)?,
-                spring_dampings: values("spring_dampings", self.spring_dampings, springs, self.spring_damping)?,
-                triangles: memory::array("triangles", self.triangles.cast(), self.triangle_count)?,
-                tetrahedra: memory::array("tetrahedra", self.tetrahedra.cast(), self.tetrahedron_count)?,
-                cells: memory::array("cells", self.cells.cast(), self.cell_count)?,
-                material: self.material()?,
-                home_stiffnesses: values("home_stiffnesses", self.home_stiffnesses, nodes, self.home_stiffness)?,
-                bending_stiffness: self.bending_stiffness,
-                spring_law: self.spring_law()?,
-                element_law: self.element_law()?,
-                fibre_directions: directions.unwrap_or(&[]),
-                fibre_stiffnesses: values(
-                    "fibre_stiffnesses",
-                    self.fibre_stiffnesses,
-                    tetrahedra,
-                    self.fibre_stiffness,
-                )?,
-                viscosity: Viscosity {
-                    retardation_time: self.retardation_time,
-                    relaxation_time: self.relaxation_time,
-                },
-                yielding: Yielding {
-                    strain: self.yield_strain,
-                    largest: self.largest_set,
-                },
-                strain_limit: self.strain_limit,
-                limit_stiffening: self.limit_stiffening,
-                storage: match self.storage {
-                    SINEW_STORAGE_PACKED => Storage::Packed,
-                    SINEW_STORAGE_EFFICIENT => Storage::Efficient,
-                    SINEW_STORAGE_FAST_LINK => Storage::FastLink,
-                    SINEW_STORAGE_DYNAMIC_BULK => Storage::DynamicBulk,
-                    unknown => return Err(Error::invalid(format!("storage is {unknown}: no SINEW_STORAGE_..."))),
-                },
-                springs_per_node: self.springs_per_node,
-                solver: match self.solver {
-                    SINEW_SOLVER_VERLET => Solver::Verlet,
-                    SINEW_SOLVER_IMPLICIT => Solver::Implicit,
-                    SINEW_SOLVER_NEWTON => Solver::Newton,
-                    SINEW_SOLVER_AUTO => Solver::Auto,
-                    unknown => return Err(Error::invalid(format!("solver is {unknown}: no SINEW_SOLVER_..."))),
-                },
-                order: self.order,
-                iterations: self.iterations,
-                accuracy: self.accuracy,
-                mass_scaling: self.mass_scaling,
-                volume_stiffness: self.volume_stiffness,
-                enclosed_stiffness: self.enclosed_stiffness,
-                pressure: self.pressure,
-                contact: self.contact()?,
-                sleep: Sleep {
-                    speed: self.sleep_speed,
-                    time: self.sleep_time,
-                },
-                spare_nodes: self.spare_nodes,
-                toughness: self.toughness,
-                tearing: Tearing {
-                    strain: self.tear_strain,
-                    force: self.tear_force,
-                    most_per_step: self.most_tears,
-                    smallest_piece: self.smallest_piece,
-                },
-            })
-        }
+        let directions = memory::optional_array("fibre_directions", self.fibre_directions.cast(), tetrahedra)?;
+        Ok(BodyDefinition {
+            positions: memory::array("positions", self.positions.cast(), nodes)?,
+            rest_positions: memory::optional_array("rest_positions", self.rest_positions.cast(), nodes)?,
+            masses: values("masses", self.masses, nodes, self.node_mass)?,
+            node_dampings: values("node_dampings", self.node_dampings, nodes, self.node_damping)?,
+            damping_rate: self.damping_rate,
+            springs: memory::optional_array("springs", self.springs.cast(), springs)?,
+            stiffnesses: values("stiffnesses", self.stiffnesses, springs, self.stiffness)?,
+            rest_lengths: memory::optional_array("rest_lengths", self.rest_lengths, springs)?,
+            spring_dampings: values("spring_dampings", self.spring_dampings, springs, self.spring_damping)?,
+            triangles: memory::array("triangles", self.triangles.cast(), self.triangle_count)?,
+            tetrahedra: memory::array("tetrahedra", self.tetrahedra.cast(), self.tetrahedron_count)?,
+            cells: memory::array("cells", self.cells.cast(), self.cell_count)?,
+            material: self.material()?,
+            home_stiffnesses: values("home_stiffnesses", self.home_stiffnesses, nodes, self.home_stiffness)?,
+            bending_stiffness: self.bending_stiffness,
+            spring_law: self.spring_law()?,
+            element_law: self.element_law()?,
+            fibre_directions: directions.unwrap_or(&[]),
+            fibre_stiffnesses: values(
+                "fibre_stiffnesses",
+                self.fibre_stiffnesses,
+                tetrahedra,
+                self.fibre_stiffness,
+            )?,
+            viscosity: Viscosity {
+                retardation_time: self.retardation_time,
+                relaxation_time: self.relaxation_time,
+            },
+            yielding: Yielding {
+                strain: self.yield_strain,
+                largest: self.largest_set,
+            },
+            strain_limit: self.strain_limit,
+            limit_stiffening: self.limit_stiffening,
+            storage: match self.storage {
+                SINEW_STORAGE_PACKED => Storage::Packed,
+                SINEW_STORAGE_EFFICIENT => Storage::Efficient,
+                SINEW_STORAGE_FAST_LINK => Storage::FastLink,
+                SINEW_STORAGE_DYNAMIC_BULK => Storage::DynamicBulk,
+                unknown => return Err(Error::invalid(format!("storage is {unknown}: no SINEW_STORAGE_..."))),
+            },
+            springs_per_node: self.springs_per_node,
+            solver: match self.solver {
+                SINEW_SOLVER_VERLET => Solver::Verlet,
+                SINEW_SOLVER_IMPLICIT => Solver::Implicit,
+                SINEW_SOLVER_NEWTON => Solver::Newton,
+                SINEW_SOLVER_AUTO => Solver::Auto,
+                unknown => return Err(Error::invalid(format!("solver is {unknown}: no SINEW_SOLVER_..."))),
+            },
+            order: self.order,
+            iterations: self.iterations,
+            accuracy: self.accuracy,
+            mass_scaling: self.mass_scaling,
+            volume_stiffness: self.volume_stiffness,
+            enclosed_stiffness: self.enclosed_stiffness,
+            pressure: self.pressure,
+            contact: self.contact()?,
+            sleep: Sleep {
+                speed: self.sleep_speed,
+                time: self.sleep_time,
+            },
+            spare_nodes: self.spare_nodes,
+            toughness: self.toughness,
+            tearing: Tearing {
+                strain: self.tear_strain,
+                force: self.tear_force,
+                most_per_step: self.most_tears,
+                smallest_piece: self.smallest_piece,
+            },
+        })
     }
 }
 
@@ -315,7 +312,6 @@ impl sinew_body_def {
 /// # Safety
 /// As [`memory::array`].
 unsafe fn values<'a>(name: &str, pointer: *const f32, count: usize, uniform: f32) -> Result<Values<'a>> {
-    // SAFETY: the same contract.
-    let array = unsafe { memory::optional_array(name, pointer, count) }?;
+    let array = memory::optional_array(name, pointer, count)?;
     Ok(array.map_or(Values::Uniform(uniform), Values::Each))
 }

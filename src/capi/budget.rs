@@ -32,8 +32,7 @@ pub unsafe extern "C" fn sinew_world_step_with_budget(
     work: u32,
     report: *mut sinew_step_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { step_and_report(world, report, |world| world.step_with_budget(dt, work)) }
+    step_and_report(world, report, |world| world.step_with_budget(dt, work))
 }
 
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
@@ -48,8 +47,7 @@ pub unsafe extern "C" fn sinew_world_step_within(
     seconds: f64,
     report: *mut sinew_step_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { step_and_report(world, report, |world| world.step_within(dt, seconds)) }
+    step_and_report(world, report, |world| world.step_within(dt, seconds))
 }
 
 /// Writes how far the force on a tool is at most from what the equations of the last step ask for.
@@ -61,6 +59,5 @@ pub unsafe extern "C" fn sinew_tool_get_force_error(
     tool: sinew_tool_id,
     out: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world(world, |world| memory::write("out", out, world.force_error(tool.id())?)) }
+    with_world(world, |world| memory::write("out", out, world.force_error(tool.id())?))
 }

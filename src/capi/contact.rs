@@ -133,12 +133,9 @@ pub unsafe extern "C" fn sinew_tool_get_contacts(
     capacity: usize,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            write_contacts(world, world.contacts(tool.id())?, (out_contacts, capacity, out_count))
-        })
-    }
+    with_world(world, |world| {
+        write_contacts(world, world.contacts(tool.id())?, (out_contacts, capacity, out_count))
+    })
 }
 
 /// Writes the bodies that a blade pressed in the last step, each with a mean point and force.
@@ -152,16 +149,13 @@ pub unsafe extern "C" fn sinew_blade_get_contacts(
     capacity: usize,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            write_contacts(
-                world,
-                world.blade_contacts(blade.id())?,
-                (out_contacts, capacity, out_count),
-            )
-        })
-    }
+    with_world(world, |world| {
+        write_contacts(
+            world,
+            world.blade_contacts(blade.id())?,
+            (out_contacts, capacity, out_count),
+        )
+    })
 }
 
 /// Writes the contacts of a body with other bodies and itself; none while it sleeps.
@@ -175,16 +169,13 @@ pub unsafe extern "C" fn sinew_body_get_contacts(
     capacity: usize,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            write_contacts(
-                world,
-                world.tissue_contacts(body.id())?,
-                (out_contacts, capacity, out_count),
-            )
-        })
-    }
+    with_world(world, |world| {
+        write_contacts(
+            world,
+            world.tissue_contacts(body.id())?,
+            (out_contacts, capacity, out_count),
+        )
+    })
 }
 
 /// Writes contacts of tools with bodies that began or ended in the last step, not by destruction.
@@ -197,14 +188,11 @@ pub unsafe extern "C" fn sinew_world_get_contact_changes(
     capacity: usize,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let found = world.contact_changes();
-            let found = found.map(|change| sinew_contact_change::of(world, change));
-            memory::write_found(found, ("out_changes", out_changes, capacity), out_count)
-        })
-    }
+    with_world(world, |world| {
+        let found = world.contact_changes();
+        let found = found.map(|change| sinew_contact_change::of(world, change));
+        memory::write_found(found, ("out_changes", out_changes, capacity), out_count)
+    })
 }
 
 /// Writes contacts of bodies with bodies or blades that began or ended in the last step.
@@ -217,17 +205,14 @@ pub unsafe extern "C" fn sinew_world_get_body_contact_changes(
     capacity: usize,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let of_bodies = world.body_contact_changes();
-            let of_bodies = of_bodies.map(|change| sinew_body_contact_change::of_bodies(world, change));
-            let of_blades = world.blade_contact_changes();
-            let of_blades = of_blades.map(|change| sinew_body_contact_change::of_blade(world, change));
-            let found = of_bodies.chain(of_blades);
-            memory::write_found(found, ("out_changes", out_changes, capacity), out_count)
-        })
-    }
+    with_world(world, |world| {
+        let of_bodies = world.body_contact_changes();
+        let of_bodies = of_bodies.map(|change| sinew_body_contact_change::of_bodies(world, change));
+        let of_blades = world.blade_contact_changes();
+        let of_blades = of_blades.map(|change| sinew_body_contact_change::of_blade(world, change));
+        let found = of_bodies.chain(of_blades);
+        memory::write_found(found, ("out_changes", out_changes, capacity), out_count)
+    })
 }
 
 /// Writes contacts, and how many there are.
@@ -240,6 +225,5 @@ unsafe fn write_contacts(
     (contacts, capacity, count): (*mut sinew_contact, usize, *mut usize),
 ) -> Result<()> {
     let found = found.map(|contact| sinew_contact::of(world, contact));
-    // SAFETY: the same contract.
-    unsafe { memory::write_found(found, ("out_contacts", contacts, capacity), count) }
+    memory::write_found(found, ("out_contacts", contacts, capacity), count)
 }

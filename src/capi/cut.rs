@@ -124,31 +124,28 @@ pub unsafe extern "C" fn sinew_body_cut(
     end: *const f32,
     out_report: *mut sinew_cut_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let start = edge("start", start)?;
-            let end = edge("end", end)?;
-            let out = if out_report.is_null() {
-                None
-            } else {
-                Some(memory::report("out_report", out_report)?)
-            };
-            let done = world.cut(body.id(), &Sweep { start, end })?;
-            if let Some(out) = out {
-                out.fill(sinew_cut_report {
-                    struct_size: size_of::<sinew_cut_report>(),
-                    new_nodes: done.new_nodes,
-                    new_triangles: done.new_triangles,
-                    springs_removed: done.springs_removed,
-                    pieces_parted: done.pieces_parted,
-                    length: done.length,
-                    area: done.area,
-                });
-            }
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let start = edge("start", start)?;
+        let end = edge("end", end)?;
+        let out = if out_report.is_null() {
+            None
+        } else {
+            Some(memory::report("out_report", out_report)?)
+        };
+        let done = world.cut(body.id(), &Sweep { start, end })?;
+        if let Some(out) = out {
+            out.fill(sinew_cut_report {
+                struct_size: size_of::<sinew_cut_report>(),
+                new_nodes: done.new_nodes,
+                new_triangles: done.new_triangles,
+                springs_removed: done.springs_removed,
+                pieces_parted: done.pieces_parted,
+                length: done.length,
+                area: done.area,
+            });
+        }
+        Ok(())
+    })
 }
 
 /// Writes the topology changes of a body since a version.
@@ -164,25 +161,22 @@ pub unsafe extern "C" fn sinew_body_get_topology_changes(
     since_version: u64,
     out: *mut sinew_topology_changes,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let changes = body.changes_since(since_version)?;
-            memory::report("out", out)?.fill(sinew_topology_changes {
-                struct_size: size_of::<sinew_topology_changes>(),
-                version: changes.version,
-                nodes: changes.nodes.as_ptr().cast(),
-                node_count: changes.nodes.len(),
-                triangles: changes.triangles.as_ptr(),
-                triangle_count: changes.triangles.len(),
-                removed_springs: changes.removed_springs.as_ptr().cast(),
-                removed_spring_count: changes.removed_springs.len(),
-                rim: changes.rim.as_ptr().cast(),
-                rim_count: changes.rim.len(),
-            });
-            Ok(())
-        })
-    }
+    with_body(world, body, |body| {
+        let changes = body.changes_since(since_version)?;
+        memory::report("out", out)?.fill(sinew_topology_changes {
+            struct_size: size_of::<sinew_topology_changes>(),
+            version: changes.version,
+            nodes: changes.nodes.as_ptr().cast(),
+            node_count: changes.nodes.len(),
+            triangles: changes.triangles.as_ptr(),
+            triangle_count: changes.triangles.len(),
+            removed_springs: changes.removed_springs.as_ptr().cast(),
+            removed_spring_count: changes.removed_springs.len(),
+            rim: changes.rim.as_ptr().cast(),
+            rim_count: changes.rim.len(),
+        });
+        Ok(())
+    })
 }
 
 /// Writes a view of the render and contact surface: the triangles of a body after all cuts.
@@ -194,12 +188,9 @@ pub unsafe extern "C" fn sinew_body_get_triangles(
     body: sinew_body_id,
     out: *mut sinew_triangle_view,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            memory::write("out", out, sinew_triangle_view::of(body.surface()))
-        })
-    }
+    with_body(world, body, |body| {
+        memory::write("out", out, sinew_triangle_view::of(body.surface()))
+    })
 }
 
 /// Writes the connected component of each node, from 0, and the number of components.
@@ -214,24 +205,21 @@ pub unsafe extern "C" fn sinew_body_get_pieces(
     node_count: usize,
     out_piece_count: *mut u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let out = memory::optional_output_array("out_pieces", out_pieces, node_count)?;
-            let out_piece_count = memory::optional_output_array("out_piece_count", out_piece_count, 1)?;
-            if out.is_some() {
-                expect_count("out_pieces", node_count, body.node_count())?;
-            }
-            let found = body.pieces()?;
-            if let Some(out) = out {
-                out.copy_from_slice(&found.of_nodes);
-            }
-            if let Some(out_piece_count) = out_piece_count {
-                out_piece_count[0] = found.count;
-            }
-            Ok(())
-        })
-    }
+    with_body(world, body, |body| {
+        let out = memory::optional_output_array("out_pieces", out_pieces, node_count)?;
+        let out_piece_count = memory::optional_output_array("out_piece_count", out_piece_count, 1)?;
+        if out.is_some() {
+            expect_count("out_pieces", node_count, body.node_count())?;
+        }
+        let found = body.pieces()?;
+        if let Some(out) = out {
+            out.copy_from_slice(&found.of_nodes);
+        }
+        if let Some(out_piece_count) = out_piece_count {
+            out_piece_count[0] = found.count;
+        }
+        Ok(())
+    })
 }
 
 /// Writes how many nodes and surface triangles a body has at most after all cuts and tears.
@@ -245,20 +233,17 @@ pub unsafe extern "C" fn sinew_body_get_max_counts(
     out_max_nodes: *mut u32,
     out_max_triangles: *mut u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let out_max_nodes = memory::optional_output_array("out_max_nodes", out_max_nodes, 1)?;
-            let out_max_triangles = memory::optional_output_array("out_max_triangles", out_max_triangles, 1)?;
-            if let Some(out) = out_max_nodes {
-                out[0] = body.max_nodes() as u32;
-            }
-            if let Some(out) = out_max_triangles {
-                out[0] = body.max_triangles() as u32;
-            }
-            Ok(())
-        })
-    }
+    with_body(world, body, |body| {
+        let out_max_nodes = memory::optional_output_array("out_max_nodes", out_max_nodes, 1)?;
+        let out_max_triangles = memory::optional_output_array("out_max_triangles", out_max_triangles, 1)?;
+        if let Some(out) = out_max_nodes {
+            out[0] = body.max_nodes() as u32;
+        }
+        if let Some(out) = out_max_triangles {
+            out[0] = body.max_triangles() as u32;
+        }
+        Ok(())
+    })
 }
 
 /// Writes the mass of a node [kg]; 0 for a permanent pin or a node bound to others.
@@ -269,8 +254,7 @@ pub unsafe extern "C" fn sinew_body_get_node_mass(
     node: u32,
     out: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body(world, body, |body| memory::write("out", out, body.node_mass(node)?)) }
+    with_body(world, body, |body| memory::write("out", out, body.node_mass(node)?))
 }
 
 /// Both ends of a blade's edge.
@@ -278,7 +262,6 @@ pub unsafe extern "C" fn sinew_body_get_node_mass(
 /// # Safety
 /// As [`memory::array`] of 6 numbers.
 unsafe fn edge(name: &str, ends: *const f32) -> crate::base::Result<[Vec3; 2]> {
-    // SAFETY: the same contract.
-    let ends: &[[f32; 3]] = unsafe { memory::array(name, ends.cast(), 2) }?;
+    let ends: &[[f32; 3]] = memory::array(name, ends.cast(), 2)?;
     Ok([ends[0], ends[1]].map(Vec3::from))
 }

@@ -123,8 +123,7 @@ impl DebugCanvas for Callbacks {
 /// Fills a debug drawing with its defaults; `struct_size` is sizeof(sinew_debug_draw).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_debug_draw_init(def: *mut sinew_debug_draw, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_debug_draw::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_debug_draw::defaults()))
 }
 
 /// Draws what `def` asks for through its callbacks, as the last step left it.
@@ -135,11 +134,8 @@ pub unsafe extern "C" fn sinew_world_debug_draw(
     world: *const sinew_world,
     def: *const sinew_debug_draw,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let def = memory::definition("def", def, sinew_debug_draw::defaults())?;
-            world.debug_draw(&def.definition()?, &mut Callbacks(def))
-        })
-    }
+    with_world(world, |world| {
+        let def = memory::definition("def", def, sinew_debug_draw::defaults())?;
+        world.debug_draw(&def.definition()?, &mut Callbacks(def))
+    })
 }

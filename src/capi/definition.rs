@@ -278,6 +278,5 @@ unsafe impl Versioned for sinew_body_def {
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_def_init(def: *mut sinew_body_def, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_body_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_body_def::defaults()))
 }

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::body::sinew_body_id;
-use super::guard::{guard, sinew_world, with_world};
+use super::guard::{destroy, guard, sinew_world, with_world};
 use super::memory::{self, Versioned};
 use super::overlaps::{DetectorSide, Method, Overlaps, of_body};
 use super::status::sinew_status;
@@ -302,8 +302,7 @@ impl sinew_detector {
 /// Fills a detector definition with its defaults; `struct_size` is sizeof(sinew_detector_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_def_init(def: *mut sinew_detector_def, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_detector_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_detector_def::defaults()))
 }
 
 /// Creates a detector for two bodies and allocates its memory, without a first search.
@@ -318,15 +317,12 @@ pub unsafe extern "C" fn sinew_detector_create(
     def: *const sinew_detector_def,
     out: *mut *mut sinew_detector,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out = memory::output("out", out)?;
-            let def = memory::definition("def", def, sinew_detector_def::defaults())?;
-            *out = Box::into_raw(crate::base::memory::boxed(def.detector(world)?)?);
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let out = memory::output("out", out)?;
+        let def = memory::definition("def", def, sinew_detector_def::defaults())?;
+        *out = Box::into_raw(crate::base::memory::boxed(def.detector(world)?)?);
+        Ok(())
+    })
 }
 
 /// Finds the overlap of the two bodies at their current positions.
@@ -342,16 +338,13 @@ pub unsafe extern "C" fn sinew_detector_find(
     world: *const sinew_world,
     out_report: *mut sinew_detector_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let detector = memory::output("detector", detector)?;
-            let out_report = memory::report("out_report", out_report)?;
-            detector.find(world)?;
-            out_report.fill(detector.found.report);
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let detector = memory::output("detector", detector)?;
+        let out_report = memory::report("out_report", out_report)?;
+        detector.find(world)?;
+        out_report.fill(detector.found.report);
+        Ok(())
+    })
 }
 
 /// Writes the list of nodes of one body that lie inside the other, in ascending order.
@@ -365,8 +358,7 @@ pub unsafe extern "C" fn sinew_detector_get_points(
     out_points: *mut *const sinew_point_inside,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe {
+    guard(|| {
         let detector = memory::reference("detector", detector)?;
         let found = &detector.found.points[index_of(side)?];
         memory::write_both(
@@ -386,8 +378,7 @@ pub unsafe extern "C" fn sinew_detector_get_edges(
     out_edges: *mut *const sinew_edge_inside,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe {
+    guard(|| {
         let detector = memory::reference("detector", detector)?;
         let found = &detector.found.edges[index_of(side)?];
         memory::write_both(
@@ -407,8 +398,7 @@ pub unsafe extern "C" fn sinew_detector_get_gradient(
     side: u32,
     out: *mut sinew_dvec3_view,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe {
+    guard(|| {
         let detector = memory::reference("detector", detector)?;
         let gradient = &detector.found.gradients[index_of(side)?];
         memory::write(
@@ -426,13 +416,7 @@ pub unsafe extern "C" fn sinew_detector_get_gradient(
 /// Destroys a detector and ends its lists and views; NULL has no effect.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_destroy(detector: *mut sinew_detector) {
-    if !detector.is_null() {
-        guard(|| {
-            // SAFETY: made by Box::into_raw in `sinew_detector_create`, and given back once.
-            drop(unsafe { Box::from_raw(detector) });
-            Ok(())
-        });
-    }
+    destroy(detector);
 }
 
 fn index_of(side: u32) -> Result<usize> {

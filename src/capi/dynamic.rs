@@ -57,14 +57,11 @@ pub unsafe extern "C" fn sinew_tool_get_mass_of_density(
     density: f32,
     out: *mut sinew_mass_properties,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out = memory::report("out", out)?;
-            out.fill(world.mass_of_density(tool.id(), density)?.into());
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let out = memory::report("out", out)?;
+        out.fill(world.mass_of_density(tool.id(), density)?.into());
+        Ok(())
+    })
 }
 
 /// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
@@ -79,21 +76,18 @@ pub unsafe extern "C" fn sinew_tool_set_mass(
     tool: sinew_tool_id,
     mass: *const sinew_mass_properties,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            if mass.is_null() {
-                return world.set_dynamic(tool.id(), None);
-            }
-            let mass = memory::definition("mass", mass, sinew_mass_properties::NONE)?;
-            let properties = MassProperties {
-                mass: mass.mass,
-                center_of_mass: Vec3::from_array(mass.center_of_mass),
-                inertia: mass.inertia,
-            };
-            world.set_dynamic(tool.id(), Some(&properties))
-        })
-    }
+    with_world_mut(world, |world| {
+        if mass.is_null() {
+            return world.set_dynamic(tool.id(), None);
+        }
+        let mass = memory::definition("mass", mass, sinew_mass_properties::NONE)?;
+        let properties = MassProperties {
+            mass: mass.mass,
+            center_of_mass: Vec3::from_array(mass.center_of_mass),
+            inertia: mass.inertia,
+        };
+        world.set_dynamic(tool.id(), Some(&properties))
+    })
 }
 
 /// Writes the mass properties of a dynamic tool; all zero if the tool is kinematic.
@@ -103,15 +97,12 @@ pub unsafe extern "C" fn sinew_tool_get_mass(
     tool: sinew_tool_id,
     out: *mut sinew_mass_properties,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out = memory::report("out", out)?;
-            let properties = world.mass_properties(tool.id())?;
-            out.fill(properties.map_or(sinew_mass_properties::NONE, Into::into));
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let out = memory::report("out", out)?;
+        let properties = world.mass_properties(tool.id())?;
+        out.fill(properties.map_or(sinew_mass_properties::NONE, Into::into));
+        Ok(())
+    })
 }
 
 /// Sets the velocity of a dynamic tool, in world axes.
@@ -126,14 +117,11 @@ pub unsafe extern "C" fn sinew_tool_set_velocity(
     velocity: *const f32,
     angular_velocity: *const f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let velocity = memory::vector("velocity", velocity)?;
-            let spin = memory::vector("angular_velocity", angular_velocity)?;
-            world.set_tool_velocity(tool.id(), velocity, spin)
-        })
-    }
+    with_world_mut(world, |world| {
+        let velocity = memory::vector("velocity", velocity)?;
+        let spin = memory::vector("angular_velocity", angular_velocity)?;
+        world.set_tool_velocity(tool.id(), velocity, spin)
+    })
 }
 
 /// Writes the velocity of a dynamic tool, as sinew_tool_set_velocity takes it; both are nullable.
@@ -146,16 +134,13 @@ pub unsafe extern "C" fn sinew_tool_get_velocity(
     out_velocity: *mut f32,
     out_angular_velocity: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let (linear, angular) = world.tool_velocity(tool.id())?;
-            memory::write_wanted(
-                ("out_velocity", out_velocity.cast(), linear.to_array()),
-                ("out_angular_velocity", out_angular_velocity.cast(), angular.to_array()),
-            )
-        })
-    }
+    with_world(world, |world| {
+        let (linear, angular) = world.tool_velocity(tool.id())?;
+        memory::write_wanted(
+            ("out_velocity", out_velocity.cast(), linear.to_array()),
+            ("out_angular_velocity", out_angular_velocity.cast(), angular.to_array()),
+        )
+    })
 }
 
 /// Adds a force and a torque on a dynamic tool throughout the next step, in world axes.
@@ -170,14 +155,11 @@ pub unsafe extern "C" fn sinew_tool_apply_wrench(
     force: *const f32,
     torque: *const f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let force = memory::vector("force", force)?;
-            let torque = memory::vector("torque", torque)?;
-            world.apply_wrench(tool.id(), force, torque)
-        })
-    }
+    with_world_mut(world, |world| {
+        let force = memory::vector("force", force)?;
+        let torque = memory::vector("torque", torque)?;
+        world.apply_wrench(tool.id(), force, torque)
+    })
 }
 
 /// Moves a tool to a new pose at once, without a sweep; a dynamic tool keeps its velocity.
@@ -193,12 +175,9 @@ pub unsafe extern "C" fn sinew_tool_teleport(
     position: *const f32,
     orientation: *const f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let position = memory::vector("position", position)?;
-            let orientation = memory::optional_orientation("orientation", orientation)?;
-            world.teleport(tool.id(), position, orientation)
-        })
-    }
+    with_world_mut(world, |world| {
+        let position = memory::vector("position", position)?;
+        let orientation = memory::optional_orientation("orientation", orientation)?;
+        world.teleport(tool.id(), position, orientation)
+    })
 }

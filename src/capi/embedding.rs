@@ -5,7 +5,7 @@ use std::mem::MaybeUninit;
 use super::body::{sinew_body_id, sinew_vec3_view};
 use super::cut::sinew_triangle_view;
 use super::definition::sinew_body_def;
-use super::guard::{guard, sinew_world, with_world, with_world_mut};
+use super::guard::{destroy, guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::embedding::{Embedding, EmbeddingDefinition};
@@ -61,22 +61,18 @@ impl sinew_embedding_def {
     /// # Safety
     /// Arrays of the lengths that it states, for as long as the result lives.
     unsafe fn definition<'a>(&self) -> crate::Result<EmbeddingDefinition<'a>> {
-        // SAFETY: the same contract.
-        unsafe {
-            Ok(EmbeddingDefinition {
-                vertices: memory::array("vertices", self.vertices.cast(), self.vertex_count)?,
-                triangles: memory::array("triangles", self.triangles.cast(), self.triangle_count)?,
-                tetrahedra: memory::array("tetrahedra", self.tetrahedra.cast(), self.tetrahedron_count)?,
-            })
-        }
+        Ok(EmbeddingDefinition {
+            vertices: memory::array("vertices", self.vertices.cast(), self.vertex_count)?,
+            triangles: memory::array("triangles", self.triangles.cast(), self.triangle_count)?,
+            tetrahedra: memory::array("tetrahedra", self.tetrahedra.cast(), self.tetrahedron_count)?,
+        })
     }
 }
 
 /// Fills an embedding definition with its defaults; `struct_size` is sizeof(sinew_embedding_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_def_init(def: *mut sinew_embedding_def, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_embedding_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_embedding_def::defaults()))
 }
 
 /// Creates an embedding: binds a render surface to a body at its current positions.
@@ -92,28 +88,19 @@ pub unsafe extern "C" fn sinew_embedding_create(
     def: *const sinew_embedding_def,
     out: *mut *mut sinew_embedding,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out = memory::output("out", out)?;
-            let def = memory::definition("def", def, sinew_embedding_def::defaults())?;
-            let embedding = world.create_embedding(body.id(), &def.definition()?)?;
-            *out = Box::into_raw(crate::base::memory::boxed(sinew_embedding { embedding })?);
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let out = memory::output("out", out)?;
+        let def = memory::definition("def", def, sinew_embedding_def::defaults())?;
+        let embedding = world.create_embedding(body.id(), &def.definition()?)?;
+        *out = Box::into_raw(crate::base::memory::boxed(sinew_embedding { embedding })?);
+        Ok(())
+    })
 }
 
 /// Destroys an embedding and ends its views; NULL has no effect.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_destroy(embedding: *mut sinew_embedding) {
-    if !embedding.is_null() {
-        guard(|| {
-            // SAFETY: made by Box::into_raw when it was created, and given back once.
-            drop(unsafe { Box::from_raw(embedding) });
-            Ok(())
-        });
-    }
+    destroy(embedding);
 }
 
 /// Moves the vertices of an embedding to the body's current positions.
@@ -127,13 +114,10 @@ pub unsafe extern "C" fn sinew_embedding_update(
     embedding: *mut sinew_embedding,
     world: *const sinew_world,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let embedding = memory::output("embedding", embedding)?;
-            embedding.embedding.update(world)
-        })
-    }
+    with_world(world, |world| {
+        let embedding = memory::output("embedding", embedding)?;
+        embedding.embedding.update(world)
+    })
 }
 
 /// Moves the vertices of an embedding to node positions [m], 3 * node_count packed floats.
@@ -148,12 +132,9 @@ pub unsafe extern "C" fn sinew_embedding_update_from(
     node_count: usize,
 ) -> sinew_status {
     guard(|| {
-        // SAFETY: the same contract.
-        unsafe {
-            let embedding = memory::output("embedding", embedding)?;
-            let positions = memory::array("positions", positions.cast(), node_count)?;
-            embedding.embedding.update_from(positions)
-        }
+        let embedding = memory::output("embedding", embedding)?;
+        let positions = memory::array("positions", positions.cast(), node_count)?;
+        embedding.embedding.update_from(positions)
     })
 }
 
@@ -166,11 +147,8 @@ pub unsafe extern "C" fn sinew_embedding_get_positions(
     out: *mut sinew_vec3_view,
 ) -> sinew_status {
     guard(|| {
-        // SAFETY: the same contract.
-        unsafe {
-            let embedding = memory::reference("embedding", embedding)?;
-            memory::write("out", out, sinew_vec3_view::of(embedding.embedding.positions()))
-        }
+        let embedding = memory::reference("embedding", embedding)?;
+        memory::write("out", out, sinew_vec3_view::of(embedding.embedding.positions()))
     })
 }
 
@@ -183,11 +161,8 @@ pub unsafe extern "C" fn sinew_embedding_get_triangles(
     out: *mut sinew_triangle_view,
 ) -> sinew_status {
     guard(|| {
-        // SAFETY: the same contract.
-        unsafe {
-            let triangles = memory::reference("embedding", embedding)?.embedding.triangles();
-            memory::write("out", out, sinew_triangle_view::of(triangles))
-        }
+        let triangles = memory::reference("embedding", embedding)?.embedding.triangles();
+        memory::write("out", out, sinew_triangle_view::of(triangles))
     })
 }
 
@@ -201,13 +176,10 @@ pub unsafe extern "C" fn sinew_embedding_get_normals(
     out: *mut sinew_vec3_view,
 ) -> sinew_status {
     guard(|| {
-        // SAFETY: the same contract.
-        unsafe {
-            let embedding = memory::output("embedding", embedding)?;
-            let out = memory::output("out", out)?;
-            *out = sinew_vec3_view::of(embedding.embedding.normals());
-            Ok(())
-        }
+        let embedding = memory::output("embedding", embedding)?;
+        let out = memory::output("out", out)?;
+        *out = sinew_vec3_view::of(embedding.embedding.normals());
+        Ok(())
     })
 }
 
@@ -226,24 +198,21 @@ pub unsafe extern "C" fn sinew_body_create_from_surface(
     out_body: *mut sinew_body_id,
     out_embedding: *mut *mut sinew_embedding,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let out_body = memory::output("out_body", out_body)?;
-            let out_embedding = match out_embedding.is_null() {
-                true => None,
-                false => Some(memory::output("out_embedding", out_embedding)?),
-            };
-            let def = memory::definition("def", def, sinew_body_def::defaults())?;
-            // Nothing may fail once there is a body.
-            let place = crate::base::memory::boxed(MaybeUninit::uninit())?;
-            let (body, embedding) = def.placed(|definition| world.create_body_from_surface(definition, spacing))?;
-            world.body_mut(body)?.set_gravity_scale(def.gravity_scale)?;
-            *out_body = body.into();
-            if let Some(out) = out_embedding {
-                *out = Box::into_raw(Box::write(place, sinew_embedding { embedding }));
-            }
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let out_body = memory::output("out_body", out_body)?;
+        let out_embedding = match out_embedding.is_null() {
+            true => None,
+            false => Some(memory::output("out_embedding", out_embedding)?),
+        };
+        let def = memory::definition("def", def, sinew_body_def::defaults())?;
+        // Nothing may fail once there is a body.
+        let place = crate::base::memory::boxed(MaybeUninit::uninit())?;
+        let (body, embedding) = def.placed(|definition| world.create_body_from_surface(definition, spacing))?;
+        world.body_mut(body)?.set_gravity_scale(def.gravity_scale)?;
+        *out_body = body.into();
+        if let Some(out) = out_embedding {
+            *out = Box::into_raw(Box::write(place, sinew_embedding { embedding }));
+        }
+        Ok(())
+    })
 }

@@ -17,65 +17,52 @@ use crate::world::World;
 /// As of what calls it.
 unsafe fn is_there(world: *const sinew_world, mut has: impl FnMut(&World) -> bool) -> u32 {
     let mut is_there = false;
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            is_there = has(world);
-            Ok(())
-        });
-    }
+    with_world(world, |world| {
+        is_there = has(world);
+        Ok(())
+    });
     u32::from(is_there)
 }
 
 /// Returns 1 if a body with this id exists in the world, else 0; also for a NULL world.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_is_valid(world: *const sinew_world, body: sinew_body_id) -> u32 {
-    // SAFETY: the same contract.
-    unsafe { is_there(world, |world| world.has_body(body.id())) }
+    is_there(world, |world| world.has_body(body.id()))
 }
 
 /// Returns 1 if a tool with this id exists in the world, else 0; also for a NULL world.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_is_valid(world: *const sinew_world, tool: sinew_tool_id) -> u32 {
-    // SAFETY: the same contract.
-    unsafe { is_there(world, |world| world.has_tool(tool.id())) }
+    is_there(world, |world| world.has_tool(tool.id()))
 }
 
 /// Returns 1 if a blade with this id exists in the world, else 0; also for a NULL world.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_is_valid(world: *const sinew_world, blade: sinew_blade_id) -> u32 {
-    // SAFETY: the same contract.
-    unsafe { is_there(world, |world| world.has_blade(blade.id())) }
+    is_there(world, |world| world.has_blade(blade.id()))
 }
 
 /// Returns 1 if an attachment with this id exists in the world, else 0; also for a NULL world.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_is_valid(world: *const sinew_world, attachment: sinew_attachment_id) -> u32 {
-    // SAFETY: the same contract.
-    unsafe { is_there(world, |world| world.has_attachment(attachment.id())) }
+    is_there(world, |world| world.has_attachment(attachment.id()))
 }
 
 /// Stores a pointer of the caller, nullable, with a world; snapshots do not hold it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_user_data(world: *mut sinew_world, user_data: *mut c_void) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            world.set_user_data(user_data as usize);
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        world.set_user_data(user_data as usize);
+        Ok(())
+    })
 }
 
 /// Writes the pointer that is stored with a world; NULL by default.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_user_data(world: *const sinew_world, out: *mut *mut c_void) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            memory::write("out", out, world.user_data() as *mut c_void)
-        })
-    }
+    with_world(world, |world| {
+        memory::write("out", out, world.user_data() as *mut c_void)
+    })
 }
 
 /// Stores a pointer of the caller, nullable, with a tool; snapshots do not hold it.
@@ -85,8 +72,7 @@ pub unsafe extern "C" fn sinew_tool_set_user_data(
     tool: sinew_tool_id,
     user_data: *mut c_void,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.set_tool_user_data(tool.id(), user_data as usize)) }
+    with_world_mut(world, |world| world.set_tool_user_data(tool.id(), user_data as usize))
 }
 
 /// Writes the pointer that is stored with a tool; NULL by default.
@@ -96,12 +82,9 @@ pub unsafe extern "C" fn sinew_tool_get_user_data(
     tool: sinew_tool_id,
     out: *mut *mut c_void,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            memory::write("out", out, world.tool_user_data(tool.id())? as *mut c_void)
-        })
-    }
+    with_world(world, |world| {
+        memory::write("out", out, world.tool_user_data(tool.id())? as *mut c_void)
+    })
 }
 
 /// Writes the time [s] that a world has been stepped, and the number of steps; both are nullable.
@@ -111,24 +94,18 @@ pub unsafe extern "C" fn sinew_world_get_time(
     out_time: *mut f64,
     out_steps: *mut u64,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let time = ("out_time", out_time, world.time());
-            memory::write_wanted(time, ("out_steps", out_steps, world.step_count()))
-        })
-    }
+    with_world(world, |world| {
+        let time = ("out_time", out_time, world.time());
+        memory::write_wanted(time, ("out_steps", out_steps, world.step_count()))
+    })
 }
 
 /// Writes the gravitational acceleration [m/s^2] of a world, 3 floats.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_gravity(world: *const sinew_world, out_gravity: *mut f32) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            memory::write("out_gravity", out_gravity.cast(), world.gravity().to_array())
-        })
-    }
+    with_world(world, |world| {
+        memory::write("out_gravity", out_gravity.cast(), world.gravity().to_array())
+    })
 }
 
 /// Writes the friction coefficient of a tool.
@@ -138,8 +115,7 @@ pub unsafe extern "C" fn sinew_tool_get_friction(
     tool: sinew_tool_id,
     out: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world(world, |world| memory::write("out", out, world.friction(tool.id())?)) }
+    with_world(world, |world| memory::write("out", out, world.friction(tool.id())?))
 }
 
 /// Writes the largest force [N] that moves a tool; infinity: unlimited.
@@ -149,8 +125,7 @@ pub unsafe extern "C" fn sinew_tool_get_force_limit(
     tool: sinew_tool_id,
     out: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world(world, |world| memory::write("out", out, world.force_limit(tool.id())?)) }
+    with_world(world, |world| memory::write("out", out, world.force_limit(tool.id())?))
 }
 
 /// Writes the collision category and mask of a tool.
@@ -161,14 +136,11 @@ pub unsafe extern "C" fn sinew_tool_get_collision(
     out_category: *mut u32,
     out_mask: *mut u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let filter = world.collision_filter(tool.id())?;
-            let category = ("out_category", out_category, filter.category);
-            memory::write_both(category, ("out_mask", out_mask, filter.mask))
-        })
-    }
+    with_world(world, |world| {
+        let filter = world.collision_filter(tool.id())?;
+        let category = ("out_category", out_category, filter.category);
+        memory::write_both(category, ("out_mask", out_mask, filter.mask))
+    })
 }
 
 /// Writes the collision category and mask of a body.
@@ -179,14 +151,11 @@ pub unsafe extern "C" fn sinew_body_get_collision(
     out_category: *mut u32,
     out_mask: *mut u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let filter = body.collision_filter();
-            let category = ("out_category", out_category, filter.category);
-            memory::write_both(category, ("out_mask", out_mask, filter.mask))
-        })
-    }
+    with_body(world, body, |body| {
+        let filter = body.collision_filter();
+        let category = ("out_category", out_category, filter.category);
+        memory::write_both(category, ("out_mask", out_mask, filter.mask))
+    })
 }
 
 /// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
@@ -196,8 +165,7 @@ pub unsafe extern "C" fn sinew_body_get_pressure(
     body: sinew_body_id,
     out: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body(world, body, |body| memory::write("out", out, body.pressure())) }
+    with_body(world, body, |body| memory::write("out", out, body.pressure()))
 }
 
 /// Writes the current pose of a blade; see sinew_tool_get_pose.
@@ -208,12 +176,9 @@ pub unsafe extern "C" fn sinew_blade_get_pose(
     out_position: *mut f32,
     out_orientation: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            write_pose(world.blade_pose(blade.id())?, out_position, out_orientation)
-        })
-    }
+    with_world(world, |world| {
+        write_pose(world.blade_pose(blade.id())?, out_position, out_orientation)
+    })
 }
 
 /// Writes the collision category and mask of a blade.
@@ -224,12 +189,9 @@ pub unsafe extern "C" fn sinew_blade_get_collision(
     out_category: *mut u32,
     out_mask: *mut u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let filter = world.blade_collision_filter(blade.id())?;
-            let category = ("out_category", out_category, filter.category);
-            memory::write_both(category, ("out_mask", out_mask, filter.mask))
-        })
-    }
+    with_world(world, |world| {
+        let filter = world.blade_collision_filter(blade.id())?;
+        let category = ("out_category", out_category, filter.category);
+        memory::write_both(category, ("out_mask", out_mask, filter.mask))
+    })
 }

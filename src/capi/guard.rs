@@ -28,6 +28,20 @@ pub(super) fn guard(mut call: impl FnMut() -> Result<()>) -> sinew_status {
     answer(&mut call, None)
 }
 
+/// Drops what the caller was given as a pointer; NULL has no effect.
+///
+/// # Safety
+/// `pointer` is NULL or was made by `Box::into_raw`, and is given back once.
+pub(super) unsafe fn destroy<T>(pointer: *mut T) {
+    if !pointer.is_null() {
+        guard(|| {
+            // SAFETY: the same contract.
+            drop(unsafe { Box::from_raw(pointer) });
+            Ok(())
+        });
+    }
+}
+
 /// Runs `call` once with a world to look at.
 ///
 /// # Safety

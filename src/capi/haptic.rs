@@ -3,11 +3,11 @@
 use glam::{Quat, Vec3};
 
 use super::body::sinew_body_id;
-use super::guard::{guard, sinew_world, with_world_mut};
+use super::guard::{destroy, guard, sinew_world, with_world_mut};
 use super::memory::{self, Versioned};
-use super::status::{fail, sinew_status};
+use super::status::sinew_status;
 use super::tool::sinew_tool_id;
-use crate::base::{Error, ToolId};
+use crate::base::ToolId;
 use crate::contact::Pose;
 use crate::haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
 
@@ -177,8 +177,7 @@ impl From<&HapticContact> for sinew_haptic_contact {
 /// Fills a haptic definition with its defaults; `struct_size` is sizeof(sinew_haptic_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_def_init(def: *mut sinew_haptic_def, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_haptic_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_haptic_def::defaults()))
 }
 
 /// Creates a haptic handle that drives a tool; destroy it with sinew_haptic_destroy.
@@ -193,17 +192,14 @@ pub unsafe extern "C" fn sinew_haptic_create(
     def: *const sinew_haptic_def,
     out: *mut *mut sinew_haptic,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let out = memory::output("out", out)?;
-            let def = memory::definition("def", def, sinew_haptic_def::defaults())?;
-            let orientation = world.pose(def.tool.id())?.orientation;
-            let handle = world.create_haptic(&def.definition())?;
-            *out = Box::into_raw(crate::base::memory::boxed(sinew_haptic { handle, orientation })?);
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let out = memory::output("out", out)?;
+        let def = memory::definition("def", def, sinew_haptic_def::defaults())?;
+        let orientation = world.pose(def.tool.id())?.orientation;
+        let handle = world.create_haptic(&def.definition())?;
+        *out = Box::into_raw(crate::base::memory::boxed(sinew_haptic { handle, orientation })?);
+        Ok(())
+    })
 }
 
 /// Destroys a haptic handle, before or after its world; NULL has no effect.
@@ -211,13 +207,7 @@ pub unsafe extern "C" fn sinew_haptic_create(
 /// The tool is then moved by sinew_tool_set_pose again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_destroy(haptic: *mut sinew_haptic) {
-    if !haptic.is_null() {
-        guard(|| {
-            // SAFETY: made by Box::into_raw in sinew_haptic_create, and given back once.
-            drop(unsafe { Box::from_raw(haptic) });
-            Ok(())
-        });
-    }
+    destroy(haptic);
 }
 
 /// Computes the force on the device from its current pose, without waiting, locking or allocating.
@@ -235,28 +225,19 @@ pub unsafe extern "C" fn sinew_haptic_tick(
     dt: f32,
     out: *mut sinew_haptic_report,
 ) -> sinew_status {
-    // SAFETY: the caller vouches for the handle where the pointer is not NULL.
-    let Some(haptic) = (unsafe { haptic.as_mut() }) else {
-        return fail(Error::invalid("haptic is NULL"));
-    };
     guard(|| {
-        // SAFETY: the same contract, for this and what follows.
-        let out = unsafe { memory::report("out", out) }?;
-        // SAFETY: as above.
-        let position = unsafe { memory::vector("position", position) }?;
-        // SAFETY: as above.
-        let given = unsafe { memory::optional_array("orientation", orientation.cast::<[f32; 4]>(), 1) }?;
-        // SAFETY: as above.
-        let along = unsafe { memory::optional_array("velocity", velocity.cast::<[f32; 3]>(), 1) }?;
-        // SAFETY: as above.
-        let about = unsafe { memory::optional_array("angular_velocity", angular_velocity.cast::<[f32; 3]>(), 1) }?;
+        let haptic = memory::output("haptic", haptic)?;
+        let out = memory::report("out", out)?;
+        let position = memory::vector("position", position)?;
+        let given = memory::optional_array("orientation", orientation.cast::<[f32; 4]>(), 1)?;
+        let along = memory::optional_array("velocity", velocity.cast::<[f32; 3]>(), 1)?;
+        let about = memory::optional_array("angular_velocity", angular_velocity.cast::<[f32; 3]>(), 1)?;
         let orientation = given.map_or(haptic.orientation, |given| Quat::from_array(given[0]));
         let pose = Pose { position, orientation };
         let [along, about] = [along, about].map(|given| given.map(|given| Vec3::from_array(given[0])));
         let tick = haptic.handle.tick(pose, along, about, dt)?;
         haptic.orientation = orientation;
-        // SAFETY: still there.
-        unsafe { out.fill(sinew_haptic_report::of(tick, haptic.handle.is_over())) };
+        out.fill(sinew_haptic_report::of(tick, haptic.handle.is_over()));
         Ok(())
     })
 }
@@ -271,15 +252,10 @@ pub unsafe extern "C" fn sinew_haptic_get_contacts(
     capacity: usize,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the caller vouches for the handle where the pointer is not NULL.
-    let Some(haptic) = (unsafe { haptic.as_ref() }) else {
-        return fail(Error::invalid("haptic is NULL"));
-    };
     guard(|| {
-        // SAFETY: the same contract.
-        let out_count = unsafe { memory::output("out_count", out_count) }?;
-        // SAFETY: the same contract.
-        let out_contacts = unsafe { memory::output_array("out_contacts", out_contacts, capacity) }?;
+        let haptic = memory::reference("haptic", haptic)?;
+        let out_count = memory::output("out_count", out_count)?;
+        let out_contacts = memory::output_array("out_contacts", out_contacts, capacity)?;
         let mut found = 0;
         haptic.handle.contacts(|contact| {
             if let Some(place) = out_contacts.get_mut(found) {

@@ -51,8 +51,7 @@ unsafe impl Versioned for sinew_material_preset {}
 /// `preset` is a sinew_preset value; presets are numbered from 0 without a gap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_material_get_preset(preset: u32, out: *mut sinew_material_preset) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe {
+    guard(|| {
         let out = memory::report("out", out)?;
         let found = PRESETS
             .get(preset as usize)

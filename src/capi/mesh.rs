@@ -4,7 +4,7 @@ use std::mem::offset_of;
 
 use std::ffi::c_char;
 
-use super::guard::guard;
+use super::guard::{destroy, guard};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::base::{Error, Result};
@@ -134,8 +134,7 @@ impl sinew_mesh_view {
 /// `out` is NULL or writable.
 pub(super) unsafe fn create(out: *mut *mut sinew_mesh, mut make: impl FnMut() -> Result<LoadedMesh>) -> sinew_status {
     guard(|| {
-        // SAFETY: the same contract.
-        let out = unsafe { memory::output("out", out) }?;
+        let out = memory::output("out", out)?;
         let loaded = make()?;
         let surface = loaded.mesh.surface()?;
         let closed = is_closed(&surface)?;
@@ -161,21 +160,18 @@ pub unsafe extern "C" fn sinew_mesh_load(
     scale: f32,
     out: *mut *mut sinew_mesh,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        create(out, || {
-            let format = match format {
-                SINEW_MESH_FORMAT_AUTO => MeshFormat::Auto,
-                SINEW_MESH_FORMAT_OBJ => MeshFormat::Obj,
-                SINEW_MESH_FORMAT_STL => MeshFormat::Stl,
-                SINEW_MESH_FORMAT_VTK => MeshFormat::Vtk,
-                SINEW_MESH_FORMAT_GMSH => MeshFormat::Gmsh,
-                SINEW_MESH_FORMAT_TETGEN => MeshFormat::TetGen,
-                unknown => return Err(Error::invalid(format!("format is {unknown}: no SINEW_MESH_FORMAT_..."))),
-            };
-            mesh::load(memory::text("path", path)?, format, scale)
-        })
-    }
+    create(out, || {
+        let format = match format {
+            SINEW_MESH_FORMAT_AUTO => MeshFormat::Auto,
+            SINEW_MESH_FORMAT_OBJ => MeshFormat::Obj,
+            SINEW_MESH_FORMAT_STL => MeshFormat::Stl,
+            SINEW_MESH_FORMAT_VTK => MeshFormat::Vtk,
+            SINEW_MESH_FORMAT_GMSH => MeshFormat::Gmsh,
+            SINEW_MESH_FORMAT_TETGEN => MeshFormat::TetGen,
+            unknown => return Err(Error::invalid(format!("format is {unknown}: no SINEW_MESH_FORMAT_..."))),
+        };
+        mesh::load(memory::text("path", path)?, format, scale)
+    })
 }
 
 /// Creates a cloth of triangles in the plane y = 0, centered at the origin, with normals along +y.
@@ -187,14 +183,11 @@ pub unsafe extern "C" fn sinew_mesh_create_cloth(
     cells: *const u32,
     out: *mut *mut sinew_mesh,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        create(out, || {
-            let size: &[f32; 2] = memory::reference("size", size.cast())?;
-            let cells: &[u32; 2] = memory::reference("cells", cells.cast())?;
-            LoadedMesh::unchanged(Mesh::cloth(*size, *cells)?)
-        })
-    }
+    create(out, || {
+        let size: &[f32; 2] = memory::reference("size", size.cast())?;
+        let cells: &[u32; 2] = memory::reference("cells", cells.cast())?;
+        LoadedMesh::unchanged(Mesh::cloth(*size, *cells)?)
+    })
 }
 
 /// Creates a box of tetrahedra, centered at the origin.
@@ -206,14 +199,11 @@ pub unsafe extern "C" fn sinew_mesh_create_block(
     cells: *const u32,
     out: *mut *mut sinew_mesh,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        create(out, || {
-            let size: &[f32; 3] = memory::reference("size", size.cast())?;
-            let cells: &[u32; 3] = memory::reference("cells", cells.cast())?;
-            LoadedMesh::unchanged(Mesh::block(*size, *cells)?)
-        })
-    }
+    create(out, || {
+        let size: &[f32; 3] = memory::reference("size", size.cast())?;
+        let cells: &[u32; 3] = memory::reference("cells", cells.cast())?;
+        LoadedMesh::unchanged(Mesh::block(*size, *cells)?)
+    })
 }
 
 /// Creates a lattice of cubes, centered at the origin.
@@ -225,13 +215,10 @@ pub unsafe extern "C" fn sinew_mesh_create_lattice(
     cells: *const u32,
     out: *mut *mut sinew_mesh,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        create(out, || {
-            let cells: &[u32; 3] = memory::reference("cells", cells.cast())?;
-            LoadedMesh::unchanged(Mesh::lattice(edge, *cells)?)
-        })
-    }
+    create(out, || {
+        let cells: &[u32; 3] = memory::reference("cells", cells.cast())?;
+        LoadedMesh::unchanged(Mesh::lattice(edge, *cells)?)
+    })
 }
 
 /// Creates a liver-like organ of tetrahedra, centered at the origin and thin in y.
@@ -239,15 +226,13 @@ pub unsafe extern "C" fn sinew_mesh_create_lattice(
 /// `length` [m] is its extent along x and `spacing` [m] the node spacing, both above 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_create_organ(length: f32, spacing: f32, out: *mut *mut sinew_mesh) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { create(out, || LoadedMesh::unchanged(Mesh::organ(length, spacing)?)) }
+    create(out, || LoadedMesh::unchanged(Mesh::organ(length, spacing)?))
 }
 
 /// Writes a view of the contents of a mesh, which ends with the mesh.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_get_view(mesh: *const sinew_mesh, out: *mut sinew_mesh_view) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe {
+    guard(|| {
         let mesh = memory::reference("mesh", mesh)?;
         memory::report("out", out)?.fill(sinew_mesh_view::of(mesh));
         Ok(())
@@ -257,11 +242,5 @@ pub unsafe extern "C" fn sinew_mesh_get_view(mesh: *const sinew_mesh, out: *mut 
 /// Destroys a mesh and ends its views; NULL has no effect.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_mesh_destroy(mesh: *mut sinew_mesh) {
-    if !mesh.is_null() {
-        guard(|| {
-            // SAFETY: made by Box::into_raw in `create`, and given back once.
-            drop(unsafe { Box::from_raw(mesh) });
-            Ok(())
-        });
-    }
+    destroy(mesh);
 }

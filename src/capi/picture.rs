@@ -75,8 +75,7 @@ impl sinew_picture_def {
 /// Fills an image definition with its defaults; `struct_size` is sizeof(sinew_picture_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_picture_def_init(def: *mut sinew_picture_def, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_picture_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_picture_def::defaults()))
 }
 
 /// Blue over light gray to red, for signed values.
@@ -108,8 +107,7 @@ impl sinew_body_values {
     unsafe fn values<'a>(&self) -> Result<BodyValues<'a>> {
         Ok(BodyValues {
             body: self.body.id(),
-            // SAFETY: the same contract.
-            values: unsafe { memory::array("values", self.values, self.node_count) }?,
+            values: memory::array("values", self.values, self.node_count)?,
             scale: ColourScale {
                 colours: match self.colours {
                     SINEW_COLOURS_DIVERGING => Colours::Diverging,
@@ -134,13 +132,10 @@ pub unsafe extern "C" fn sinew_world_save_picture(
     def: *const sinew_picture_def,
     path: *const c_char,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let path = memory::text("path", path)?;
-            world.picture(&definition(def)?)?.write_png(path)
-        })
-    }
+    with_world(world, |world| {
+        let path = memory::text("path", path)?;
+        world.picture(&definition(def)?)?.write_png(path)
+    })
 }
 
 /// Draws like sinew_world_save_picture, with some bodies colored by values.
@@ -154,18 +149,15 @@ pub unsafe extern "C" fn sinew_world_save_picture_of_values(
     count: usize,
     path: *const c_char,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let coloured = memory::array("coloured", coloured, count)?;
-            let mut values = crate::base::memory::reserved(count)?;
-            for of in coloured {
-                values.push(of.values()?);
-            }
-            let picture = world.picture_of_values(&definition(def)?, &values)?;
-            picture.write_png(memory::text("path", path)?)
-        })
-    }
+    with_world(world, |world| {
+        let coloured = memory::array("coloured", coloured, count)?;
+        let mut values = crate::base::memory::reserved(count)?;
+        for of in coloured {
+            values.push(of.values()?);
+        }
+        let picture = world.picture_of_values(&definition(def)?, &values)?;
+        picture.write_png(memory::text("path", path)?)
+    })
 }
 
 /// What `def` asks for; NULL: the defaults.
@@ -177,6 +169,5 @@ unsafe fn definition(def: *const sinew_picture_def) -> Result<PictureDefinition>
     if def.is_null() {
         return defaults.definition();
     }
-    // SAFETY: the same contract.
-    unsafe { memory::definition("def", def, defaults) }?.definition()
+    memory::definition("def", def, defaults)?.definition()
 }

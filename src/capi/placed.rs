@@ -28,8 +28,7 @@ impl sinew_body_def {
     /// # Safety
     /// As [`definition`](Self::definition).
     pub(super) unsafe fn placed<T>(&self, make: impl FnOnce(&BodyDefinition) -> Result<T>) -> Result<T> {
-        // SAFETY: the same contract.
-        let definition = unsafe { self.definition() }?;
+        let definition = self.definition()?;
         finite("gravity_scale", self.gravity_scale)?;
         let pose = Pose {
             position: Vec3::from_array(self.position),

@@ -85,24 +85,18 @@ impl From<StepProfile> for sinew_profile {
 /// Errors: SINEW_STATUS_UNSUPPORTED on WebAssembly, which has no clock.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_profiling(world: *mut sinew_world, enabled: u32) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| match enabled {
-            0 | 1 => world.set_profiling(enabled == 1),
-            _ => Err(Error::invalid(format!("enabled is {enabled}: must be 0 or 1"))),
-        })
-    }
+    with_world_mut(world, |world| match enabled {
+        0 | 1 => world.set_profiling(enabled == 1),
+        _ => Err(Error::invalid(format!("enabled is {enabled}: must be 0 or 1"))),
+    })
 }
 
 /// Writes 1 if steps are profiled, else 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_profiling(world: *const sinew_world, out: *mut u32) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            memory::write("out", out, u32::from(world.profile().is_some()))
-        })
-    }
+    with_world(world, |world| {
+        memory::write("out", out, u32::from(world.profile().is_some()))
+    })
 }
 
 /// Writes the profile of the last step; 0 before the first.
@@ -110,15 +104,12 @@ pub unsafe extern "C" fn sinew_world_get_profiling(world: *const sinew_world, ou
 /// Errors: SINEW_STATUS_UNSUPPORTED while profiling is off.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_profile(world: *const sinew_world, out: *mut sinew_profile) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out = memory::report("out", out)?;
-            let profile = world.profile().ok_or_else(|| {
-                Error::Unsupported("the world is not profiled: call sinew_world_set_profiling first".into())
-            })?;
-            out.fill(profile.into());
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let out = memory::report("out", out)?;
+        let profile = world.profile().ok_or_else(|| {
+            Error::Unsupported("the world is not profiled: call sinew_world_set_profiling first".into())
+        })?;
+        out.fill(profile.into());
+        Ok(())
+    })
 }

@@ -72,16 +72,13 @@ pub unsafe extern "C" fn sinew_world_cast_ray(
     max_distance: f32,
     out: *mut sinew_surface_point,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out = memory::report("out", out)?;
-            let origin = memory::vector("origin", origin)?;
-            let direction = memory::vector("direction", direction)?;
-            out.fill(world.cast_ray(origin, direction, max_distance)?.into());
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let out = memory::report("out", out)?;
+        let origin = memory::vector("origin", origin)?;
+        let direction = memory::vector("direction", direction)?;
+        out.fill(world.cast_ray(origin, direction, max_distance)?.into());
+        Ok(())
+    })
 }
 
 /// Finds the body surface point nearest to a point; without one out->body is all zero.
@@ -94,15 +91,12 @@ pub unsafe extern "C" fn sinew_world_find_nearest(
     max_distance: f32,
     out: *mut sinew_surface_point,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out = memory::report("out", out)?;
-            let point = memory::vector("point", point)?;
-            out.fill(world.nearest_point(point, max_distance)?.into());
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let out = memory::report("out", out)?;
+        let point = memory::vector("point", point)?;
+        out.fill(world.nearest_point(point, max_distance)?.into());
+        Ok(())
+    })
 }
 
 /// First body or tool that a ray hits.
@@ -182,15 +176,12 @@ pub unsafe extern "C" fn sinew_world_cast_ray_filtered(
     mask: u32,
     out: *mut sinew_ray_hit,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out = memory::report("out", out)?;
-            let origin = memory::vector("origin", origin)?;
-            let direction = memory::vector("direction", direction)?;
-            let filter = CollisionFilter { category, mask };
-            out.fill(world.cast_ray_at(origin, direction, max_distance, filter)?.into());
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let out = memory::report("out", out)?;
+        let origin = memory::vector("origin", origin)?;
+        let direction = memory::vector("direction", direction)?;
+        let filter = CollisionFilter { category, mask };
+        out.fill(world.cast_ray_at(origin, direction, max_distance, filter)?.into());
+        Ok(())
+    })
 }

@@ -2,7 +2,7 @@
 
 use super::body::{sinew_body_id, sinew_vec3_view};
 use super::cut::sinew_triangle_view;
-use super::guard::{guard, sinew_world, with_world_mut};
+use super::guard::{destroy, guard, sinew_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::readers::BodyReader;
@@ -56,27 +56,18 @@ pub unsafe extern "C" fn sinew_reader_create(
     body: sinew_body_id,
     out: *mut *mut sinew_reader,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let out = memory::output("out", out)?;
-            let reader = world.create_reader(body.id())?;
-            *out = Box::into_raw(crate::base::memory::boxed(sinew_reader { reader })?);
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let out = memory::output("out", out)?;
+        let reader = world.create_reader(body.id())?;
+        *out = Box::into_raw(crate::base::memory::boxed(sinew_reader { reader })?);
+        Ok(())
+    })
 }
 
 /// Destroys a reader on any thread, before or after its body and world; NULL has no effect.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_reader_destroy(reader: *mut sinew_reader) {
-    if !reader.is_null() {
-        guard(|| {
-            // SAFETY: made by Box::into_raw in sinew_reader_create, and given back once.
-            drop(unsafe { Box::from_raw(reader) });
-            Ok(())
-        });
-    }
+    destroy(reader);
 }
 
 /// Writes the latest frame of the body without copying, allocating, locking or waiting.
@@ -85,10 +76,8 @@ pub unsafe extern "C" fn sinew_reader_destroy(reader: *mut sinew_reader) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_reader_read(reader: *mut sinew_reader, out: *mut sinew_frame) -> sinew_status {
     guard(|| {
-        // SAFETY: the same contract.
-        let reader = unsafe { memory::output("reader", reader) }?;
-        // SAFETY: the same contract.
-        let out = unsafe { memory::report("out", out) }?;
+        let reader = memory::output("reader", reader)?;
+        let out = memory::report("out", out)?;
         let frame = reader.reader.read();
         let value = sinew_frame {
             struct_size: size_of::<sinew_frame>(),
@@ -101,8 +90,7 @@ pub unsafe extern "C" fn sinew_reader_read(reader: *mut sinew_reader, out: *mut 
             is_new: frame.is_new.into(),
             is_over: frame.is_over.into(),
         };
-        // SAFETY: still there, by the same contract.
-        unsafe { out.fill(value) };
+        out.fill(value);
         Ok(())
     })
 }

@@ -52,12 +52,9 @@ impl From<ReplayReport> for sinew_replay_report {
 /// Errors: SINEW_STATUS_IO.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_start_recording(world: *mut sinew_world, path: *const c_char) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            world.start_recording(Path::new(memory::text("path", path)?))
-        })
-    }
+    with_world_mut(world, |world| {
+        world.start_recording(Path::new(memory::text("path", path)?))
+    })
 }
 
 /// Stops a recording and writes the number of recorded steps; `out_steps` is nullable.
@@ -65,17 +62,14 @@ pub unsafe extern "C" fn sinew_world_start_recording(world: *mut sinew_world, pa
 /// Errors: SINEW_STATUS_IO or SINEW_STATUS_OUT_OF_MEMORY if it ended earlier; it stops anyway.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_stop_recording(world: *mut sinew_world, out_steps: *mut u64) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let out = memory::optional_output_array("out_steps", out_steps, 1)?;
-            let steps = world.stop_recording()?;
-            if let Some(out) = out {
-                out[0] = steps;
-            }
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let out = memory::optional_output_array("out_steps", out_steps, 1)?;
+        let steps = world.stop_recording()?;
+        if let Some(out) = out {
+            out[0] = steps;
+        }
+        Ok(())
+    })
 }
 
 /// Replays a recording and compares the state hash after each step, up to the first difference.
@@ -90,8 +84,7 @@ pub unsafe extern "C" fn sinew_replay(
     thread_count: u32,
     out: *mut sinew_replay_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe {
+    guard(|| {
         let out = memory::report("out", out)?;
         let report = World::replay(Path::new(memory::text("path", path)?), thread_count)?;
         out.fill(report.into());

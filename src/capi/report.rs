@@ -106,19 +106,16 @@ pub unsafe extern "C" fn sinew_body_get_energy(
     body: sinew_body_id,
     out: *mut sinew_energy,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let energy = world.body(body.id())?.energy(world.gravity());
-            memory::report("out", out)?.fill(sinew_energy {
-                struct_size: size_of::<sinew_energy>(),
-                kinetic: energy.kinetic,
-                elastic: energy.elastic,
-                gravitational: energy.gravitational,
-            });
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let energy = world.body(body.id())?.energy(world.gravity());
+        memory::report("out", out)?.fill(sinew_energy {
+            struct_size: size_of::<sinew_energy>(),
+            kinetic: energy.kinetic,
+            elastic: energy.elastic,
+            gravitational: energy.gravitational,
+        });
+        Ok(())
+    })
 }
 
 /// Writes the memory use of the springs of a body.
@@ -128,20 +125,17 @@ pub unsafe extern "C" fn sinew_body_get_storage_report(
     body: sinew_body_id,
     out: *mut sinew_storage_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let report = body.storage_report();
-            memory::report("out", out)?.fill(sinew_storage_report {
-                struct_size: size_of::<sinew_storage_report>(),
-                node_count: report.node_count,
-                spring_count: report.spring_count,
-                bytes_used: report.bytes_used,
-                bytes_reserved: report.bytes_reserved,
-            });
-            Ok(())
-        })
-    }
+    with_body(world, body, |body| {
+        let report = body.storage_report();
+        memory::report("out", out)?.fill(sinew_storage_report {
+            struct_size: size_of::<sinew_storage_report>(),
+            node_count: report.node_count,
+            spring_count: report.spring_count,
+            bytes_used: report.bytes_used,
+            bytes_reserved: report.bytes_reserved,
+        });
+        Ok(())
+    })
 }
 
 /// Writes how the solver of a body took the last step.
@@ -151,28 +145,25 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
     body: sinew_body_id,
     out: *mut sinew_solver_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let (report, choice) = (body.solver_report(), body.solver_choice());
-            memory::report("out", out)?.fill(sinew_solver_report {
-                struct_size: size_of::<sinew_solver_report>(),
-                iterations: report.iterations,
-                error: report.error,
-                added_mass: report.added_mass,
-                solves: report.solves,
-                has_converged: u32::from(report.has_converged),
-                solver: match choice.solver {
-                    Solver::Verlet | Solver::Auto => SINEW_SOLVER_VERLET,
-                    Solver::Implicit => SINEW_SOLVER_IMPLICIT,
-                    Solver::Newton => SINEW_SOLVER_NEWTON,
-                },
-                auto_substeps: choice.substeps,
-                auto_step: choice.step,
-            });
-            Ok(())
-        })
-    }
+    with_body(world, body, |body| {
+        let (report, choice) = (body.solver_report(), body.solver_choice());
+        memory::report("out", out)?.fill(sinew_solver_report {
+            struct_size: size_of::<sinew_solver_report>(),
+            iterations: report.iterations,
+            error: report.error,
+            added_mass: report.added_mass,
+            solves: report.solves,
+            has_converged: u32::from(report.has_converged),
+            solver: match choice.solver {
+                Solver::Verlet | Solver::Auto => SINEW_SOLVER_VERLET,
+                Solver::Implicit => SINEW_SOLVER_IMPLICIT,
+                Solver::Newton => SINEW_SOLVER_NEWTON,
+            },
+            auto_substeps: choice.substeps,
+            auto_step: choice.step,
+        });
+        Ok(())
+    })
 }
 
 /// Writes the volume and the pressure of the cavities of a body.
@@ -182,18 +173,15 @@ pub unsafe extern "C" fn sinew_body_get_enclosed_report(
     body: sinew_body_id,
     out: *mut sinew_enclosed_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let report = body.enclosed();
-            memory::report("out", out)?.fill(sinew_enclosed_report {
-                struct_size: size_of::<sinew_enclosed_report>(),
-                cavity_count: report.cavity_count,
-                volume: report.volume,
-                rest_volume: report.rest_volume,
-                pressure: report.pressure,
-            });
-            Ok(())
-        })
-    }
+    with_body(world, body, |body| {
+        let report = body.enclosed();
+        memory::report("out", out)?.fill(sinew_enclosed_report {
+            struct_size: size_of::<sinew_enclosed_report>(),
+            cavity_count: report.cavity_count,
+            volume: report.volume,
+            rest_volume: report.rest_volume,
+            pressure: report.pressure,
+        });
+        Ok(())
+    })
 }

@@ -60,8 +60,7 @@ pub unsafe extern "C" fn sinew_equilibrium_def_init(
     def: *mut sinew_equilibrium_def,
     struct_size: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_equilibrium_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_equilibrium_def::defaults()))
 }
 
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
@@ -77,39 +76,36 @@ pub unsafe extern "C" fn sinew_body_solve_equilibrium(
     def: *const sinew_equilibrium_def,
     out_report: *mut sinew_equilibrium_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let defaults = sinew_equilibrium_def::defaults();
-            let def = if def.is_null() {
-                defaults
-            } else {
-                memory::definition("def", def, defaults)?
-            };
-            let out = if out_report.is_null() {
-                None
-            } else {
-                Some(memory::report("out_report", out_report)?)
-            };
-            let found = world.rest_state(
-                body.id(),
-                &RestStateDefinition {
-                    tolerance: def.tolerance,
-                    iterations: def.iterations,
-                },
-            )?;
-            if let Some(out) = out {
-                out.fill(sinew_equilibrium_report {
-                    struct_size: size_of::<sinew_equilibrium_report>(),
-                    iterations: found.iterations,
-                    products: found.products,
-                    residual: found.residual,
-                    error: found.error,
-                    energy_before: found.energy_before,
-                    energy_after: found.energy_after,
-                });
-            }
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let defaults = sinew_equilibrium_def::defaults();
+        let def = if def.is_null() {
+            defaults
+        } else {
+            memory::definition("def", def, defaults)?
+        };
+        let out = if out_report.is_null() {
+            None
+        } else {
+            Some(memory::report("out_report", out_report)?)
+        };
+        let found = world.rest_state(
+            body.id(),
+            &RestStateDefinition {
+                tolerance: def.tolerance,
+                iterations: def.iterations,
+            },
+        )?;
+        if let Some(out) = out {
+            out.fill(sinew_equilibrium_report {
+                struct_size: size_of::<sinew_equilibrium_report>(),
+                iterations: found.iterations,
+                products: found.products,
+                residual: found.residual,
+                error: found.error,
+                energy_before: found.energy_before,
+                energy_after: found.energy_after,
+            });
+        }
+        Ok(())
+    })
 }

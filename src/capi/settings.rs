@@ -23,8 +23,7 @@ pub unsafe extern "C" fn sinew_world_set_substeps(
     substeps: u32,
     max_substeps: u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.set_substeps(substeps, max_substeps)) }
+    with_world_mut(world, |world| world.set_substeps(substeps, max_substeps))
 }
 
 /// Writes the number of substeps per step and its limit; both outputs are nullable.
@@ -34,16 +33,13 @@ pub unsafe extern "C" fn sinew_world_get_substeps(
     out_substeps: *mut u32,
     out_max_substeps: *mut u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let [substeps, max_substeps] = world.substeps();
-            memory::write_wanted(
-                ("out_substeps", out_substeps, substeps),
-                ("out_max_substeps", out_max_substeps, max_substeps),
-            )
-        })
-    }
+    with_world(world, |world| {
+        let [substeps, max_substeps] = world.substeps();
+        memory::write_wanted(
+            ("out_substeps", out_substeps, substeps),
+            ("out_max_substeps", out_max_substeps, max_substeps),
+        )
+    })
 }
 
 /// Settings of a body that can change after creation; see sinew_body_def.
@@ -94,26 +90,23 @@ pub unsafe extern "C" fn sinew_body_set_settings(
     body: sinew_body_id,
     settings: *const sinew_body_settings,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let defaults = world.body(body.id())?.settings().into();
-            let given = memory::definition("settings", settings, defaults)?;
-            world.set_body_settings(
-                body.id(),
-                BodySettings {
-                    thickness: given.contact_thickness,
-                    friction: given.contact_friction,
-                    with_bodies: flag("meets_bodies", given.meets_bodies)?,
-                    with_itself: flag("meets_itself", given.meets_itself)?,
-                    sleep: Sleep {
-                        speed: given.sleep_speed,
-                        time: given.sleep_time,
-                    },
+    with_world_mut(world, |world| {
+        let defaults = world.body(body.id())?.settings().into();
+        let given = memory::definition("settings", settings, defaults)?;
+        world.set_body_settings(
+            body.id(),
+            BodySettings {
+                thickness: given.contact_thickness,
+                friction: given.contact_friction,
+                with_bodies: flag("meets_bodies", given.meets_bodies)?,
+                with_itself: flag("meets_itself", given.meets_itself)?,
+                sleep: Sleep {
+                    speed: given.sleep_speed,
+                    time: given.sleep_time,
                 },
-            )
-        })
-    }
+            },
+        )
+    })
 }
 
 /// Writes the settings of a body that can change.
@@ -123,13 +116,10 @@ pub unsafe extern "C" fn sinew_body_get_settings(
     body: sinew_body_id,
     out: *mut sinew_body_settings,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            memory::report("out", out)?.fill(body.settings().into());
-            Ok(())
-        })
-    }
+    with_body(world, body, |body| {
+        memory::report("out", out)?.fill(body.settings().into());
+        Ok(())
+    })
 }
 
 /// Sets the drag [N s/m] on each node of a body, at least 0, from the next step on.
@@ -139,8 +129,7 @@ pub unsafe extern "C" fn sinew_body_set_node_damping(
     body: sinew_body_id,
     node_damping: f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body_mut(world, body, |body| body.set_node_damping(node_damping)) }
+    with_body_mut(world, body, |body| body.set_node_damping(node_damping))
 }
 
 /// Writes the drag [N s/m] on a node.
@@ -151,6 +140,5 @@ pub unsafe extern "C" fn sinew_body_get_node_damping(
     node: u32,
     out: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body(world, body, |body| memory::write("out", out, body.node_damping(node)?)) }
+    with_body(world, body, |body| memory::write("out", out, body.node_damping(node)?))
 }

@@ -13,12 +13,9 @@ pub unsafe extern "C" fn sinew_body_pin_nodes(
     nodes: *const u32,
     count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            body.pin_nodes(memory::array("nodes", nodes, count)?)
-        })
-    }
+    with_body_mut(world, body, |body| {
+        body.pin_nodes(memory::array("nodes", nodes, count)?)
+    })
 }
 
 /// Unpins `count` nodes along all axes; see sinew_body_unpin.
@@ -29,12 +26,9 @@ pub unsafe extern "C" fn sinew_body_unpin_nodes(
     nodes: *const u32,
     count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            body.unpin_nodes(memory::array("nodes", nodes, count)?)
-        })
-    }
+    with_body_mut(world, body, |body| {
+        body.unpin_nodes(memory::array("nodes", nodes, count)?)
+    })
 }
 
 /// Pins all nodes in a box, and writes how many nodes of the box are pinned.
@@ -50,18 +44,15 @@ pub unsafe extern "C" fn sinew_body_pin_box(
     max: *const f32,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            let (low, high) = (memory::vector("min", min)?, memory::vector("max", max)?);
-            let place = memory::optional_output_array("out_count", out_count, 1)?;
-            let count = body.pin_box(low, high)?;
-            if let Some(place) = place {
-                place[0] = count;
-            }
-            Ok(())
-        })
-    }
+    with_body_mut(world, body, |body| {
+        let (low, high) = (memory::vector("min", min)?, memory::vector("max", max)?);
+        let place = memory::optional_output_array("out_count", out_count, 1)?;
+        let count = body.pin_box(low, high)?;
+        if let Some(place) = place {
+            place[0] = count;
+        }
+        Ok(())
+    })
 }
 
 /// Unpins the pinned nodes in a box, except those of mass 0, and writes how many.
@@ -75,18 +66,15 @@ pub unsafe extern "C" fn sinew_body_unpin_box(
     max: *const f32,
     out_count: *mut usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            let (low, high) = (memory::vector("min", min)?, memory::vector("max", max)?);
-            let place = memory::optional_output_array("out_count", out_count, 1)?;
-            let count = body.unpin_box(low, high)?;
-            if let Some(place) = place {
-                place[0] = count;
-            }
-            Ok(())
-        })
-    }
+    with_body_mut(world, body, |body| {
+        let (low, high) = (memory::vector("min", min)?, memory::vector("max", max)?);
+        let place = memory::optional_output_array("out_count", out_count, 1)?;
+        let count = body.unpin_box(low, high)?;
+        if let Some(place) = place {
+            place[0] = count;
+        }
+        Ok(())
+    })
 }
 
 /// Writes the reaction forces [N] on all nodes, 3 * node_count floats, averaged over the last step.
@@ -99,10 +87,7 @@ pub unsafe extern "C" fn sinew_body_get_pin_forces(
     out_forces: *mut f32,
     node_count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            body.pin_forces(memory::output_array("out_forces", out_forces.cast(), node_count)?)
-        })
-    }
+    with_body(world, body, |body| {
+        body.pin_forces(memory::output_array("out_forces", out_forces.cast(), node_count)?)
+    })
 }

@@ -12,18 +12,14 @@ pub unsafe extern "C" fn sinew_body_get_awake_share(
     body: sinew_body_id,
     out: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body(world, body, |body| memory::write("out", out, body.awake_share())) }
+    with_body(world, body, |body| memory::write("out", out, body.awake_share()))
 }
 
 /// Wakes all nodes of a body until they come to rest again; whatever affects a body does too.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_wake(world: *mut sinew_world, body: sinew_body_id) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            body.wake();
-            Ok(())
-        })
-    }
+    with_body_mut(world, body, |body| {
+        body.wake();
+        Ok(())
+    })
 }

@@ -11,14 +11,11 @@ use crate::world::World;
 /// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or the size is too large.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_snapshot_size(world: *const sinew_world, out: *mut usize) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out = memory::output("out", out)?;
-            *out = world.snapshot_size()?;
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let out = memory::output("out", out)?;
+        *out = world.snapshot_size()?;
+        Ok(())
+    })
 }
 
 /// Saves a world as bytes, from which sinew_world_load_snapshot continues bitwise identically.
@@ -33,13 +30,10 @@ pub unsafe extern "C" fn sinew_world_save_snapshot(
     out_bytes: *mut u8,
     size: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out_bytes = memory::output_array("out_bytes", out_bytes, size)?;
-            world.save_into(out_bytes)
-        })
-    }
+    with_world(world, |world| {
+        let out_bytes = memory::output_array("out_bytes", out_bytes, size)?;
+        world.save_into(out_bytes)
+    })
 }
 
 /// Creates a world from the bytes of a snapshot.
@@ -57,10 +51,8 @@ pub unsafe extern "C" fn sinew_world_load_snapshot(
     out: *mut *mut sinew_world,
 ) -> sinew_status {
     guard(|| {
-        // SAFETY: the same contract.
-        let (out, bytes) = unsafe { (memory::output("out", out)?, memory::array("bytes", bytes, size)?) };
-        // SAFETY: the same contract.
-        let def = unsafe { sinew_world_def::read_or_default(def) }?;
+        let (out, bytes) = (memory::output("out", out)?, memory::array("bytes", bytes, size)?);
+        let def = sinew_world_def::read_or_default(def)?;
         let world = World::load(bytes, def.thread_count, def.tasks)?;
         *out = Box::into_raw(crate::base::memory::boxed(sinew_world::new(world))?);
         Ok(())

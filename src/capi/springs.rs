@@ -17,16 +17,13 @@ pub unsafe extern "C" fn sinew_body_get_spring_pairs(
     out_pairs: *mut u32,
     count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let out = memory::output_array("out_pairs", out_pairs.cast::<[u32; 2]>(), count)?;
-            let pairs = body.spring_pairs()?;
-            expect_count("out_pairs", count, pairs.len())?;
-            out.copy_from_slice(&pairs);
-            Ok(())
-        })
-    }
+    with_body(world, body, |body| {
+        let out = memory::output_array("out_pairs", out_pairs.cast::<[u32; 2]>(), count)?;
+        let pairs = body.spring_pairs()?;
+        expect_count("out_pairs", count, pairs.len())?;
+        out.copy_from_slice(&pairs);
+        Ok(())
+    })
 }
 
 /// Writes the stiffnesses and rest lengths of the springs between pairs of nodes.
@@ -44,24 +41,21 @@ pub unsafe extern "C" fn sinew_body_get_springs(
     out_stiffnesses: *mut f32,
     out_rest_lengths: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
-            let mut out_stiffnesses = memory::optional_output_array("out_stiffnesses", out_stiffnesses, count)?;
-            let mut out_rest_lengths = memory::optional_output_array("out_rest_lengths", out_rest_lengths, count)?;
-            let springs = body.springs(pairs)?;
-            for (index, spring) in springs.into_iter().enumerate() {
-                if let Some(out_stiffnesses) = &mut out_stiffnesses {
-                    out_stiffnesses[index] = spring.stiffness;
-                }
-                if let Some(out_rest_lengths) = &mut out_rest_lengths {
-                    out_rest_lengths[index] = spring.rest_length;
-                }
+    with_body(world, body, |body| {
+        let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
+        let mut out_stiffnesses = memory::optional_output_array("out_stiffnesses", out_stiffnesses, count)?;
+        let mut out_rest_lengths = memory::optional_output_array("out_rest_lengths", out_rest_lengths, count)?;
+        let springs = body.springs(pairs)?;
+        for (index, spring) in springs.into_iter().enumerate() {
+            if let Some(out_stiffnesses) = &mut out_stiffnesses {
+                out_stiffnesses[index] = spring.stiffness;
             }
-            Ok(())
-        })
-    }
+            if let Some(out_rest_lengths) = &mut out_rest_lengths {
+                out_rest_lengths[index] = spring.rest_length;
+            }
+        }
+        Ok(())
+    })
 }
 
 /// Sets stiffnesses, rest lengths or both of the springs between pairs of nodes.
@@ -79,15 +73,12 @@ pub unsafe extern "C" fn sinew_body_set_springs(
     rest_lengths: *const f32,
     count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
-            let stiffnesses = memory::optional_array("stiffnesses", stiffnesses, count)?;
-            let rest_lengths = memory::optional_array("rest_lengths", rest_lengths, count)?;
-            body.set_springs(pairs, stiffnesses.map(Values::Each), rest_lengths.map(Values::Each))
-        })
-    }
+    with_body_mut(world, body, |body| {
+        let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
+        let stiffnesses = memory::optional_array("stiffnesses", stiffnesses, count)?;
+        let rest_lengths = memory::optional_array("rest_lengths", rest_lengths, count)?;
+        body.set_springs(pairs, stiffnesses.map(Values::Each), rest_lengths.map(Values::Each))
+    })
 }
 
 /// Multiplies the stiffness and the rest length of the material between given nodes.
@@ -104,11 +95,8 @@ pub unsafe extern "C" fn sinew_body_scale_region(
     stiffness_factor: f32,
     length_factor: f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            let nodes = memory::array("nodes", nodes, node_count)?;
-            body.scale_region(nodes, stiffness_factor, length_factor)
-        })
-    }
+    with_body_mut(world, body, |body| {
+        let nodes = memory::array("nodes", nodes, node_count)?;
+        body.scale_region(nodes, stiffness_factor, length_factor)
+    })
 }

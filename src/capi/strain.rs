@@ -27,8 +27,8 @@ pub struct sinew_strain {
 /// As [`memory::output_array`].
 unsafe fn strains_of<'a>(strains: *mut sinew_strain, count: usize) -> Result<&'a mut [Strain]> {
     const { assert!(size_of::<sinew_strain>() == size_of::<Strain>()) };
-    // SAFETY: the same contract; both are repr(C) with the same fields.
-    unsafe { memory::output_array("out_strains", strains.cast::<Strain>(), count) }
+    // Both are repr(C) with the same fields.
+    memory::output_array("out_strains", strains.cast::<Strain>(), count)
 }
 
 /// Writes the strain L / L0 - 1 between pairs of nodes; 0 where L0 is 0.
@@ -46,19 +46,16 @@ pub unsafe extern "C" fn sinew_body_get_spring_strains(
     count: usize,
     out_strains: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
-            let out_strains = memory::output_array("out_strains", out_strains, count)?;
-            if let Some(lengths) = memory::optional_array("rest_lengths", rest_lengths, count)? {
-                return strain::of_springs(body.positions(), pairs, lengths, out_strains);
-            }
-            let mut lengths = crate::base::memory::reserved(count)?;
-            lengths.extend(body.springs(pairs)?.iter().map(|spring| spring.rest_length));
-            strain::of_springs(body.positions(), pairs, &lengths, out_strains)
-        })
-    }
+    with_body(world, body, |body| {
+        let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
+        let out_strains = memory::output_array("out_strains", out_strains, count)?;
+        if let Some(lengths) = memory::optional_array("rest_lengths", rest_lengths, count)? {
+            return strain::of_springs(body.positions(), pairs, lengths, out_strains);
+        }
+        let mut lengths = crate::base::memory::reserved(count)?;
+        lengths.extend(body.springs(pairs)?.iter().map(|spring| spring.rest_length));
+        strain::of_springs(body.positions(), pairs, &lengths, out_strains)
+    })
 }
 
 /// Writes the strains of any triangles between nodes of a body, one per triangle.
@@ -74,15 +71,12 @@ pub unsafe extern "C" fn sinew_body_get_triangle_strains(
     triangle_count: usize,
     out_strains: *mut sinew_strain,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let rest = memory::array("rest_positions", rest_positions.cast::<Vec3>(), node_count)?;
-            let triangles = memory::array("triangles", triangles.cast::<[u32; 3]>(), triangle_count)?;
-            let out_strains = strains_of(out_strains, triangle_count)?;
-            strain::of_triangles(rest, body.positions(), triangles, out_strains)
-        })
-    }
+    with_body(world, body, |body| {
+        let rest = memory::array("rest_positions", rest_positions.cast::<Vec3>(), node_count)?;
+        let triangles = memory::array("triangles", triangles.cast::<[u32; 3]>(), triangle_count)?;
+        let out_strains = strains_of(out_strains, triangle_count)?;
+        strain::of_triangles(rest, body.positions(), triangles, out_strains)
+    })
 }
 
 /// Writes the strains of any tetrahedra between nodes of a body, one per tetrahedron.
@@ -98,15 +92,12 @@ pub unsafe extern "C" fn sinew_body_get_tetrahedron_strains(
     tetrahedron_count: usize,
     out_strains: *mut sinew_strain,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let rest = memory::array("rest_positions", rest_positions.cast::<Vec3>(), node_count)?;
-            let tetrahedra = memory::array("tetrahedra", tetrahedra.cast::<[u32; 4]>(), tetrahedron_count)?;
-            let out_strains = strains_of(out_strains, tetrahedron_count)?;
-            strain::of_tetrahedra(rest, body.positions(), tetrahedra, out_strains)
-        })
-    }
+    with_body(world, body, |body| {
+        let rest = memory::array("rest_positions", rest_positions.cast::<Vec3>(), node_count)?;
+        let tetrahedra = memory::array("tetrahedra", tetrahedra.cast::<[u32; 4]>(), tetrahedron_count)?;
+        let out_strains = strains_of(out_strains, tetrahedron_count)?;
+        strain::of_tetrahedra(rest, body.positions(), tetrahedra, out_strains)
+    })
 }
 
 /// Averages values of elements at their nodes; 0 at a node without elements.
@@ -122,8 +113,7 @@ pub unsafe extern "C" fn sinew_util_average_to_nodes(
     out_means: *mut f32,
     node_count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe {
+    guard(|| {
         let values = memory::array("values", values, element_count)?;
         let out_means = memory::output_array("out_means", out_means, node_count)?;
         let name = "elements";

@@ -56,8 +56,7 @@ impl sinew_suture_def {
 /// Fills a suture definition with its defaults; `struct_size` is sizeof(sinew_suture_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_suture_def_init(def: *mut sinew_suture_def, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_suture_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_suture_def::defaults()))
 }
 
 /// Joins two surface points of bodies by a thread, which pulls and never pushes.
@@ -74,39 +73,36 @@ pub unsafe extern "C" fn sinew_suture_create(
     def: *const sinew_suture_def,
     out: *mut sinew_attachment_id,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let [point, other] = [("point", point), ("other_point", other_point)]
-                .map(|(name, point)| memory::definition(name, point, sinew_surface_point::NONE));
-            let (point, other) = (point?, other?);
-            let defaults = sinew_suture_def::defaults();
-            let def = if def.is_null() {
-                defaults
-            } else {
-                memory::definition("def", def, defaults)?
-            };
-            let definition = SutureDefinition {
-                length: (def.length != -1.0).then_some(def.length),
-                stiffness: def.stiffness,
-                force_limit: def.force_limit,
-            };
-            let out = memory::output("out", out)?;
-            let anchor = |of: &sinew_surface_point| {
-                let (triangle, weights) = (of.triangle, of.weights);
-                Anchor::Point(SurfacePoint { triangle, weights })
-            };
-            let made = world.suture(
-                point.body.id(),
-                &anchor(&point),
-                other.body.id(),
-                &anchor(&other),
-                &definition,
-            )?;
-            *out = made.into();
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let [point, other] = [("point", point), ("other_point", other_point)]
+            .map(|(name, point)| memory::definition(name, point, sinew_surface_point::NONE));
+        let (point, other) = (point?, other?);
+        let defaults = sinew_suture_def::defaults();
+        let def = if def.is_null() {
+            defaults
+        } else {
+            memory::definition("def", def, defaults)?
+        };
+        let definition = SutureDefinition {
+            length: (def.length != -1.0).then_some(def.length),
+            stiffness: def.stiffness,
+            force_limit: def.force_limit,
+        };
+        let out = memory::output("out", out)?;
+        let anchor = |of: &sinew_surface_point| {
+            let (triangle, weights) = (of.triangle, of.weights);
+            Anchor::Point(SurfacePoint { triangle, weights })
+        };
+        let made = world.suture(
+            point.body.id(),
+            &anchor(&point),
+            other.body.id(),
+            &anchor(&other),
+            &definition,
+        )?;
+        *out = made.into();
+        Ok(())
+    })
 }
 
 /// Changes the length [m] of a suture's thread over the next step, by at most 0.25 m/s.
@@ -120,8 +116,7 @@ pub unsafe extern "C" fn sinew_suture_set_length(
     suture: sinew_attachment_id,
     length: f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.set_suture_length(suture.id(), length)) }
+    with_world_mut(world, |world| world.set_suture_length(suture.id(), length))
 }
 
 /// Writes the current state of a suture.
@@ -133,18 +128,15 @@ pub unsafe extern "C" fn sinew_suture_get_report(
     suture: sinew_attachment_id,
     out_report: *mut sinew_suture_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            let out = memory::report("out_report", out_report)?;
-            let found = world.suture_report(suture.id())?;
-            out.fill(sinew_suture_report {
-                struct_size: size_of::<sinew_suture_report>(),
-                length: found.length,
-                distance: found.distance,
-                energy: found.energy,
-            });
-            Ok(())
-        })
-    }
+    with_world(world, |world| {
+        let out = memory::report("out_report", out_report)?;
+        let found = world.suture_report(suture.id())?;
+        out.fill(sinew_suture_report {
+            struct_size: size_of::<sinew_suture_report>(),
+            length: found.length,
+            distance: found.distance,
+            energy: found.energy,
+        });
+        Ok(())
+    })
 }

@@ -36,21 +36,18 @@ pub unsafe extern "C" fn sinew_body_get_tear_report(
     body: sinew_body_id,
     out: *mut sinew_tear_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let report = body.tear_report();
-            memory::report("out", out)?.fill(sinew_tear_report {
-                struct_size: size_of::<sinew_tear_report>(),
-                tears: report.tears,
-                pieces_parted: report.pieces_parted,
-                waiting: report.waiting,
-                small_pieces: report.small_pieces,
-                no_room: report.no_room,
-            });
-            Ok(())
-        })
-    }
+    with_body(world, body, |body| {
+        let report = body.tear_report();
+        memory::report("out", out)?.fill(sinew_tear_report {
+            struct_size: size_of::<sinew_tear_report>(),
+            tears: report.tears,
+            pieces_parted: report.pieces_parted,
+            waiting: report.waiting,
+            small_pieces: report.small_pieces,
+            no_room: report.no_room,
+        });
+        Ok(())
+    })
 }
 
 /// Writes the tear limits of springs or element edges between pairs of nodes.
@@ -66,21 +63,18 @@ pub unsafe extern "C" fn sinew_body_get_tear_limits(
     out_strains: *mut f32,
     out_forces: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
-            let strains = memory::optional_output_array("out_strains", out_strains, count)?;
-            let forces = memory::optional_output_array("out_forces", out_forces, count)?;
-            let limits = body.tear_limits(pairs)?;
-            for (out, of) in [(strains, 0), (forces, 1)] {
-                for (out, limits) in out.unwrap_or_default().iter_mut().zip(&limits) {
-                    *out = limits[of];
-                }
+    with_body(world, body, |body| {
+        let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
+        let strains = memory::optional_output_array("out_strains", out_strains, count)?;
+        let forces = memory::optional_output_array("out_forces", out_forces, count)?;
+        let limits = body.tear_limits(pairs)?;
+        for (out, of) in [(strains, 0), (forces, 1)] {
+            for (out, limits) in out.unwrap_or_default().iter_mut().zip(&limits) {
+                *out = limits[of];
             }
-            Ok(())
-        })
-    }
+        }
+        Ok(())
+    })
 }
 
 /// Sets tear limits of single springs or element edges, in place of the body's.
@@ -99,13 +93,10 @@ pub unsafe extern "C" fn sinew_body_set_tear_limits(
     forces: *const f32,
     count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
-            let strains = memory::optional_array("strains", strains, count)?;
-            let forces = memory::optional_array("forces", forces, count)?;
-            body.set_tear_limits(pairs, strains.map(Values::Each), forces.map(Values::Each))
-        })
-    }
+    with_body_mut(world, body, |body| {
+        let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
+        let strains = memory::optional_array("strains", strains, count)?;
+        let forces = memory::optional_array("forces", forces, count)?;
+        body.set_tear_limits(pairs, strains.map(Values::Each), forces.map(Values::Each))
+    })
 }

@@ -159,10 +159,8 @@ impl sinew_tool_def {
                 half_extents: Vec3::from_array(self.half_extents),
             },
             SINEW_SHAPE_MESH => Shape::Mesh {
-                // SAFETY: the same contract.
-                positions: unsafe { memory::array("positions", self.positions.cast(), self.node_count) }?,
-                // SAFETY: the same contract.
-                triangles: unsafe { memory::array("triangles", self.triangles.cast(), self.triangle_count) }?,
+                positions: memory::array("positions", self.positions.cast(), self.node_count)?,
+                triangles: memory::array("triangles", self.triangles.cast(), self.triangle_count)?,
             },
             unknown => return Err(Error::invalid(format!("shape is {unknown}: no SINEW_SHAPE_..."))),
         };
@@ -187,8 +185,7 @@ impl sinew_tool_def {
 /// Fills a tool definition with its defaults; `struct_size` is sizeof(sinew_tool_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_def_init(def: *mut sinew_tool_def, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_tool_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_tool_def::defaults()))
 }
 
 /// Creates a tool in a world, and copies everything that `def` points to.
@@ -200,22 +197,18 @@ pub unsafe extern "C" fn sinew_tool_create(
     def: *const sinew_tool_def,
     out: *mut sinew_tool_id,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let out = memory::output("out", out)?;
-            let def = memory::definition("def", def, sinew_tool_def::defaults())?;
-            *out = world.create_tool(&def.definition()?)?.into();
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let out = memory::output("out", out)?;
+        let def = memory::definition("def", def, sinew_tool_def::defaults())?;
+        *out = world.create_tool(&def.definition()?)?.into();
+        Ok(())
+    })
 }
 
 /// Destroys a tool and releases everything attached to it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_destroy(world: *mut sinew_world, tool: sinew_tool_id) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.destroy_tool(tool.id())) }
+    with_world_mut(world, |world| world.destroy_tool(tool.id()))
 }
 
 /// Moves a tool to a new pose during the next step, along a line and the shorter arc.
@@ -231,14 +224,11 @@ pub unsafe extern "C" fn sinew_tool_set_pose(
     position: *const f32,
     orientation: *const f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let position = memory::vector("position", position)?;
-            let orientation = memory::optional_orientation("orientation", orientation)?;
-            world.set_pose(tool.id(), position, orientation)
-        })
-    }
+    with_world_mut(world, |world| {
+        let position = memory::vector("position", position)?;
+        let orientation = memory::optional_orientation("orientation", orientation)?;
+        world.set_pose(tool.id(), position, orientation)
+    })
 }
 
 /// Sets the friction coefficient of a tool, at least 0, from the next step on.
@@ -248,8 +238,7 @@ pub unsafe extern "C" fn sinew_tool_set_friction(
     tool: sinew_tool_id,
     friction: f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.set_friction(tool.id(), friction)) }
+    with_world_mut(world, |world| world.set_friction(tool.id(), friction))
 }
 
 /// Sets the largest force [N] that moves a tool, from the next step on; 0 or infinity: unlimited.
@@ -259,8 +248,7 @@ pub unsafe extern "C" fn sinew_tool_set_force_limit(
     tool: sinew_tool_id,
     force_limit: f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.set_force_limit(tool.id(), force_limit)) }
+    with_world_mut(world, |world| world.set_force_limit(tool.id(), force_limit))
 }
 
 /// Sets the collision category and mask of a tool from the next step on.
@@ -273,12 +261,9 @@ pub unsafe extern "C" fn sinew_tool_set_collision(
     category: u32,
     mask: u32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            world.set_collision_filter(tool.id(), CollisionFilter { category, mask })
-        })
-    }
+    with_world_mut(world, |world| {
+        world.set_collision_filter(tool.id(), CollisionFilter { category, mask })
+    })
 }
 
 /// Writes the current pose of a tool, which a force_limit can keep short of the commanded one.
@@ -291,12 +276,9 @@ pub unsafe extern "C" fn sinew_tool_get_pose(
     out_position: *mut f32,
     out_orientation: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            write_pose(world.pose(tool.id())?, out_position, out_orientation)
-        })
-    }
+    with_world(world, |world| {
+        write_pose(world.pose(tool.id())?, out_position, out_orientation)
+    })
 }
 
 /// Writes the pose that the last step moved a tool to, before the force_limit.
@@ -309,12 +291,9 @@ pub unsafe extern "C" fn sinew_tool_get_target(
     out_position: *mut f32,
     out_orientation: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world(world, |world| {
-            write_pose(world.tool_target(tool.id())?, out_position, out_orientation)
-        })
-    }
+    with_world(world, |world| {
+        write_pose(world.tool_target(tool.id())?, out_position, out_orientation)
+    })
 }
 
 /// Writes a pose where it is wanted.
@@ -324,8 +303,7 @@ pub unsafe extern "C" fn sinew_tool_get_target(
 pub(super) unsafe fn write_pose(pose: Pose, position: *mut f32, orientation: *mut f32) -> Result<()> {
     let position = ("out_position", position.cast(), pose.position.to_array());
     let orientation = ("out_orientation", orientation.cast(), pose.orientation.to_array());
-    // SAFETY: the same contract.
-    unsafe { memory::write_wanted(position, orientation) }
+    memory::write_wanted(position, orientation)
 }
 
 /// Writes a force and a torque where they are wanted.
@@ -335,8 +313,7 @@ pub(super) unsafe fn write_pose(pose: Pose, position: *mut f32, orientation: *mu
 pub(super) unsafe fn write_wrench(wrench: (Vec3, Vec3), force: *mut f32, torque: *mut f32) -> Result<()> {
     let force = ("force", force.cast(), wrench.0.to_array());
     let torque = ("torque", torque.cast(), wrench.1.to_array());
-    // SAFETY: the same contract.
-    unsafe { memory::write_wanted(force, torque) }
+    memory::write_wanted(force, torque)
 }
 
 /// Writes the force and torque on a tool, averaged over the last step, in world axes.
@@ -349,6 +326,5 @@ pub unsafe extern "C" fn sinew_tool_get_wrench(
     force: *mut f32,
     torque: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world(world, |world| write_wrench(world.wrench(tool.id())?, force, torque)) }
+    with_world(world, |world| write_wrench(world.wrench(tool.id())?, force, torque))
 }

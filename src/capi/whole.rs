@@ -29,17 +29,14 @@ pub unsafe extern "C" fn sinew_mesh_create(
     tetrahedron_count: usize,
     out: *mut *mut sinew_mesh,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        create(out, || {
-            tidy(&Mesh {
-                positions: copied(memory::array("positions", positions.cast::<Vec3>(), node_count)?)?,
-                triangles: copied(memory::array("triangles", triangles.cast(), triangle_count)?)?,
-                tetrahedra: copied(memory::array("tetrahedra", tetrahedra.cast(), tetrahedron_count)?)?,
-                ..Mesh::default()
-            })
+    create(out, || {
+        tidy(&Mesh {
+            positions: copied(memory::array("positions", positions.cast::<Vec3>(), node_count)?)?,
+            triangles: copied(memory::array("triangles", triangles.cast(), triangle_count)?)?,
+            tetrahedra: copied(memory::array("tetrahedra", tetrahedra.cast(), tetrahedron_count)?)?,
+            ..Mesh::default()
         })
-    }
+    })
 }
 
 /// Creates a mesh of tetrahedra that fills the closed surface of a mesh.
@@ -53,13 +50,10 @@ pub unsafe extern "C" fn sinew_mesh_create_filled(
     spacing: f32,
     out: *mut *mut sinew_mesh,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        create(out, || {
-            let surface = memory::reference("surface", surface)?;
-            LoadedMesh::unchanged(Mesh::filled(&surface.drawn()?, spacing)?)
-        })
-    }
+    create(out, || {
+        let surface = memory::reference("surface", surface)?;
+        LoadedMesh::unchanged(Mesh::filled(&surface.drawn()?, spacing)?)
+    })
 }
 
 /// Sets the nodes and elements of a body definition to those of a mesh.
@@ -69,8 +63,7 @@ pub unsafe extern "C" fn sinew_mesh_create_filled(
 /// Errors: SINEW_STATUS_UNSUPPORTED for a mesh of cells if `def` is of an older header.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_def_set_mesh(def: *mut sinew_body_def, mesh: *const sinew_mesh) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe {
+    guard(|| {
         let mut changed = memory::definition("def", def, sinew_body_def::defaults())?;
         let view = sinew_mesh_view::of(memory::reference("mesh", mesh)?);
         let (size, cell_count) = (changed.struct_size, view.cell_count);
@@ -97,17 +90,14 @@ pub unsafe extern "C" fn sinew_body_transform(
     rotation: *const f32,
     pivot: *const f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            let translation = memory::optional_array("translation", translation.cast::<Vec3>(), 1)?;
-            let rotation = memory::optional_array("rotation", rotation.cast::<[f32; 4]>(), 1)?;
-            let pivot = memory::optional_array("pivot", pivot.cast::<Vec3>(), 1)?;
-            let rotation = rotation.map_or(Quat::IDENTITY, |rotation| Quat::from_array(rotation[0]));
-            let translation = translation.map_or(Vec3::ZERO, |translation| translation[0]);
-            body.transform(translation, rotation, pivot.map(|pivot| pivot[0]))
-        })
-    }
+    with_body_mut(world, body, |body| {
+        let translation = memory::optional_array("translation", translation.cast::<Vec3>(), 1)?;
+        let rotation = memory::optional_array("rotation", rotation.cast::<[f32; 4]>(), 1)?;
+        let pivot = memory::optional_array("pivot", pivot.cast::<Vec3>(), 1)?;
+        let rotation = rotation.map_or(Quat::IDENTITY, |rotation| Quat::from_array(rotation[0]));
+        let translation = translation.map_or(Vec3::ZERO, |translation| translation[0]);
+        body.transform(translation, rotation, pivot.map(|pivot| pivot[0]))
+    })
 }
 
 /// Writes the bounding box [m] of the nodes of a body, as two corners of 3 floats.
@@ -118,13 +108,10 @@ pub unsafe extern "C" fn sinew_body_get_bounds(
     out_min: *mut f32,
     out_max: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            let [min, max] = body.bounds().map(|corner| corner.to_array());
-            memory::write_both(("out_min", out_min.cast(), min), ("out_max", out_max.cast(), max))
-        })
-    }
+    with_body(world, body, |body| {
+        let [min, max] = body.bounds().map(|corner| corner.to_array());
+        memory::write_both(("out_min", out_min.cast(), min), ("out_max", out_max.cast(), max))
+    })
 }
 
 /// Writes the unit normals of the surface of a body at its nodes, 3 * node_count floats.
@@ -137,12 +124,9 @@ pub unsafe extern "C" fn sinew_body_get_normals(
     out_normals: *mut f32,
     node_count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            body.normals(memory::output_array("out_normals", out_normals.cast(), node_count)?)
-        })
-    }
+    with_body(world, body, |body| {
+        body.normals(memory::output_array("out_normals", out_normals.cast(), node_count)?)
+    })
 }
 
 /// Writes the masses [kg] of all nodes of a body; see sinew_body_get_node_mass.
@@ -153,12 +137,9 @@ pub unsafe extern "C" fn sinew_body_get_masses(
     out_masses: *mut f32,
     node_count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            body.node_masses(memory::output_array("out_masses", out_masses, node_count)?)
-        })
-    }
+    with_body(world, body, |body| {
+        body.node_masses(memory::output_array("out_masses", out_masses, node_count)?)
+    })
 }
 
 /// Changes the velocities of nodes at once by impulses [N s], 3 * count floats.
@@ -172,13 +153,10 @@ pub unsafe extern "C" fn sinew_body_apply_impulses(
     impulses: *const f32,
     count: usize,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            let nodes = memory::array("nodes", nodes, count)?;
-            body.apply_impulses(nodes, memory::array("impulses", impulses.cast(), count)?)
-        })
-    }
+    with_body_mut(world, body, |body| {
+        let nodes = memory::array("nodes", nodes, count)?;
+        body.apply_impulses(nodes, memory::array("impulses", impulses.cast(), count)?)
+    })
 }
 
 /// Sets the factor of the world's gravity on a body, any finite number, from the next step on.
@@ -188,8 +166,7 @@ pub unsafe extern "C" fn sinew_body_set_gravity_scale(
     body: sinew_body_id,
     scale: f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body_mut(world, body, |body| body.set_gravity_scale(scale)) }
+    with_body_mut(world, body, |body| body.set_gravity_scale(scale))
 }
 
 /// Writes the factor of the world's gravity on a body.
@@ -199,8 +176,7 @@ pub unsafe extern "C" fn sinew_body_get_gravity_scale(
     body: sinew_body_id,
     out: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_body(world, body, |body| memory::write("out", out, body.gravity_scale())) }
+    with_body(world, body, |body| memory::write("out", out, body.gravity_scale()))
 }
 
 /// Sets an acceleration [m/s^2] of a body beside gravity, such as wind, from the next step on.
@@ -210,12 +186,9 @@ pub unsafe extern "C" fn sinew_body_set_acceleration(
     body: sinew_body_id,
     acceleration: *const f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            body.set_acceleration(memory::vector("acceleration", acceleration)?)
-        })
-    }
+    with_body_mut(world, body, |body| {
+        body.set_acceleration(memory::vector("acceleration", acceleration)?)
+    })
 }
 
 /// Writes the acceleration [m/s^2] of sinew_body_set_acceleration, 3 floats; 0 by default.
@@ -225,12 +198,9 @@ pub unsafe extern "C" fn sinew_body_get_acceleration(
     body: sinew_body_id,
     out: *mut f32,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            memory::write("out", out.cast(), body.acceleration().to_array())
-        })
-    }
+    with_body(world, body, |body| {
+        memory::write("out", out.cast(), body.acceleration().to_array())
+    })
 }
 
 /// Stores a pointer of the caller, nullable, with a body; snapshots do not hold it.
@@ -240,13 +210,10 @@ pub unsafe extern "C" fn sinew_body_set_user_data(
     body: sinew_body_id,
     user_data: *mut c_void,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body_mut(world, body, |body| {
-            body.set_user_data(user_data as usize);
-            Ok(())
-        })
-    }
+    with_body_mut(world, body, |body| {
+        body.set_user_data(user_data as usize);
+        Ok(())
+    })
 }
 
 /// Writes the pointer that is stored with a body; NULL by default.
@@ -256,10 +223,7 @@ pub unsafe extern "C" fn sinew_body_get_user_data(
     body: sinew_body_id,
     out: *mut *mut c_void,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_body(world, body, |body| {
-            memory::write("out", out, body.user_data() as *mut c_void)
-        })
-    }
+    with_body(world, body, |body| {
+        memory::write("out", out, body.user_data() as *mut c_void)
+    })
 }

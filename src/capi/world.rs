@@ -6,7 +6,7 @@ use glam::Vec3;
 use std::ffi::c_void;
 
 use super::body::sinew_body_id;
-use super::guard::{guard, with_world, with_world_mut};
+use super::guard::{destroy, guard, with_world, with_world_mut};
 use super::limit::{SINEW_LIMIT_NONE, limit_of};
 use super::log::{self, SINEW_LOG_WARNING};
 use super::memory::{self, Versioned};
@@ -156,19 +156,16 @@ impl sinew_world_def {
     pub(super) unsafe fn read_or_default(def: *const Self) -> Result<WorldDefinition> {
         let mut read = Self::defaults();
         if !def.is_null() {
-            // SAFETY: the same contract.
-            read = unsafe { memory::definition("def", def, read) }?;
+            read = memory::definition("def", def, read)?;
         }
-        // SAFETY: the same contract.
-        unsafe { read.definition() }
+        read.definition()
     }
 
     /// # Safety
     /// `run_tasks` is NULL or what [`sinew_run_tasks`] says, for as long as a world of this definition lives.
     unsafe fn definition(&self) -> Result<WorldDefinition> {
         memory::reserved("reserved", self.reserved)?;
-        // SAFETY: the same contract.
-        let run_tasks = |run| unsafe { RunTasks::from_c(run, self.tasks_context) };
+        let run_tasks = |run| RunTasks::from_c(run, self.tasks_context);
         Ok(WorldDefinition {
             gravity: Vec3::from_array(self.gravity),
             thread_count: self.thread_count,
@@ -215,8 +212,7 @@ impl From<StepReport> for sinew_step_report {
 /// Fills a world definition with its defaults; `struct_size` is sizeof(sinew_world_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_def_init(def: *mut sinew_world_def, struct_size: usize) -> sinew_status {
-    // SAFETY: the same contract.
-    guard(|| unsafe { memory::initialise(def, struct_size, sinew_world_def::defaults()) })
+    guard(|| memory::initialise(def, struct_size, sinew_world_def::defaults()))
 }
 
 /// Creates an empty world; destroy it with sinew_world_destroy.
@@ -225,12 +221,9 @@ pub unsafe extern "C" fn sinew_world_def_init(def: *mut sinew_world_def, struct_
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *mut *mut sinew_world) -> sinew_status {
     guard(|| {
-        // SAFETY: the same contract.
-        let out = unsafe { memory::output("out", out) }?;
-        // SAFETY: the same contract.
-        let def = unsafe { memory::definition("def", def, sinew_world_def::defaults()) }?;
-        // SAFETY: the same contract.
-        let world = World::new(unsafe { def.definition() }?)?;
+        let out = memory::output("out", out)?;
+        let def = memory::definition("def", def, sinew_world_def::defaults())?;
+        let world = World::new(def.definition()?)?;
         *out = Box::into_raw(crate::base::memory::boxed(sinew_world::new(world))?);
         Ok(())
     })
@@ -239,13 +232,7 @@ pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *m
 /// Destroys a world with all its bodies, tools and blades; NULL has no effect.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_destroy(world: *mut sinew_world) {
-    if !world.is_null() {
-        guard(|| {
-            // SAFETY: made by Box::into_raw in sinew_world_create, and given back once.
-            drop(unsafe { Box::from_raw(world) });
-            Ok(())
-        });
-    }
+    destroy(world);
 }
 
 /// Advances everything in the world by one time step.
@@ -259,8 +246,7 @@ pub unsafe extern "C" fn sinew_world_step(
     dt: f32,
     report: *mut sinew_step_report,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { step_and_report(world, report, |world| world.step(dt)) }
+    step_and_report(world, report, |world| world.step(dt))
 }
 
 /// Takes a step, and writes what came of it, also where it is refused as unstable.
@@ -272,44 +258,39 @@ pub(super) unsafe fn step_and_report<Report: Into<sinew_step_report>>(
     report: *mut sinew_step_report,
     mut step: impl FnMut(&mut World) -> Result<Report>,
 ) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let report = (!report.is_null()).then(|| memory::report("report", report));
-            let report = report.transpose()?;
-            let result = step(world).map(Into::into);
-            let told = match &result {
-                Ok(told) => Some(*told),
-                Err(Error::Unstable { report, .. }) => Some((*report).into()),
-                Err(_) => None,
-            };
-            let lag = world.lag();
-            if let (Some(report), Some(told)) = (report, told) {
-                report.fill(sinew_step_report { lag, ..told });
-            }
-            let count = result?.bodies_restored;
-            if count > 0 {
-                let time = world.time();
-                log::log(
-                    SINEW_LOG_WARNING,
-                    format_args!("the step to {time} s restored {count} bodies"),
-                );
-            }
-            Ok(())
-        })
-    }
+    with_world_mut(world, |world| {
+        let report = (!report.is_null()).then(|| memory::report("report", report));
+        let report = report.transpose()?;
+        let result = step(world).map(Into::into);
+        let told = match &result {
+            Ok(told) => Some(*told),
+            Err(Error::Unstable { report, .. }) => Some((*report).into()),
+            Err(_) => None,
+        };
+        let lag = world.lag();
+        if let (Some(report), Some(told)) = (report, told) {
+            report.fill(sinew_step_report { lag, ..told });
+        }
+        let count = result?.bodies_restored;
+        if count > 0 {
+            let time = world.time();
+            log::log(
+                SINEW_LOG_WARNING,
+                format_args!("the step to {time} s restored {count} bodies"),
+            );
+        }
+        Ok(())
+    })
 }
 
 /// Sets the gravitational acceleration [m/s^2], 3 floats, from the next step on.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_gravity(world: *mut sinew_world, gravity: *const f32) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world_mut(world, |world| world.set_gravity(memory::vector("gravity", gravity)?)) }
+    with_world_mut(world, |world| world.set_gravity(memory::vector("gravity", gravity)?))
 }
 
 /// Computes a hash over all that the next step depends on; compare it within one version.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_get_state_hash(world: *const sinew_world, out: *mut u64) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe { with_world(world, |world| memory::write("out", out, world.state_hash())) }
+    with_world(world, |world| memory::write("out", out, world.state_hash()))
 }
