@@ -1,7 +1,5 @@
 //! Attachments: what tools hold of bodies and bodies of each other, and the force on several tools together.
 
-use std::ptr::null;
-
 use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::id::converts;
@@ -69,18 +67,8 @@ enum AttachedEnds<'a> {
 impl sinew_attachment_def {
     fn defaults() -> Self {
         Self {
-            struct_size: size_of::<Self>(),
-            body: sinew_body_id::default(),
-            tool: sinew_tool_id::default(),
-            other: sinew_body_id::default(),
-            count: 0,
-            nodes: null(),
-            triangles: null(),
-            weights: null(),
-            other_nodes: null(),
-            other_triangles: null(),
-            other_weights: null(),
             force_limit: f32::INFINITY,
+            ..Self::empty()
         }
     }
 

@@ -60,15 +60,11 @@ impl sinew_debug_draw {
     fn defaults() -> Self {
         let defaults = DebugDrawDefinition::default();
         Self {
-            struct_size: size_of::<Self>(),
             flags: ALL,
             normal_length: defaults.normal_length,
             force_scale: defaults.force_scale,
             full_strain: defaults.full_strain,
-            context: std::ptr::null_mut(),
-            draw_line: None,
-            draw_point: None,
-            draw_triangle: None,
+            ..Self::empty()
         }
     }
 

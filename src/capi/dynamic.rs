@@ -27,22 +27,13 @@ pub struct sinew_mass_properties {
 // SAFETY: repr(C), begins with struct_size; numbers, which any bits are.
 unsafe impl Versioned for sinew_mass_properties {}
 
-impl sinew_mass_properties {
-    const NONE: Self = Self {
-        struct_size: size_of::<Self>(),
-        mass: 0.0,
-        center_of_mass: [0.0; 3],
-        inertia: [0.0; 6],
-    };
-}
-
 impl From<MassProperties> for sinew_mass_properties {
     fn from(properties: MassProperties) -> Self {
         Self {
             mass: properties.mass,
             center_of_mass: properties.center_of_mass.to_array(),
             inertia: properties.inertia,
-            ..Self::NONE
+            ..Self::empty()
         }
     }
 }
@@ -80,7 +71,7 @@ pub unsafe extern "C" fn sinew_tool_set_mass(
         if mass.is_null() {
             return world.set_dynamic(tool.id(), None);
         }
-        let mass = memory::definition("mass", mass, sinew_mass_properties::NONE)?;
+        let mass = memory::definition("mass", mass, sinew_mass_properties::empty())?;
         let properties = MassProperties {
             mass: mass.mass,
             center_of_mass: Vec3::from_array(mass.center_of_mass),
@@ -100,7 +91,7 @@ pub unsafe extern "C" fn sinew_tool_get_mass(
     with_world(world, |world| {
         let out = memory::report("out", out)?;
         let properties = world.mass_properties(tool.id())?;
-        out.fill(properties.map_or(sinew_mass_properties::NONE, Into::into));
+        out.fill(properties.map_or_else(sinew_mass_properties::empty, Into::into));
         Ok(())
     })
 }

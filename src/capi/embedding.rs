@@ -46,18 +46,6 @@ pub struct sinew_embedding_def {
 unsafe impl Versioned for sinew_embedding_def {}
 
 impl sinew_embedding_def {
-    fn defaults() -> Self {
-        Self {
-            struct_size: size_of::<Self>(),
-            vertices: std::ptr::null(),
-            vertex_count: 0,
-            triangles: std::ptr::null(),
-            triangle_count: 0,
-            tetrahedra: std::ptr::null(),
-            tetrahedron_count: 0,
-        }
-    }
-
     /// # Safety
     /// Arrays of the lengths that it states, for as long as the result lives.
     unsafe fn definition<'a>(&self) -> crate::Result<EmbeddingDefinition<'a>> {
@@ -72,7 +60,7 @@ impl sinew_embedding_def {
 /// Fills an embedding definition with its defaults; `struct_size` is sizeof(sinew_embedding_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_embedding_def_init(def: *mut sinew_embedding_def, struct_size: usize) -> sinew_status {
-    guard(|| memory::initialise(def, struct_size, sinew_embedding_def::defaults()))
+    guard(|| memory::initialise(def, struct_size, sinew_embedding_def::empty()))
 }
 
 /// Creates an embedding: binds a render surface to a body at its current positions.
@@ -90,7 +78,7 @@ pub unsafe extern "C" fn sinew_embedding_create(
 ) -> sinew_status {
     with_world(world, |world| {
         let out = memory::output("out", out)?;
-        let def = memory::definition("def", def, sinew_embedding_def::defaults())?;
+        let def = memory::definition("def", def, sinew_embedding_def::empty())?;
         let embedding = world.create_embedding(body.id(), &def.definition()?)?;
         *out = Box::into_raw(crate::base::memory::boxed(sinew_embedding { embedding })?);
         Ok(())

@@ -20,6 +20,15 @@ use crate::base::{Error, Result, memory};
 pub(super) unsafe trait Versioned: Copy {
     /// The sizes that earlier headers gave it, and today's last.
     const SIZES: &'static [usize] = &[size_of::<Self>()];
+
+    /// What is 0, NULL or none throughout, but for its size.
+    fn empty() -> Self {
+        // SAFETY: every pattern of bits is a value of it.
+        let mut empty: Self = unsafe { std::mem::zeroed() };
+        // SAFETY: `struct_size` is the first field of every `Versioned`.
+        unsafe { (&raw mut empty).cast::<usize>().write(size_of::<Self>()) };
+        empty
+    }
 }
 
 /// The value that `pointer` points to.

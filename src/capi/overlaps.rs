@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::body::sinew_body_id;
 use super::detector::{SINEW_NO_TRIANGLE, sinew_detector_report, sinew_edge_inside, sinew_point_inside};
+use super::memory::Versioned;
 use crate::base::memory::reserved;
 use crate::base::{Error, Result};
 use crate::body::Body;
@@ -35,18 +36,6 @@ pub(super) struct Overlaps {
     pub edges: [Vec<sinew_edge_inside>; 2],
     pub gradients: [Vec<DVec3>; 2],
 }
-
-const NOTHING: sinew_detector_report = sinew_detector_report {
-    struct_size: size_of::<sinew_detector_report>(),
-    volume: 0.0,
-    normal: [0.0; 3],
-    depth: 0.0,
-    pixel: 0.0,
-    point_counts: [0; 2],
-    edge_counts: [0; 2],
-    unlisted: [0; 2],
-    is_closed: [0; 2],
-};
 
 impl DetectorSide {
     /// The body, where it is still what the detector was made for.
@@ -84,7 +73,7 @@ impl Overlaps {
         let gradients = node_counts.map(|count| if has_volume { count } else { 0 });
         Ok(Self {
             has_volume,
-            report: NOTHING,
+            report: sinew_detector_report::empty(),
             points: [reserved(node_counts[0])?, reserved(node_counts[1])?],
             edges: [reserved(edges)?, reserved(edges)?],
             gradients: [reserved(gradients[0])?, reserved(gradients[1])?],
@@ -92,7 +81,7 @@ impl Overlaps {
     }
 
     pub fn clear(&mut self) {
-        self.report = NOTHING;
+        self.report = sinew_detector_report::empty();
         self.points.iter_mut().for_each(Vec::clear);
         self.edges.iter_mut().for_each(Vec::clear);
         self.gradients.iter_mut().for_each(Vec::clear);

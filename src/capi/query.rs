@@ -31,24 +31,9 @@ pub struct sinew_surface_point {
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_surface_point {}
 
-impl sinew_surface_point {
-    pub(super) const NONE: Self = Self {
-        struct_size: size_of::<Self>(),
-        body: sinew_body_id {
-            index1: 0,
-            generation: 0,
-        },
-        triangle: 0,
-        weights: [0.0; 3],
-        position: [0.0; 3],
-        normal: [0.0; 3],
-        distance: 0.0,
-    };
-}
-
 impl From<Option<SurfaceHit>> for sinew_surface_point {
     fn from(found: Option<SurfaceHit>) -> Self {
-        found.map_or(Self::NONE, |found| Self {
+        found.map_or_else(Self::empty, |found| Self {
             struct_size: size_of::<Self>(),
             body: found.body.into(),
             triangle: found.triangle,
@@ -126,18 +111,8 @@ unsafe impl Versioned for sinew_ray_hit {}
 
 impl From<Option<RayHit>> for sinew_ray_hit {
     fn from(hit: Option<RayHit>) -> Self {
-        let nothing = Self {
-            struct_size: size_of::<Self>(),
-            body: sinew_body_id::default(),
-            tool: sinew_tool_id::default(),
-            triangle: 0,
-            weights: [0.0; 3],
-            position: [0.0; 3],
-            normal: [0.0; 3],
-            distance: 0.0,
-        };
         match hit {
-            None => nothing,
+            None => Self::empty(),
             Some(RayHit::Body(hit)) => Self {
                 body: hit.body.into(),
                 triangle: hit.triangle,
@@ -145,7 +120,7 @@ impl From<Option<RayHit>> for sinew_ray_hit {
                 position: hit.position.to_array(),
                 normal: hit.normal.to_array(),
                 distance: hit.distance,
-                ..nothing
+                ..Self::empty()
             },
             Some(RayHit::Tool {
                 tool,
@@ -157,7 +132,7 @@ impl From<Option<RayHit>> for sinew_ray_hit {
                 position: position.to_array(),
                 normal: normal.to_array(),
                 distance,
-                ..nothing
+                ..Self::empty()
             },
         }
     }

@@ -44,23 +44,13 @@ unsafe impl Versioned for sinew_equilibrium_def {}
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_equilibrium_report {}
 
-impl sinew_equilibrium_def {
-    fn defaults() -> Self {
-        Self {
-            struct_size: size_of::<Self>(),
-            tolerance: 0.0,
-            iterations: 0,
-        }
-    }
-}
-
 /// Fills a definition with its defaults; `struct_size` is sizeof(sinew_equilibrium_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_equilibrium_def_init(
     def: *mut sinew_equilibrium_def,
     struct_size: usize,
 ) -> sinew_status {
-    guard(|| memory::initialise(def, struct_size, sinew_equilibrium_def::defaults()))
+    guard(|| memory::initialise(def, struct_size, sinew_equilibrium_def::empty()))
 }
 
 /// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
@@ -77,7 +67,7 @@ pub unsafe extern "C" fn sinew_body_solve_equilibrium(
     out_report: *mut sinew_equilibrium_report,
 ) -> sinew_status {
     with_world_mut(world, |world| {
-        let defaults = sinew_equilibrium_def::defaults();
+        let defaults = sinew_equilibrium_def::empty();
         let def = if def.is_null() {
             defaults
         } else {

@@ -75,7 +75,7 @@ pub unsafe extern "C" fn sinew_suture_create(
 ) -> sinew_status {
     with_world_mut(world, |world| {
         let [point, other] = [("point", point), ("other_point", other_point)]
-            .map(|(name, point)| memory::definition(name, point, sinew_surface_point::NONE));
+            .map(|(name, point)| memory::definition(name, point, sinew_surface_point::empty()));
         let (point, other) = (point?, other?);
         let defaults = sinew_suture_def::defaults();
         let def = if def.is_null() {

@@ -118,25 +118,13 @@ pub(super) fn detection(name: &str, number: u32) -> Result<Detection> {
 impl sinew_tool_def {
     fn defaults() -> Self {
         Self {
-            struct_size: size_of::<Self>(),
             shape: SINEW_SHAPE_SPHERE,
-            radius: 0.0,
-            half_length: 0.0,
-            reserved0: 0,
-            positions: std::ptr::null(),
-            node_count: 0,
-            triangles: std::ptr::null(),
-            triangle_count: 0,
             detection: SINEW_DETECTION_EXACT,
-            friction: 0.0,
-            position: [0.0; 3],
             orientation: [0.0, 0.0, 0.0, 1.0],
-            reserved: 0,
-            resolution: 0.0,
             force_limit: f32::INFINITY,
             collision_category: CollisionFilter::default().category,
             collision_mask: CollisionFilter::default().mask,
-            half_extents: [0.0; 3],
+            ..Self::empty()
         }
     }
 

@@ -138,16 +138,13 @@ impl sinew_world_def {
     fn defaults() -> Self {
         let defaults = WorldDefinition::default();
         Self {
-            struct_size: size_of::<Self>(),
             gravity: defaults.gravity.to_array(),
             thread_count: defaults.thread_count,
             substeps: defaults.substeps,
             max_substeps: defaults.max_substeps,
             tolerance: defaults.tolerance,
-            reserved: 0,
-            run_tasks: None,
-            tasks_context: std::ptr::null_mut(),
             kernel: SINEW_KERNEL_BEST,
+            ..Self::empty()
         }
     }
 
