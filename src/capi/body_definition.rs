@@ -94,16 +94,11 @@ impl sinew_body_def {
     }
 
     fn contact(&self) -> Result<BodyContact> {
-        let flag = |name: &str, value: u32| match value {
-            0 => Ok(false),
-            1 => Ok(true),
-            _ => Err(Error::invalid(format!("{name} is {value}: must be 0 or 1"))),
-        };
         Ok(BodyContact {
             thickness: self.contact_thickness,
             friction: self.contact_friction,
-            with_bodies: flag("meets_bodies", self.meets_bodies)?,
-            with_itself: flag("meets_itself", self.meets_itself)?,
+            with_bodies: memory::flag("meets_bodies", self.meets_bodies)?,
+            with_itself: memory::flag("meets_itself", self.meets_itself)?,
             detection: detection("contact_detection", self.contact_detection)?,
             resolution: self.contact_resolution,
             filter: CollisionFilter {

@@ -127,11 +127,7 @@ pub unsafe extern "C" fn sinew_body_cut(
     with_world_mut(world, |world| {
         let start = edge("start", start)?;
         let end = edge("end", end)?;
-        let out = if out_report.is_null() {
-            None
-        } else {
-            Some(memory::report("out_report", out_report)?)
-        };
+        let out = memory::optional_report("out_report", out_report)?;
         let done = world.cut(body.id(), &Sweep { start, end })?;
         if let Some(out) = out {
             out.fill(sinew_cut_report {
@@ -234,15 +230,9 @@ pub unsafe extern "C" fn sinew_body_get_max_counts(
     out_max_triangles: *mut u32,
 ) -> sinew_status {
     with_body(world, body, |body| {
-        let out_max_nodes = memory::optional_output_array("out_max_nodes", out_max_nodes, 1)?;
-        let out_max_triangles = memory::optional_output_array("out_max_triangles", out_max_triangles, 1)?;
-        if let Some(out) = out_max_nodes {
-            out[0] = body.max_nodes() as u32;
-        }
-        if let Some(out) = out_max_triangles {
-            out[0] = body.max_triangles() as u32;
-        }
-        Ok(())
+        let [nodes, triangles] = [body.max_nodes(), body.max_triangles()].map(|most| most as u32);
+        let triangles = ("out_max_triangles", out_max_triangles, triangles);
+        memory::write_wanted(("out_max_nodes", out_max_nodes, nodes), triangles)
     })
 }
 

@@ -262,6 +262,18 @@ pub(super) unsafe fn definition<T: Versioned>(name: &str, pointer: *const T, def
     Ok(definition)
 }
 
+/// The definition that `pointer` points to, or the defaults where it is left out.
+///
+/// # Safety
+/// As [`definition`].
+pub(super) unsafe fn optional_definition<T: Versioned>(name: &str, pointer: *const T, defaults: T) -> Result<T> {
+    if pointer.is_null() {
+        return Ok(defaults);
+    }
+    // SAFETY: the same contract.
+    unsafe { definition(name, pointer, defaults) }
+}
+
 /// Fills the definition at `pointer` with `defaults`, as much of it as `size` says the caller knows.
 ///
 /// # Safety
@@ -296,6 +308,18 @@ pub(super) unsafe fn report<T: Versioned>(name: &str, pointer: *mut T) -> Result
     let size = unsafe { pointer.cast::<usize>().read_unaligned() };
     known_size::<T>(&format_args!("{name}->struct_size"), size)?;
     Ok(Report { pointer, size })
+}
+
+/// A result struct that may be left out.
+///
+/// # Safety
+/// As [`report`].
+pub(super) unsafe fn optional_report<T: Versioned>(name: &str, pointer: *mut T) -> Result<Option<Report<T>>> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: the same contract.
+    unsafe { report(name, pointer) }.map(Some)
 }
 
 impl<T: Versioned> Report<T> {
@@ -341,6 +365,15 @@ pub(super) fn reserved(name: &str, value: u32) -> Result<()> {
         return Ok(());
     }
     Err(Error::invalid(format!("{name} is {value}: reserved fields are 0")))
+}
+
+/// A flag of the caller's.
+pub(super) fn flag(name: &str, value: u32) -> Result<bool> {
+    match value {
+        0 => Ok(false),
+        1 => Ok(true),
+        other => Err(Error::invalid(format!("{name} is {other}: must be 0 or 1"))),
+    }
 }
 
 #[cfg(test)]

@@ -63,11 +63,7 @@ impl sinew_picture_def {
             up: Vec3::from_array(self.up),
             direction: Vec3::from_array(self.direction),
             field_of_view: self.field_of_view,
-            show_contacts: match self.show_contacts {
-                0 => false,
-                1 => true,
-                other => return Err(Error::invalid(format!("show_contacts is {other}: must be 0 or 1"))),
-            },
+            show_contacts: memory::flag("show_contacts", self.show_contacts)?,
         })
     }
 }
@@ -165,9 +161,5 @@ pub unsafe extern "C" fn sinew_world_save_picture_of_values(
 /// # Safety
 /// `def` is NULL or a definition of the size that it states.
 unsafe fn definition(def: *const sinew_picture_def) -> Result<PictureDefinition> {
-    let defaults = sinew_picture_def::defaults();
-    if def.is_null() {
-        return defaults.definition();
-    }
-    memory::definition("def", def, defaults)?.definition()
+    memory::optional_definition("def", def, sinew_picture_def::defaults())?.definition()
 }

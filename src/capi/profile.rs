@@ -85,10 +85,7 @@ impl From<StepProfile> for sinew_profile {
 /// Errors: SINEW_STATUS_UNSUPPORTED on WebAssembly, which has no clock.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_set_profiling(world: *mut sinew_world, enabled: u32) -> sinew_status {
-    with_world_mut(world, |world| match enabled {
-        0 | 1 => world.set_profiling(enabled == 1),
-        _ => Err(Error::invalid(format!("enabled is {enabled}: must be 0 or 1"))),
-    })
+    with_world_mut(world, |world| world.set_profiling(memory::flag("enabled", enabled)?))
 }
 
 /// Writes 1 if steps are profiled, else 0.

@@ -67,17 +67,8 @@ pub unsafe extern "C" fn sinew_body_solve_equilibrium(
     out_report: *mut sinew_equilibrium_report,
 ) -> sinew_status {
     with_world_mut(world, |world| {
-        let defaults = sinew_equilibrium_def::empty();
-        let def = if def.is_null() {
-            defaults
-        } else {
-            memory::definition("def", def, defaults)?
-        };
-        let out = if out_report.is_null() {
-            None
-        } else {
-            Some(memory::report("out_report", out_report)?)
-        };
+        let def = memory::optional_definition("def", def, sinew_equilibrium_def::empty())?;
+        let out = memory::optional_report("out_report", out_report)?;
         let found = world.rest_state(
             body.id(),
             &RestStateDefinition {

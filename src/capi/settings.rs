@@ -4,17 +4,7 @@ use super::body::{sinew_body_id, with_body, with_body_mut};
 use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::base::{Error, Result};
 use crate::def::{BodySettings, Sleep};
-
-/// A flag of the caller's.
-fn flag(name: &str, value: u32) -> Result<bool> {
-    match value {
-        0 => Ok(false),
-        1 => Ok(true),
-        other => Err(Error::invalid(format!("{name} is {other}: must be 0 or 1"))),
-    }
-}
 
 /// Sets the substeps per step and their limit, from the next step on; see sinew_world_def.
 #[unsafe(no_mangle)]
@@ -98,8 +88,8 @@ pub unsafe extern "C" fn sinew_body_set_settings(
             BodySettings {
                 thickness: given.contact_thickness,
                 friction: given.contact_friction,
-                with_bodies: flag("meets_bodies", given.meets_bodies)?,
-                with_itself: flag("meets_itself", given.meets_itself)?,
+                with_bodies: memory::flag("meets_bodies", given.meets_bodies)?,
+                with_itself: memory::flag("meets_itself", given.meets_itself)?,
                 sleep: Sleep {
                     speed: given.sleep_speed,
                     time: given.sleep_time,

@@ -1,9 +1,13 @@
 //! Pins of several nodes at once.
 
+use glam::Vec3;
+
 use super::body::{sinew_body_id, with_body, with_body_mut};
 use super::guard::sinew_world;
 use super::memory;
 use super::status::sinew_status;
+use crate::base::Result;
+use crate::body::Body;
 
 /// Pins `count` nodes at their current positions; see sinew_body_pin.
 #[unsafe(no_mangle)]
@@ -44,15 +48,7 @@ pub unsafe extern "C" fn sinew_body_pin_box(
     max: *const f32,
     out_count: *mut usize,
 ) -> sinew_status {
-    with_body_mut(world, body, |body| {
-        let (low, high) = (memory::vector("min", min)?, memory::vector("max", max)?);
-        let place = memory::optional_output_array("out_count", out_count, 1)?;
-        let count = body.pin_box(low, high)?;
-        if let Some(place) = place {
-            place[0] = count;
-        }
-        Ok(())
-    })
+    change_box(world, body, [min, max], out_count, Body::pin_box)
 }
 
 /// Unpins the pinned nodes in a box, except those of mass 0, and writes how many.
@@ -66,10 +62,24 @@ pub unsafe extern "C" fn sinew_body_unpin_box(
     max: *const f32,
     out_count: *mut usize,
 ) -> sinew_status {
+    change_box(world, body, [min, max], out_count, Body::unpin_box)
+}
+
+/// Changes the pins in a box, and writes how many nodes that is about.
+///
+/// # Safety
+/// As of what calls it.
+unsafe fn change_box(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    [min, max]: [*const f32; 2],
+    out_count: *mut usize,
+    change: impl Fn(&mut Body, Vec3, Vec3) -> Result<usize>,
+) -> sinew_status {
     with_body_mut(world, body, |body| {
         let (low, high) = (memory::vector("min", min)?, memory::vector("max", max)?);
         let place = memory::optional_output_array("out_count", out_count, 1)?;
-        let count = body.unpin_box(low, high)?;
+        let count = change(body, low, high)?;
         if let Some(place) = place {
             place[0] = count;
         }

@@ -77,12 +77,7 @@ pub unsafe extern "C" fn sinew_suture_create(
         let [point, other] = [("point", point), ("other_point", other_point)]
             .map(|(name, point)| memory::definition(name, point, sinew_surface_point::empty()));
         let (point, other) = (point?, other?);
-        let defaults = sinew_suture_def::defaults();
-        let def = if def.is_null() {
-            defaults
-        } else {
-            memory::definition("def", def, defaults)?
-        };
+        let def = memory::optional_definition("def", def, sinew_suture_def::defaults())?;
         let definition = SutureDefinition {
             length: (def.length != -1.0).then_some(def.length),
             stiffness: def.stiffness,

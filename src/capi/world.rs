@@ -151,11 +151,7 @@ impl sinew_world_def {
     /// # Safety
     /// `def` is NULL or points to a definition of the size that it states, whose `run_tasks` is as [`Self::definition`] says.
     pub(super) unsafe fn read_or_default(def: *const Self) -> Result<WorldDefinition> {
-        let mut read = Self::defaults();
-        if !def.is_null() {
-            read = memory::definition("def", def, read)?;
-        }
-        read.definition()
+        memory::optional_definition("def", def, Self::defaults())?.definition()
     }
 
     /// # Safety
@@ -256,8 +252,7 @@ pub(super) unsafe fn step_and_report<Report: Into<sinew_step_report>>(
     mut step: impl FnMut(&mut World) -> Result<Report>,
 ) -> sinew_status {
     with_world_mut(world, |world| {
-        let report = (!report.is_null()).then(|| memory::report("report", report));
-        let report = report.transpose()?;
+        let report = memory::optional_report("report", report)?;
         let result = step(world).map(Into::into);
         let told = match &result {
             Ok(told) => Some(*told),
