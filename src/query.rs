@@ -4,7 +4,7 @@ mod tools;
 
 use glam::{DVec3, Vec3};
 
-use crate::base::{BodyId, Error, Result, ToolId};
+use crate::base::{BodyId, Error, Result, ToolId, ensure};
 use crate::body::Body;
 use crate::def::{CollisionFilter, finite_vector};
 use crate::geometry::Bounds;
@@ -135,9 +135,7 @@ impl World {
         finite_vector("direction", direction)?;
         check_distance(max_distance)?;
         let way = direction.as_dvec3().normalize_or_zero();
-        if way == DVec3::ZERO {
-            return Err(Error::invalid("direction is 0: it points nowhere"));
-        }
+        ensure!(way != DVec3::ZERO, "direction is 0: it points nowhere");
         let start = origin.as_dvec3();
         let mut found: Option<(f64, SurfaceHit)> = None;
         for (id, body) in self.bodies_by_id().filter(|(_, body)| is_met(body)) {

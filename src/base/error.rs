@@ -51,6 +51,16 @@ pub enum Error {
 /// ```
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// Refuses an argument unless this holds, with a message as of `format!`.
+macro_rules! ensure {
+    ($holds:expr, $($message:tt)+) => {
+        if !$holds {
+            return Err($crate::base::Error::invalid(format!($($message)+)));
+        }
+    };
+}
+pub(crate) use ensure;
+
 impl Error {
     /// An [`Error::InvalidArgument`] with this message.
     pub(crate) fn invalid(message: impl Into<String>) -> Self {

@@ -11,6 +11,7 @@ mod step_report;
 pub(crate) mod symbolic_perturbation;
 
 pub(crate) use disjoint_sets::DisjointSets;
+pub(crate) use error::ensure;
 pub use error::{Error, Result};
 pub(crate) use hash::StateHasher;
 pub use ids::{AttachmentId, BladeId, BodyId, ToolId};

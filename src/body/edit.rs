@@ -3,7 +3,7 @@
 use glam::{BVec3, Vec3};
 
 use super::Body;
-use crate::base::{Error, Result, finite, memory, not_negative};
+use crate::base::{Error, Result, ensure, finite, memory, not_negative};
 use crate::def::{Spring, distance, expect_count, finite_vector, finite_vectors};
 use crate::geometry::Bounds;
 use crate::solver::{Changed, GravityKicks, close, make_up_for};
@@ -29,9 +29,7 @@ impl Body {
         expect_count("forces", forces.len(), nodes.len())?;
         for (index, (&node, &force)) in nodes.iter().zip(forces).enumerate() {
             self.check_node(&format_args!("nodes[{index}]"), node)?;
-            if !force.is_finite() {
-                return Err(Error::invalid(format!("forces[{index}] is {force}: must be finite")));
-            }
+            ensure!(force.is_finite(), "forces[{index}] is {force}: must be finite");
         }
         if self.system.applied.is_none() {
             self.system.applied = Some(self.system.zeros()?);
@@ -313,11 +311,10 @@ impl Body {
     /// [`Error::InvalidArgument`]: the pressure is not finite, or the body was made with neither an `enclosed_stiffness` nor a `pressure`.
     pub fn set_pressure(&mut self, pressure: f32) -> Result<()> {
         finite("pressure", pressure)?;
-        if !self.system.forces.set_pressure(pressure) {
-            return Err(Error::invalid(format!(
-                "pressure is {pressure} Pa, and the body was made with neither an enclosed_stiffness nor a pressure"
-            )));
-        }
+        ensure!(
+            self.system.forces.set_pressure(pressure),
+            "pressure is {pressure} Pa, and the body was made with neither an enclosed_stiffness nor a pressure"
+        );
         self.system.changed(Changed::Pressure);
         Ok(())
     }
@@ -387,11 +384,7 @@ impl Body {
     /// The mass of a node that is to move, kg.
     pub(super) fn mass_of_unpinned(&self, node: u32) -> Result<f32> {
         let mass = self.system.masses[self.system.order.own(node) as usize];
-        if mass == 0.0 {
-            return Err(Error::invalid(format!(
-                "node {node} has no mass: it is pinned for good"
-            )));
-        }
+        ensure!(mass != 0.0, "node {node} has no mass: it is pinned for good");
         Ok(mass)
     }
 
@@ -418,11 +411,10 @@ impl Body {
 
     /// Refuses a point that is bound to nodes: nothing holds or pulls it but those.
     pub(super) fn check_not_bound(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
-        if self.is_bound(node) {
-            return Err(Error::invalid(format!(
-                "{name} is {node}: a point of the surface that is bound to nodes, and goes where they go"
-            )));
-        }
+        ensure!(
+            !self.is_bound(node),
+            "{name} is {node}: a point of the surface that is bound to nodes, and goes where they go"
+        );
         Ok(())
     }
 
@@ -430,11 +422,7 @@ impl Body {
     pub(super) fn check_pair(&self, a: u32, b: u32) -> Result<[u32; 2]> {
         self.check_node(&"a", a)?;
         self.check_node(&"b", b)?;
-        if a == b {
-            return Err(Error::invalid(format!(
-                "a and b are both {a}: a spring joins two nodes"
-            )));
-        }
+        ensure!(a != b, "a and b are both {a}: a spring joins two nodes");
         Ok([a, b].map(|node| self.system.order.own(node)))
     }
 }

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::Body;
-use crate::base::{Error, Result, finite, memory};
+use crate::base::{Error, Result, ensure, finite, memory};
 use crate::def::{CollisionFilter, expect_count, finite_vector};
 use crate::geometry::{Bounds, vertex_normals};
 use crate::solver::close;
@@ -51,11 +51,10 @@ impl Body {
         finite_vector("pivot", pivot.unwrap_or_default())?;
         let rotation = rotation.as_dquat();
         let length = rotation.length();
-        if !(length > 0.0 && length.is_finite()) {
-            return Err(Error::invalid(format!(
-                "rotation is {rotation}: must be finite and not zero"
-            )));
-        }
+        ensure!(
+            length > 0.0 && length.is_finite(),
+            "rotation is {rotation}: must be finite and not zero"
+        );
         let rotation = rotation / length;
         let [low, high] = self.bounds().map(|corner| corner.as_dvec3());
         let pivot = pivot.map_or((low + high) * 0.5, |pivot| pivot.as_dvec3());
@@ -87,11 +86,7 @@ impl Body {
         expect_count("impulses", impulses.len(), nodes.len())?;
         for (index, (&node, impulse)) in nodes.iter().zip(impulses).enumerate() {
             self.check_node(&format_args!("nodes[{index}]"), node)?;
-            if !impulse.is_finite() {
-                return Err(Error::invalid(format!(
-                    "impulses[{index}] is {impulse}: must be finite"
-                )));
-            }
+            ensure!(impulse.is_finite(), "impulses[{index}] is {impulse}: must be finite");
         }
         close(&mut self.system);
         for (&node, &impulse) in nodes.iter().zip(impulses) {

@@ -7,7 +7,7 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{sinew_tool_id, write_wrench};
 use crate::base::memory::reserved;
-use crate::base::{AttachmentId, BodyId, Error, Result, ToolId};
+use crate::base::{AttachmentId, BodyId, Error, Result, ToolId, ensure};
 use crate::def::{Anchor, SurfacePoint};
 use crate::world::World;
 
@@ -129,9 +129,7 @@ unsafe fn ends<'a>(
         }
         return memory::array(of_nodes, nodes, count).map(AttachedEnds::Nodes);
     }
-    if !nodes.is_null() {
-        return Err(Error::invalid(format!("{of_nodes} is given beside points")));
-    }
+    ensure!(nodes.is_null(), "{of_nodes} is given beside points");
     let triangles = memory::array(of_triangles, triangles, count)?;
     let weights = memory::array(of_weights, weights.cast::<[f32; 3]>(), count)?;
     let mut points = reserved(count)?;

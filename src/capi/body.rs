@@ -7,7 +7,7 @@ use super::guard::{sinew_world, with_world, with_world_mut};
 use super::id::converts;
 use super::memory;
 use super::status::sinew_status;
-use crate::base::{BodyId, Error, Result};
+use crate::base::{BodyId, Result, ensure};
 use crate::body::Body;
 use crate::def::CollisionFilter;
 
@@ -252,11 +252,10 @@ pub unsafe extern "C" fn sinew_body_pin_axes(
 ) -> sinew_status {
     const AXES: [u32; 3] = [SINEW_AXIS_X, SINEW_AXIS_Y, SINEW_AXIS_Z];
     with_body_mut(world, body, |body| {
-        if axes & !AXES.iter().sum::<u32>() != 0 {
-            return Err(Error::invalid(format!(
-                "axes is {axes}: must be a sum of SINEW_AXIS_X, _Y and _Z"
-            )));
-        }
+        ensure!(
+            axes & !AXES.iter().sum::<u32>() == 0,
+            "axes is {axes}: must be a sum of SINEW_AXIS_X, _Y and _Z"
+        );
         body.pin_axes(node, AXES.map(|axis| axes & axis != 0))
     })
 }

@@ -9,7 +9,7 @@ use super::definition::{
 };
 use super::memory::{self, Versioned};
 use super::tool::{SINEW_DETECTION_EXACT, detection};
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, ensure};
 use crate::def::{
     BodyContact, BodyDefinition, CollisionFilter, ElementLaw, Material, Model, Sleep, Solver, SpringLaw, Storage,
     Tearing, Values, Viscosity, Yielding,
@@ -46,11 +46,10 @@ impl sinew_body_def {
                     ("density", self.density),
                     ("thickness", self.thickness),
                 ] {
-                    if value != 0.0 {
-                        return Err(Error::invalid(format!(
-                            "{name} is {value} while material is SINEW_MATERIAL_NONE: must be 0"
-                        )));
-                    }
+                    ensure!(
+                        value == 0.0,
+                        "{name} is {value} while material is SINEW_MATERIAL_NONE: must be 0"
+                    );
                 }
                 return Ok(None);
             }
@@ -84,12 +83,11 @@ impl sinew_body_def {
                 )));
             }
         };
-        if self.mooney_ratio != 0.0 {
-            return Err(Error::invalid(format!(
-                "mooney_ratio is {} while element_law is not SINEW_ELEMENT_LAW_MOONEY_RIVLIN: must be 0",
-                self.mooney_ratio
-            )));
-        }
+        ensure!(
+            self.mooney_ratio == 0.0,
+            "mooney_ratio is {} while element_law is not SINEW_ELEMENT_LAW_MOONEY_RIVLIN: must be 0",
+            self.mooney_ratio
+        );
         Ok(law)
     }
 

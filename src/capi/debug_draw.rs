@@ -6,7 +6,7 @@ use std::ffi::c_void;
 use super::guard::{guard, sinew_world, with_world};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::base::{Error, Result};
+use crate::base::{Result, ensure};
 use crate::debug_draw::{DebugCanvas, DebugDrawDefinition, Rgba};
 
 /// Points where tools press bodies, and the forces on the tools.
@@ -70,9 +70,7 @@ impl sinew_debug_draw {
 
     fn definition(&self) -> Result<DebugDrawDefinition> {
         let flags = self.flags;
-        if flags & !ALL != 0 {
-            return Err(Error::invalid(format!("flags is {flags}: no sum of SINEW_DRAW_...")));
-        }
+        ensure!(flags & !ALL == 0, "flags is {flags}: no sum of SINEW_DRAW_...");
         let has = |flag: u32| flags & flag != 0;
         Ok(DebugDrawDefinition {
             contacts: has(SINEW_DRAW_CONTACTS),

@@ -9,7 +9,7 @@ use super::overlaps::{DetectorSide, Method, Overlaps, of_body};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
 use crate::base::memory::reserved;
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, ensure};
 use crate::body::Body;
 use crate::def::{Detection, finite_vector};
 use crate::detection::exact::{self, Exact};
@@ -185,11 +185,10 @@ impl sinew_detector_def {
         }
         let image = self.image()?;
         let [a, b] = self.bodies.map(sinew_body_id::id);
-        if a == b {
-            return Err(Error::invalid(
-                "bodies are one and the same: a body is not compared with itself",
-            ));
-        }
+        ensure!(
+            a != b,
+            "bodies are one and the same: a body is not compared with itself"
+        );
         let bodies = [world.body(a)?, world.body(b)?];
         let sides = [self.side(0, bodies[0])?, self.side(1, bodies[1])?];
         if !sides.iter().any(|side| side.was_closed) {
@@ -221,11 +220,10 @@ impl sinew_detector_def {
 
     fn side(&self, side: usize, body: &Body) -> Result<DetectorSide> {
         let thickness = self.thickness[side];
-        if !(thickness >= 0.0 && thickness.is_finite()) {
-            return Err(Error::invalid(format!(
-                "thickness of body {side} is {thickness} m: must be finite and at least 0"
-            )));
-        }
+        ensure!(
+            thickness >= 0.0 && thickness.is_finite(),
+            "thickness of body {side} is {thickness} m: must be finite and at least 0"
+        );
         if thickness != 0.0 && self.detection == SINEW_DETECTION_EXACT {
             return Err(Error::invalid(format!(
                 "thickness of body {side} is {thickness} m while detection is SINEW_DETECTION_EXACT: must be 0"
@@ -252,12 +250,11 @@ impl sinew_detector_def {
             return Ok(None);
         }
         let surface = ClosedSurface::new(body.positions(), body.surface()).map_err(|error| of_body(number, error))?;
-        if surface.triangles() != body.surface() {
-            return Err(Error::invalid(format!(
-                "bodies: body {number} has nodes at the same place or a triangle along a line, which SINEW_DETECTION_EXACT cannot follow \
+        ensure!(
+            surface.triangles() == body.surface(),
+            "bodies: body {number} has nodes at the same place or a triangle along a line, which SINEW_DETECTION_EXACT cannot follow \
                  as they move; SINEW_DETECTION_IMAGE_SPACE can"
-            )));
-        }
+        );
         Ok(Some(crate::base::memory::boxed(Exact::changing(&surface)?)?))
     }
 }

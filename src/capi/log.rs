@@ -9,7 +9,7 @@ use std::ffi::{c_char, c_void};
 use super::guard::guard;
 use super::memory;
 use super::status::sinew_status;
-use crate::base::Error;
+use crate::base::{Error, ensure};
 
 /// No messages.
 pub const SINEW_LOG_OFF: u32 = 0;
@@ -90,9 +90,7 @@ pub(super) fn failed(error: &Error) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_set_log_callback(level: u32, callback: sinew_log, context: *mut c_void) -> sinew_status {
     guard(|| {
-        if level > SINEW_LOG_WARNING {
-            return Err(Error::invalid(format!("level is {level}: no SINEW_LOG_...")));
-        }
+        ensure!(level <= SINEW_LOG_WARNING, "level is {level}: no SINEW_LOG_...");
         let mut place = match CALLBACK.write() {
             Ok(place) => place,
             Err(poisoned) => poisoned.into_inner(),

@@ -22,7 +22,7 @@ pub(crate) use saved::{
     Saved, floats_into, least_of_field, load_count, saved, saved_enum, shape_of_field, shape_of_name, shape_with,
 };
 
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, ensure};
 use crate::simd::ChosenKernel;
 
 /// No text begins so, and none comes through a transfer of text as it was.
@@ -77,9 +77,10 @@ fn checksum(bytes: &[u8]) -> u64 {
 pub(crate) fn opened(bytes: &[u8], shape: u64) -> Result<&[u8]> {
     let size = bytes.len();
     let known = size.min(MAGIC.len());
-    if bytes[..known] != MAGIC[..known] {
-        return Err(Error::invalid("bytes are no world: they begin with something else"));
-    }
+    ensure!(
+        bytes[..known] == MAGIC[..known],
+        "bytes are no world: they begin with something else"
+    );
     if size < HEADER {
         return Err(Error::invalid(format!(
             "size is {size}: bytes of a world have a header of {HEADER}"
@@ -93,12 +94,11 @@ pub(crate) fn opened(bytes: &[u8], shape: u64) -> Result<&[u8]> {
             number(12)
         )));
     }
-    if number(20) != size as u64 {
-        return Err(Error::invalid(format!(
-            "size is {size}: the world in bytes was saved as {}",
-            number(20)
-        )));
-    }
+    ensure!(
+        number(20) == size as u64,
+        "size is {size}: the world in bytes was saved as {}",
+        number(20)
+    );
     if number(CHECKSUM) != checksum(bytes) {
         return Err(Error::invalid(
             "bytes are no world: some have changed since it was saved, as their checksum tells",

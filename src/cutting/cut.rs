@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use super::changes::Changes;
 use super::pieces::Copier;
 use super::surface::CutSurface;
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 
 /// What a blade's edge, a segment, passes over in one step: two triangles, which meet from the start's first point to the end's second.
 ///
@@ -60,24 +60,19 @@ impl Sweep {
         (items, count): (&str, u32),
         nodes_of: impl Fn(u32) -> [u32; N],
     ) -> Result<()> {
-        if positions.len() != node_count as usize {
-            return Err(Error::invalid(format!(
-                "{} positions for {node_count} nodes",
-                positions.len()
-            )));
-        }
+        ensure!(
+            positions.len() == node_count as usize,
+            "{} positions for {node_count} nodes",
+            positions.len()
+        );
         if let Some(end) = self.start.iter().chain(&self.end).find(|end| !end.is_finite()) {
             return Err(Error::invalid(format!("an end of the blade is at {end}")));
         }
         for &item in candidates {
-            if item >= count {
-                return Err(Error::invalid(format!("candidate {item} of {count} {items}")));
-            }
+            ensure!(item < count, "candidate {item} of {count} {items}");
             for node in nodes_of(item) {
                 let place = positions[node as usize];
-                if !place.is_finite() {
-                    return Err(Error::invalid(format!("node {node} is at {place}")));
-                }
+                ensure!(place.is_finite(), "node {node} is at {place}");
             }
         }
         Ok(())

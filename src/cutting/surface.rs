@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use super::divided::{Cell, Divided, NONE, Node, SNAP, Simplex, divided, weighed};
 use super::pieces::piece_count;
 use super::tracked::Tracked;
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 use crate::codec::saved;
 
 /// A triangle that is simulated.
@@ -152,9 +152,10 @@ impl CutSurface {
         if let Some(at) = rest.iter().position(|place| !place.is_finite()) {
             return Err(Error::invalid(format!("rest position {at} is {}", rest[at])));
         }
-        if rest.len().max(cells.len()) >= (NONE / 3) as usize {
-            return Err(Error::invalid("more than 2^32 / 3 nodes or cells"));
-        }
+        ensure!(
+            rest.len().max(cells.len()) < (NONE / 3) as usize,
+            "more than 2^32 / 3 nodes or cells"
+        );
         let mut nodes = memory::reserved(rest.len())?;
         nodes.extend(rest.iter().map(|&rest| Node { rest, first: NONE }));
         let mut vertices = memory::reserved(rest.len())?;
@@ -175,11 +176,7 @@ impl CutSurface {
             }
             let places = corners.map(|node| rest[node as usize].as_dvec3());
             let area = area_of(places);
-            if !(area > 0.0) {
-                return Err(Error::invalid(format!(
-                    "cell {number} of nodes {corners:?} has no area"
-                )));
-            }
+            ensure!(area > 0.0, "cell {number} of nodes {corners:?} has no area");
             let shortest = (0..3)
                 .map(|k| places[k].distance(places[(k + 1) % 3]))
                 .fold(f64::INFINITY, f64::min);
@@ -312,12 +309,11 @@ impl CutSurface {
         let mut ring = Vec::new();
         for (vertex, &count) in counts.iter().enumerate().filter(|&(_, &count)| count > 0) {
             self.ring(vertex as u32, &mut ring)?;
-            if ring.len() != count {
-                return Err(Error::invalid(format!(
-                    "node {vertex} has {count} cells, of which {} hang together by edges",
-                    ring.len()
-                )));
-            }
+            ensure!(
+                ring.len() == count,
+                "node {vertex} has {count} cells, of which {} hang together by edges",
+                ring.len()
+            );
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ use super::SpringLaw;
 use super::Tearing;
 use super::values::{check_values, expect_count, finite_vectors, node_indices};
 use super::{Material, Model, Values, Viscosity, Yielding};
-use crate::base::{Error, Result, finite, memory, not_negative};
+use crate::base::{Error, Result, ensure, finite, memory, not_negative};
 use crate::mesh::Mesh;
 
 /// How a body keeps its springs.
@@ -314,11 +314,10 @@ impl BodyDefinition<'_> {
                     ("rest_lengths", self.rest_lengths.is_some()),
                     ("spring_dampings", matches!(self.spring_dampings, Values::Each(_))),
                 ] {
-                    if given {
-                        return Err(Error::invalid(format!(
-                            "{name} is given while springs is not: there is no order of springs to give it in"
-                        )));
-                    }
+                    ensure!(
+                        !given,
+                        "{name} is given while springs is not: there is no order of springs to give it in"
+                    );
                 }
                 check_values("stiffness", &self.stiffnesses, 0)?;
                 check_values("spring_damping", &self.spring_dampings, 0)?;
@@ -402,21 +401,18 @@ impl BodyDefinition<'_> {
     }
 
     fn check_solver(&self) -> Result<()> {
-        if self.order > 2 {
-            return Err(Error::invalid(format!("order is {}: must be 0, 1 or 2", self.order)));
-        }
+        ensure!(self.order <= 2, "order is {}: must be 0, 1 or 2", self.order);
         if self.accuracy != 0.0 && !(1e-6..=1.0).contains(&self.accuracy) {
             return Err(Error::invalid(format!(
                 "accuracy is {}: must be 0, or from 1e-6 to 1",
                 self.accuracy
             )));
         }
-        if self.iterations > MOST_ITERATIONS {
-            return Err(Error::invalid(format!(
-                "iterations is {}: must be at most {MOST_ITERATIONS}",
-                self.iterations
-            )));
-        }
+        ensure!(
+            self.iterations <= MOST_ITERATIONS,
+            "iterations is {}: must be at most {MOST_ITERATIONS}",
+            self.iterations
+        );
         if !(0.0..=1.0).contains(&self.mass_scaling) {
             return Err(Error::invalid(format!(
                 "mass_scaling is {}: must be from 0 to 1",

@@ -1,6 +1,6 @@
 //! The law of tetrahedra that are elements.
 
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, ensure};
 use crate::codec::saved_enum;
 
 /// The hyperelastic law of tetrahedra that are elements. All have the Young's modulus and Poisson's ratio of the material at small strains.
@@ -57,11 +57,10 @@ impl ElementLaw {
             return Ok(());
         }
         let name = self.name();
-        if !is_of_elements {
-            return Err(Error::invalid(format!(
-                "element_law is {name}, and material is not SINEW_MATERIAL_TETRAHEDRA: there are no elements"
-            )));
-        }
+        ensure!(
+            is_of_elements,
+            "element_law is {name}, and material is not SINEW_MATERIAL_TETRAHEDRA: there are no elements"
+        );
         match refused.into_iter().find(|(_, value)| *value != 0.0) {
             None => Ok(()),
             Some((other, value)) => Err(Error::invalid(format!(

@@ -1,7 +1,7 @@
 //! A material by a laboratory's numbers.
 
 use super::{BodyDefinition, Values};
-use crate::base::{Error, Result, above_zero, not_negative};
+use crate::base::{Error, Result, above_zero, ensure, not_negative};
 
 /// How a material's numbers become forces.
 ///
@@ -106,33 +106,30 @@ impl Material {
 /// There are tetrahedra, and Poisson's ratio is one that they can have.
 fn check_tetrahedra(material: &Material, definition: &BodyDefinition) -> Result<()> {
     const HIGHEST: f32 = 0.49;
-    if definition.tetrahedra.is_empty() {
-        return Err(Error::invalid(
-            "material is of tetrahedra, and the body has none: tetrahedron_count is 0",
-        ));
-    }
+    ensure!(
+        !definition.tetrahedra.is_empty(),
+        "material is of tetrahedra, and the body has none: tetrahedron_count is 0"
+    );
     if definition.volume_stiffness > 0.0 {
         return Err(Error::invalid(format!(
             "volume_stiffness is {} Pa beside a material of tetrahedra, which keeps volume by itself: must be 0",
             definition.volume_stiffness
         )));
     }
-    if !(0.0..=HIGHEST).contains(&material.poisson_ratio) {
-        return Err(Error::invalid(format!(
-            "poisson_ratio is {}: must be from 0 to {HIGHEST}",
-            material.poisson_ratio
-        )));
-    }
+    ensure!(
+        (0.0..=HIGHEST).contains(&material.poisson_ratio),
+        "poisson_ratio is {}: must be from 0 to {HIGHEST}",
+        material.poisson_ratio
+    );
     Ok(())
 }
 
 /// Springs come from the material alone.
 fn check_springs(definition: &BodyDefinition) -> Result<()> {
-    if definition.springs.is_some() {
-        return Err(Error::invalid(
-            "springs is given beside a material, which makes springs of the elements",
-        ));
-    }
+    ensure!(
+        definition.springs.is_none(),
+        "springs is given beside a material, which makes springs of the elements"
+    );
     match definition.stiffnesses {
         Values::Uniform(stiffness) if stiffness != 0.0 => Err(Error::invalid(format!(
             "stiffness is {stiffness}: must be 0 beside a material, which gives each spring its own"

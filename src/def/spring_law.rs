@@ -1,6 +1,6 @@
 //! How springs stiffen as they are stretched.
 
-use crate::base::{Error, Result, above_zero};
+use crate::base::{Error, Result, above_zero, ensure};
 use crate::codec::saved_enum;
 
 /// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
@@ -72,12 +72,11 @@ impl SpringLaw {
                 limit,
             } => {
                 above_zero("limit of spring_law", limit)?;
-                if !(quadratic * quadratic <= 3.0 * cubic && cubic.is_finite()) {
-                    return Err(Error::invalid(format!(
-                        "quadratic of spring_law is {quadratic} and cubic {cubic}: quadratic² must be at most 3 cubic, and finite, \
+                ensure!(
+                    quadratic * quadratic <= 3.0 * cubic && cubic.is_finite(),
+                    "quadratic of spring_law is {quadratic} and cubic {cubic}: quadratic² must be at most 3 cubic, and finite, \
                          or longer springs would pull less"
-                    )));
-                }
+                );
                 Ok(())
             }
         }

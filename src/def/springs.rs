@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::BodyDefinition;
-use crate::base::{Error, Result, memory};
+use crate::base::{Result, ensure, memory};
 
 /// A spring between two nodes, checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,11 +65,10 @@ impl BodyDefinition<'_> {
                 Some(lengths) => lengths[index],
                 None => distance(rest[nodes[0] as usize], rest[nodes[1] as usize]),
             };
-            if !rest_length.is_finite() {
-                return Err(Error::invalid(format!(
-                    "springs[{index}] would be {rest_length} m long: positions lie too far apart"
-                )));
-            }
+            ensure!(
+                rest_length.is_finite(),
+                "springs[{index}] would be {rest_length} m long: positions lie too far apart"
+            );
             springs.push(Spring {
                 nodes,
                 stiffness: self.stiffnesses.get(index),

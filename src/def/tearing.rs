@@ -2,7 +2,7 @@
 
 use super::BodyDefinition;
 use super::Model;
-use crate::base::{Error, Result, not_negative};
+use crate::base::{Error, Result, ensure, not_negative};
 use crate::codec::{saved, saved_enum};
 
 /// When a body tears.
@@ -108,11 +108,10 @@ impl Tearing {
             return Ok(());
         }
         let most = self.most_per_step;
-        if definition.spare_nodes == 0 {
-            return Err(Error::invalid(format!(
-                "most_tears is {most}, and spare_nodes is 0: a tear needs nodes to come"
-            )));
-        }
+        ensure!(
+            definition.spare_nodes != 0,
+            "most_tears is {most}, and spare_nodes is 0: a tear needs nodes to come"
+        );
         if !definition.cells.is_empty() {
             return Err(Error::Unsupported(format!(
                 "most_tears is {most}: bodies with cells do not tear"

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::base::{Error, Result, not_negative};
+use crate::base::{Error, Result, ensure, not_negative};
 
 /// One value for all, or one for each.
 ///
@@ -107,11 +107,10 @@ fn plural(name: &str) -> String {
 pub(crate) fn node_indices<const N: usize>(name: &str, elements: &[[u32; N]], nodes: usize) -> Result<()> {
     for (index, element) in elements.iter().enumerate() {
         for (corner, &node) in element.iter().enumerate() {
-            if node as usize >= nodes {
-                return Err(Error::invalid(format!(
-                    "{name}[{index}] names node {node}: there are {nodes} nodes"
-                )));
-            }
+            ensure!(
+                (node as usize) < nodes,
+                "{name}[{index}] names node {node}: there are {nodes} nodes"
+            );
             if element[..corner].contains(&node) {
                 return Err(Error::invalid(format!("{name}[{index}] names node {node} twice")));
             }

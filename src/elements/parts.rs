@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::cut::{PieceOfElement, TetrahedronPlace};
 use super::law::{Deformed, Law, Rest};
 use super::tetrahedra::{GROUP, Group, TetrahedronGroups};
-use crate::base::{Error, Result, memory};
+use crate::base::{Result, ensure, memory};
 use crate::codec::saved;
 use crate::simd::Record;
 use crate::soa::{TILE, tile_count};
@@ -86,11 +86,10 @@ impl FemPart {
             let at_rest = Rest::of(DMat3::from_cols(b - a, c - a, d - a));
             let entries = upper_entries(at_rest.inverse);
             let volume = at_rest.volume as f32;
-            if !(volume > 0.0 && entries.iter().all(|entry| entry.is_finite())) {
-                return Err(Error::invalid(format!(
-                    "tetrahedra[{index}] has a volume of {volume} m³ at rest: must be above 0"
-                )));
-            }
+            ensure!(
+                volume > 0.0 && entries.iter().all(|entry| entry.is_finite()),
+                "tetrahedra[{index}] has a volume of {volume} m³ at rest: must be above 0"
+            );
             for (to, node) in group.corners.iter_mut().zip(corners) {
                 to[lane] = 2 * nodes.partition_point(|&other| other < node) as u16;
             }

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::Elements;
 use super::parts::{FemPart, PART};
 use super::tetrahedra::{GROUP, Group};
-use crate::base::{Error, Result};
+use crate::base::{Result, ensure};
 use crate::soa::{Region, Scale};
 
 /// Which nodes of a part are in a region: a bit each, of which tetrahedra have four at most.
@@ -82,11 +82,10 @@ impl Elements {
                     let [xx, _, _, yy, _, zz] = inverse;
                     let has_edges = xx != 0.0 && yy != 0.0 && zz != 0.0;
                     let is_finite = volume.is_finite() && inverse.iter().all(|entry| entry.is_finite());
-                    if !(has_volume && has_edges && is_finite) {
-                        return Err(Error::invalid(format!(
-                            "a tetrahedron would have a volume times its stiffness_factor of {volume} m³ at rest: too little or too much"
-                        )));
-                    }
+                    ensure!(
+                        has_volume && has_edges && is_finite,
+                        "a tetrahedron would have a volume times its stiffness_factor of {volume} m³ at rest: too little or too much"
+                    );
                 }
             }
         }

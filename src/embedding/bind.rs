@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::base::{Error, Result, memory};
+use crate::base::{Result, ensure, memory};
 use crate::cutting::{CutSolid, CutSurface};
 use crate::geometry::Bounds;
 use crate::geometry::nearest::nearest_on_triangle;
@@ -44,9 +44,10 @@ impl Binding {
             (0..tetrahedra.len() as u32)
                 .map(|place| PlacedTetrahedron::of(corners(place).map(|corner| corner.as_dvec3()))),
         );
-        if !solids.iter().any(PlacedTetrahedron::has_volume) {
-            return Err(Error::invalid("tetrahedra: none of them has a volume"));
-        }
+        ensure!(
+            solids.iter().any(PlacedTetrahedron::has_volume),
+            "tetrahedra: none of them has a volume"
+        );
         // The box of these three corners is that of the tetrahedron.
         let tree = Tree::new(tetrahedra.len(), |place| {
             let bounds = Bounds::of(corners(place).into_iter());
@@ -130,11 +131,10 @@ impl Binding {
 
     /// Each vertex to the nearest triangle.
     pub fn to_triangles(vertices: &[Vec3], positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
-        if triangles.is_empty() {
-            return Err(Error::invalid(
-                "tetrahedra are 0, and nothing is drawn of the body: there is nothing to bind to",
-            ));
-        }
+        ensure!(
+            !triangles.is_empty(),
+            "tetrahedra are 0, and nothing is drawn of the body: there is nothing to bind to"
+        );
         let homes = nearest_triangles(vertices, positions, triangles)?;
         let mut bound = memory::reserved(vertices.len())?;
         bound.extend(vertices.iter().zip(homes).map(|(vertex, home)| {

@@ -6,7 +6,7 @@ mod read;
 
 use glam::Vec3;
 
-use crate::base::{BodyId, Error, Result, memory};
+use crate::base::{BodyId, Error, Result, ensure, memory};
 use crate::body::Body;
 use crate::cutting::CutMaterial;
 use crate::def::{BodyDefinition, Values};
@@ -173,13 +173,12 @@ impl Embedding {
     /// # Errors
     /// [`Error::InvalidArgument`]: there are not as many positions as the body had nodes at the last [`update`](Self::update), which follows its cuts.
     pub fn update_from(&mut self, positions: &[Vec3]) -> Result<()> {
-        if positions.len() != self.node_count {
-            return Err(Error::invalid(format!(
-                "{} positions are given: the embedding knows of {} nodes",
-                positions.len(),
-                self.node_count
-            )));
-        }
+        ensure!(
+            positions.len() == self.node_count,
+            "{} positions are given: the embedding knows of {} nodes",
+            positions.len(),
+            self.node_count
+        );
         self.binding.read(positions, &mut self.positions);
         self.are_normals_new = false;
         Ok(())
@@ -308,9 +307,7 @@ fn check(definition: &EmbeddingDefinition, node_count: usize) -> Result<()> {
         triangles,
         tetrahedra,
     } = definition;
-    if vertices.is_empty() {
-        return Err(Error::invalid("vertices are 0: there is nothing to bind"));
-    }
+    ensure!(!vertices.is_empty(), "vertices are 0: there is nothing to bind");
     if u32::try_from(vertices.len()).is_err() {
         return Err(Error::invalid(format!(
             "{} vertices: too many to count",

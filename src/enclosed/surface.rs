@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::Cavity;
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 use crate::codec::saved;
 use crate::def::BodyDefinition;
 use crate::soa::{NodeOrder, TILE, tile_count};
@@ -64,11 +64,10 @@ pub(super) fn close(
     order: &NodeOrder,
 ) -> Result<(CavitySurface, Vec<Cavity>)> {
     let (name, value) = asked(definition);
-    if triangles.is_empty() {
-        return Err(Error::invalid(format!(
-            "{name} is {value} Pa, and the body has no surface: no triangles, tetrahedra or cells"
-        )));
-    }
+    ensure!(
+        !triangles.is_empty(),
+        "{name} is {value} Pa, and the body has no surface: no triangles, tetrahedra or cells"
+    );
     let walls = walls((name, value), triangles)?;
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let mut order_of_walls: Vec<u32> = memory::reserved(triangles.len())?;
@@ -96,12 +95,11 @@ pub(super) fn close(
     let mut has_inner = false;
     for wall in order_of_walls.chunk_by(same_wall) {
         let (volume, area) = volume_of(wall);
-        if !(volume.abs() > FLAT * area * area.sqrt()) {
-            return Err(Error::invalid(format!(
-                "{name} is {value} Pa, and the closed surface of node {} encloses {volume:e} m³ at rest: it is flat",
-                triangles[wall[0] as usize][0]
-            )));
-        }
+        ensure!(
+            volume.abs() > FLAT * area * area.sqrt(),
+            "{name} is {value} Pa, and the closed surface of node {} encloses {volume:e} m³ at rest: it is flat",
+            triangles[wall[0] as usize][0]
+        );
         has_inner |= volume < 0.0;
     }
     let mut made = CavitySurface {

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, ensure};
 use crate::def::{BodyDefinition, Rounding};
 use crate::mesh::{CELL_DIAGONALS, CELL_EDGES, cell_volume, tetrahedron_volume};
 
@@ -48,21 +48,19 @@ impl<'a> Filled<'a> {
             }
             (_, [], cells @ [_, ..]) => Self::Cells(cells, common_edge(cells, rest, definition.rounding())?),
             (triangles, [], []) => {
-                if thickness == 0.0 {
-                    return Err(Error::invalid(
-                        "thickness is 0 m: must be above 0 where a material fills triangles",
-                    ));
-                }
+                ensure!(
+                    thickness != 0.0,
+                    "thickness is 0 m: must be above 0 where a material fills triangles"
+                );
                 check_each("triangles", triangles, rest, &triangle_height)?;
                 return Ok(Self::Triangles(triangles, f64::from(thickness)));
             }
         };
-        if thickness != 0.0 {
-            return Err(Error::invalid(format!(
-                "thickness is {thickness} m: must be 0 where a material fills {}",
-                elements.name()
-            )));
-        }
+        ensure!(
+            thickness == 0.0,
+            "thickness is {thickness} m: must be 0 where a material fills {}",
+            elements.name()
+        );
         Ok(elements)
     }
 

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::filled::{Filled, corners, triangle_area};
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 use crate::def::BodyDefinition;
 use crate::mesh::{
     CELL_DIAGONALS, CELL_EDGES, TETRAHEDRON_EDGES, TRIANGLE_EDGES, element_edges, pack, tetrahedron_volume, unpack,
@@ -84,14 +84,13 @@ fn shares(elements: &Filled, young_modulus: f64, definition: &BodyDefinition) ->
 /// Refuses triangles with an edge that no spring joins: beside other elements they are surface, and nothing would hold it.
 fn check_surface(springs: &[[u32; 2]], elements: &Filled, definition: &BodyDefinition) -> Result<()> {
     for edge in element_edges(definition.triangles, &[], &[])? {
-        if springs.binary_search(&edge).is_err() {
-            return Err(Error::invalid(format!(
-                "triangles join nodes {} and {}, which no element of the material does: beside {} they are its surface",
-                edge[0],
-                edge[1],
-                elements.name()
-            )));
-        }
+        ensure!(
+            springs.binary_search(&edge).is_ok(),
+            "triangles join nodes {} and {}, which no element of the material does: beside {} they are its surface",
+            edge[0],
+            edge[1],
+            elements.name()
+        );
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{check_indices, tetrahedron_volume};
-use crate::base::{DisjointSets, memory};
+use crate::base::{DisjointSets, ensure, memory};
 use crate::geometry::Bounds;
 use crate::geometry::predicates::{crosses, solid_angle};
 use crate::geometry::tree::Tree;
@@ -58,17 +58,14 @@ impl ClosedSurface {
     /// part of; an edge is not gone along as often in one direction as in the other, so that the surface is open; the surface, or a part of
     /// it, is inside out; two triangles pass through each other, by more than 1e-6 of the largest coordinate. [`Error::OutOfMemory`].
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
-        if triangles.is_empty() {
-            return Err(Error::invalid("no triangles: they enclose nothing"));
-        }
+        ensure!(!triangles.is_empty(), "no triangles: they enclose nothing");
         check_indices("triangle", triangles, positions.len())?;
-        if triangles.len() > (u32::MAX / 4) as usize {
-            return Err(Error::invalid(format!(
-                "{} triangles: at most {} are possible",
-                triangles.len(),
-                u32::MAX / 4
-            )));
-        }
+        ensure!(
+            triangles.len() <= (u32::MAX / 4) as usize,
+            "{} triangles: at most {} are possible",
+            triangles.len(),
+            u32::MAX / 4
+        );
         let near = |position: &Vec3| position.abs().max_element() <= FURTHEST && position.is_finite();
         if let Some(node) = positions.iter().position(|position| !near(position)) {
             return Err(Error::invalid(format!(

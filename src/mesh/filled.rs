@@ -5,7 +5,7 @@ use glam::{DVec3, IVec3};
 use super::hinges::remove_hinges;
 use super::stuffing::{Lattice, Site, Stuffing};
 use super::{ClosedSurface, Mesh, boundary, tetrahedron_volume, tidy};
-use crate::base::memory;
+use crate::base::{ensure, memory};
 use crate::geometry::Bounds;
 use crate::geometry::predicates::pierce;
 use crate::geometry::tree::Tree;
@@ -25,19 +25,16 @@ impl Mesh {
     /// [`Error::InvalidArgument`]: a position is not finite, an index that of no node, the surface open, inside out or without a volume; the
     /// spacing not finite and above 0, so fine that `u32` cannot count the nodes, or so coarse that nothing is filled. [`Error::OutOfMemory`].
     pub fn filled(surface: &Mesh, spacing: f32) -> Result<Mesh> {
-        if !(spacing.is_normal() && spacing > 0.0) {
-            return Err(Error::invalid(format!(
-                "spacing is {spacing} m: it must be finite and above 0"
-            )));
-        }
+        ensure!(
+            spacing.is_normal() && spacing > 0.0,
+            "spacing is {spacing} m: it must be finite and above 0"
+        );
         let given = Mesh {
             positions: memory::copied(&surface.positions)?,
             triangles: memory::copied(&surface.triangles)?,
             ..Mesh::default()
         };
-        if given.triangles.is_empty() {
-            return Err(Error::invalid("no triangles: they enclose nothing"));
-        }
+        ensure!(!given.triangles.is_empty(), "no triangles: they enclose nothing");
         let tidied = tidy(&given)?.mesh;
         let surface = ClosedSurface::loose(tidied.positions, tidied.triangles)?;
         let filling = Filling::new(&surface)?;
@@ -63,11 +60,10 @@ impl Mesh {
             tetrahedron_volume(corners) > 0.0
         });
         remove_hinges(tetrahedra, positions.len())?;
-        if mesh.tetrahedra.is_empty() {
-            return Err(Error::invalid(format!(
-                "spacing is {spacing} m: too coarse for anything of the surface to be filled"
-            )));
-        }
+        ensure!(
+            !mesh.tetrahedra.is_empty(),
+            "spacing is {spacing} m: too coarse for anything of the surface to be filled"
+        );
         let mut mesh = tidy(&mesh)?.mesh;
         mesh.triangles = boundary(&mesh.tetrahedra)?;
         Ok(mesh)

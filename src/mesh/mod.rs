@@ -15,7 +15,7 @@ mod topology;
 
 use glam::{DVec3, Vec3};
 
-use crate::base::memory;
+use crate::base::{ensure, memory};
 use crate::{Error, Result};
 
 pub use closed::ClosedSurface;
@@ -56,11 +56,10 @@ impl Mesh {
     pub fn check(&self) -> Result<()> {
         let node_count = self.positions.len();
         // The last index is kept for "no node".
-        if node_count > NO_NODE as usize {
-            return Err(Error::invalid(format!(
-                "{node_count} nodes: at most {NO_NODE} are possible"
-            )));
-        }
+        ensure!(
+            node_count <= NO_NODE as usize,
+            "{node_count} nodes: at most {NO_NODE} are possible"
+        );
         if let Some(node) = self.positions.iter().position(|p| !p.is_finite()) {
             let position = self.positions[node];
             return Err(Error::invalid(format!("the position of node {node} is {position}")));

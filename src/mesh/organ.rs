@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::stuffing::{Lattice, Stuffing};
 use super::{Mesh, boundary, is_closed, tetrahedron_volume};
-use crate::base::memory;
+use crate::base::{ensure, memory};
 use crate::{Error, Result};
 
 /// The largest spacing, in lengths of the organ: coarser, its thin lobe is lost.
@@ -23,11 +23,10 @@ impl Mesh {
     /// show the shape, or one so fine that `u32` cannot count the nodes; [`Error::OutOfMemory`].
     pub fn organ(length: f32, spacing: f32) -> Result<Mesh> {
         for (name, value) in [("length", length), ("spacing", spacing)] {
-            if !(value.is_normal() && value > 0.0) {
-                return Err(Error::invalid(format!(
-                    "{name} is {value} m: it must be finite and above 0"
-                )));
-            }
+            ensure!(
+                value.is_normal() && value > 0.0,
+                "{name} is {value} m: it must be finite and above 0"
+            );
         }
         let relative = f64::from(spacing) / f64::from(length);
         if relative > COARSEST {

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::tidy::NO_NODE;
 use super::{Mesh, boundary, cell_boundary};
-use crate::base::{above_zero, memory};
+use crate::base::{above_zero, ensure, memory};
 use crate::{Error, Result};
 
 /// The tetrahedra of a cell, by its corners x + 2 y + 4 z: one in the middle and four at its corners. Cells that share a
@@ -120,21 +120,16 @@ fn cells_of_grid([nx, ny, nz]: [u32; 3]) -> impl Iterator<Item = ([u32; 3], [u32
 fn check_node_count(cells: &[u32]) -> Result<()> {
     let nodes = cells.iter().map(|&count| u128::from(count) + 1);
     let node_count: u128 = nodes.product();
-    if node_count > u128::from(NO_NODE) {
-        return Err(Error::invalid(format!(
-            "cells {cells:?}: {node_count} nodes, at most {NO_NODE} are possible"
-        )));
-    }
+    ensure!(
+        node_count <= u128::from(NO_NODE),
+        "cells {cells:?}: {node_count} nodes, at most {NO_NODE} are possible"
+    );
     Ok(())
 }
 
 /// The places of a grid's nodes along one axis, about 0.
 fn axis(name: &str, size: f64, cells: u32) -> Result<Vec<f32>> {
-    if cells == 0 {
-        return Err(Error::invalid(format!(
-            "cells along {name} is 0: there must be at least 1"
-        )));
-    }
+    ensure!(cells != 0, "cells along {name} is 0: there must be at least 1");
     above_zero(&format!("size along {name}"), size as f32)?;
     let coincide = || {
         Error::invalid(format!(

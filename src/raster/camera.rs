@@ -1,6 +1,7 @@
 //! Where a picture is taken from.
 
 use super::view::{View, axes};
+use crate::base::ensure;
 use crate::{Error, Result};
 use glam::{DVec3, Vec3};
 
@@ -56,9 +57,7 @@ impl Camera {
         check_direction("direction", direction)?;
         check_direction("up", up)?;
         check_angle(field_of_view)?;
-        if !(aspect > 0.0 && aspect.is_finite()) {
-            return Err(Error::invalid(format!("aspect is {aspect}, not above 0")));
-        }
+        ensure!(aspect > 0.0 && aspect.is_finite(), "aspect is {aspect}, not above 0");
         let direction = if direction.as_dvec3().length_squared() > 0.0 {
             direction
         } else {
@@ -117,9 +116,7 @@ impl Camera {
         check_angle(self.field_of_view)?;
         let forward = self.target.as_dvec3() - self.eye.as_dvec3();
         let distance = forward.length();
-        if distance == 0.0 {
-            return Err(Error::invalid("the camera's eye is at its target"));
-        }
+        ensure!(distance != 0.0, "the camera's eye is at its target");
         let focal_length = f64::from(height) / 2.0 / f64::from(self.field_of_view / 2.0).tan();
         Ok(View::perspective(
             self.eye,

@@ -5,7 +5,7 @@
 
 use glam::{Mat3, Vec3};
 
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, ensure};
 
 /// Which colours numbers have.
 ///
@@ -105,11 +105,10 @@ impl Coloured<'_> {
     /// Refuses what cannot be drawn.
     pub(super) fn check(&self, count: usize) -> Result<()> {
         let ColourScale { low, high, .. } = self.scale;
-        if !(low < high && low.is_finite() && high.is_finite()) {
-            return Err(Error::invalid(format!(
-                "low is {low} and high {high}: low must be below high, and both finite"
-            )));
-        }
+        ensure!(
+            low < high && low.is_finite() && high.is_finite(),
+            "low is {low} and high {high}: low must be below high, and both finite"
+        );
         if self.values.len() != count {
             let given = self.values.len();
             return Err(Error::invalid(format!("values has {given} entries: must have {count}")));

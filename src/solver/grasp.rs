@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 
 use super::closing::close;
 use super::{Changed, System};
-use crate::base::{Error, Result, SlotId, StateHasher, memory};
+use crate::base::{Error, Result, SlotId, StateHasher, ensure, memory};
 use crate::codec::saved;
 use crate::contact::{Frame, ToolPath};
 use crate::nodes::{Pin, Pins};
@@ -310,9 +310,10 @@ impl System {
 
     /// Refuses a node that a tool holds.
     pub(crate) fn check_not_held(&self, name: &dyn Display, node: u32) -> Result<()> {
-        if self.is_held_by_tool(self.order.own(node)) {
-            return Err(Error::invalid(format!("{name} is {node}: a tool holds it")));
-        }
+        ensure!(
+            !self.is_held_by_tool(self.order.own(node)),
+            "{name} is {node}: a tool holds it"
+        );
         Ok(())
     }
 

@@ -20,7 +20,7 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::parting::Parting;
 use super::stencils::{SeePart, Stencil, StencilLaw, Stencils};
-use crate::base::{Error, Result, memory, not_negative};
+use crate::base::{Error, Result, ensure, memory, not_negative};
 use crate::codec::saved;
 use crate::def::BodyDefinition;
 use crate::soa::NodeOrder;
@@ -52,11 +52,10 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
     if rigidity == 0.0 {
         return Ok(None);
     }
-    if definition.triangles.is_empty() {
-        return Err(Error::invalid(format!(
-            "bending_stiffness is {rigidity} while the body has no triangles: there is no surface to bend"
-        )));
-    }
+    ensure!(
+        !definition.triangles.is_empty(),
+        "bending_stiffness is {rigidity} while the body has no triangles: there is no surface to bend"
+    );
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let at = |node: u32| rest[node as usize].as_dvec3();
     let mut hinges = memory::reserved(definition.triangles.len() * 3 / 2)?;
@@ -73,12 +72,12 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
             )));
         };
         let nodes = [a.edge[0], a.edge[1], a.opposite, b.opposite];
-        if a.opposite == b.opposite {
-            return Err(Error::invalid(format!(
-                "triangles[{}] and triangles[{}] have the same corners: bending_stiffness needs each once",
-                a.triangle, b.triangle
-            )));
-        }
+        ensure!(
+            a.opposite != b.opposite,
+            "triangles[{}] and triangles[{}] have the same corners: bending_stiffness needs each once",
+            a.triangle,
+            b.triangle
+        );
         let reach = nodes.map(|node| rest[node as usize].abs().max_element());
         let reach = reach.into_iter().fold(0.0, f32::max);
         let Some((shape, stiffness)) = HingeShape::of(nodes.map(at), f64::from(reach)) else {

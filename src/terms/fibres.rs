@@ -11,7 +11,7 @@ use super::Term;
 use super::parting::Parting;
 use super::stencils::{SeePart, Stencil, StencilLaw, Stencils, directed, lengthening, shares, weighted};
 use super::strings::Tension;
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, check_values, expect_count};
 use crate::soa::NodeOrder;
@@ -30,16 +30,16 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
     let tetrahedra = definition.tetrahedra;
     if directions.is_empty() {
         check_values("fibre_stiffness", stiffnesses, 0)?;
-        if !stiffnesses.all_zero() {
-            return Err(Error::invalid("fibre_stiffness is given while fibre_directions is not"));
-        }
+        ensure!(
+            stiffnesses.all_zero(),
+            "fibre_stiffness is given while fibre_directions is not"
+        );
         return Ok(None);
     }
-    if tetrahedra.is_empty() {
-        return Err(Error::invalid(
-            "fibre_directions is given while the body has no tetrahedra: fibres lie in tetrahedra",
-        ));
-    }
+    ensure!(
+        !tetrahedra.is_empty(),
+        "fibre_directions is given while the body has no tetrahedra: fibres lie in tetrahedra"
+    );
     expect_count("fibre_directions", directions.len(), tetrahedra.len())?;
     check_values("fibre_stiffness", stiffnesses, tetrahedra.len())?;
     let rest = definition.rest_positions.unwrap_or(definition.positions);
@@ -60,11 +60,10 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
         let volume = edges.determinant().abs() / 6.0;
         let weights = (edges.inverse() * direction.as_dvec3().normalize()).as_vec3();
         let stiffness = (stiffness * volume) as f32;
-        if !(volume > 0.0 && weights.length_squared().is_finite() && stiffness.is_finite()) {
-            return Err(Error::invalid(format!(
-                "tetrahedra[{index}] has a volume of {volume} m³ at rest: too little, or too much, for a fibre"
-            )));
-        }
+        ensure!(
+            volume > 0.0 && weights.length_squared().is_finite() && stiffness.is_finite(),
+            "tetrahedra[{index}] has a volume of {volume} m³ at rest: too little, or too much, for a fibre"
+        );
         fibres.push(Stencil {
             nodes: corners.map(|corner| order.own(corner)),
             stiffness,

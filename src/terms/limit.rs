@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::stencils::{StencilLaw, Stencils, directed, lengthening, of_springs};
 use super::strings::Tension;
-use crate::base::{Error, Result, not_negative};
+use crate::base::{Error, Result, ensure, not_negative};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, Spring};
 use crate::soa::NodeOrder;
@@ -32,11 +32,10 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
     if strain == 0.0 {
         return Ok(None);
     }
-    if !(stiffening > 0.0 && stiffening <= STIFFEST) {
-        return Err(Error::invalid(format!(
-            "limit_stiffening is {stiffening}: must be above 0, and at most {STIFFEST}"
-        )));
-    }
+    ensure!(
+        stiffening > 0.0 && stiffening <= STIFFEST,
+        "limit_stiffening is {stiffening}: must be above 0, and at most {STIFFEST}"
+    );
     if springs.is_empty() {
         return Err(Error::invalid(format!(
             "strain_limit is {strain} while the body has no springs"

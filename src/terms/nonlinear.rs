@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::stencils::{StencilLaw, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
-use crate::base::{Error, Result};
+use crate::base::{Result, ensure};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, Spring, SpringLaw};
 use crate::soa::NodeOrder;
@@ -169,9 +169,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
     if law == SpringLaw::Linear {
         return Ok(None);
     }
-    if springs.is_empty() {
-        return Err(Error::invalid("spring_law is given while the body has no springs"));
-    }
+    ensure!(!springs.is_empty(), "spring_law is given while the body has no springs");
     let stiffest = law.stiffest();
     let stiffening = of_springs(springs, order, true, |rest_length| rest_length)?;
     let law = Stiffening {

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 use super::stencils::{StencilLaw, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use super::{Event, Term};
-use crate::base::{Error, Result, StateHasher};
+use crate::base::{Result, StateHasher, ensure};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, RelaxationStep, Spring, SpringLaw, Yielding};
 use crate::soa::NodeOrder;
@@ -40,11 +40,10 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
     if definition.yielding.is_none() || springs.is_empty() {
         return Ok(None);
     }
-    if definition.spring_law != SpringLaw::Linear {
-        return Err(Error::invalid(format!(
-            "yield_strain is {strain} while spring_law is not linear: only linear springs yield"
-        )));
-    }
+    ensure!(
+        definition.spring_law == SpringLaw::Linear,
+        "yield_strain is {strain} while spring_law is not linear: only linear springs yield"
+    );
     let sets = of_springs(springs, order, true, |rest_length| Set {
         rest_length,
         longer: 0.0,

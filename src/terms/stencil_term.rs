@@ -9,7 +9,7 @@ use super::parting::Parting;
 use super::stencils::{Stencil, StencilLaw, Stencils, tile_of};
 use super::strings::Aging;
 use super::{Event, TangentBlocks, Term};
-use crate::base::{Error, Result, StateHasher, memory};
+use crate::base::{Result, StateHasher, ensure, memory};
 use crate::codec::{Saved, Writer};
 use crate::def::RelaxationStep;
 use crate::simd::ChosenKernel;
@@ -290,12 +290,12 @@ impl<L: StencilLaw<N>, const N: usize> Term for Stencils<L, N> {
     fn check_scale(&self, region: &Region, scale: Scale) -> Result<()> {
         for index in self.within(region) {
             let Stencil { stiffness, shape, .. } = self.scaled(index, scale);
-            if !(stiffness.is_finite() && self.law.is_finite(&shape)) {
-                return Err(Error::invalid(format!(
-                    "stiffness_factor is {} and length_factor {}: a stiffness of {stiffness}, or a length, would be too much or too little",
-                    scale.stiffness, scale.length
-                )));
-            }
+            ensure!(
+                stiffness.is_finite() && self.law.is_finite(&shape),
+                "stiffness_factor is {} and length_factor {}: a stiffness of {stiffness}, or a length, would be too much or too little",
+                scale.stiffness,
+                scale.length
+            );
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{World, make_walks};
-use crate::base::{AttachmentId, BodyId, Error, Result, ToolId, memory};
+use crate::base::{AttachmentId, BodyId, Error, Result, ToolId, ensure, memory};
 use crate::codec::{saved, saved_enum};
 use crate::def::{Anchor, SurfacePoint};
 use crate::solver::Grip;
@@ -318,11 +318,10 @@ impl World {
     /// Refuses a body that is attached to a body.
     pub(super) fn check_not_attached(&self, body: BodyId) -> Result<()> {
         let place = self.bodies.place(body.0)?;
-        if self.tissue.as_ref().is_some_and(|tissue| tissue.bonds.concern(place)) {
-            return Err(Error::invalid(
-                "body is attached to a body: what holds it there moves with that one",
-            ));
-        }
+        ensure!(
+            !self.tissue.as_ref().is_some_and(|tissue| tissue.bonds.concern(place)),
+            "body is attached to a body: what holds it there moves with that one"
+        );
         Ok(())
     }
 
@@ -388,9 +387,7 @@ impl World {
         crate::def::finite_vector("point", point)?;
         let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
         for (index, tool) in tools.iter().enumerate() {
-            if tools[..index].contains(tool) {
-                return Err(Error::invalid(format!("tools[{index}] is named before")));
-            }
+            ensure!(!tools[..index].contains(tool), "tools[{index}] is named before");
             let tool = self.tools.get(tool.0)?;
             let arm = tool.pose.position.as_dvec3() - point.as_dvec3();
             force += tool.force.as_dvec3();
@@ -483,11 +480,10 @@ fn grip_of(surface: &[[u32; 3]], which: Which, point: &SurfacePoint) -> Result<G
         )));
     };
     let sum: f32 = weights.iter().sum();
-    if !(weights.iter().all(|&weight| weight >= 0.0) && (sum - 1.0).abs() <= SUM_OFF) {
-        return Err(Error::invalid(format!(
-            "{} are {weights:?}: must be at least 0, and 1 in sum",
-            which.name("weights", "weights")
-        )));
-    }
+    ensure!(
+        weights.iter().all(|&weight| weight >= 0.0) && (sum - 1.0).abs() <= SUM_OFF,
+        "{} are {weights:?}: must be at least 0, and 1 in sum",
+        which.name("weights", "weights")
+    );
     Ok(Grip { corners, weights })
 }

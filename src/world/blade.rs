@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::resistance::Knot;
-use crate::base::{BodyId, Error, Result, SlotId, StateHasher, above_zero, memory};
+use crate::base::{BodyId, Error, Result, SlotId, StateHasher, above_zero, ensure, memory};
 use crate::body::{CutReport, Stroke};
 use crate::codec::saved;
 use crate::contact::Pose;
@@ -206,9 +206,7 @@ impl Blade {
                 )));
             }
         }
-        if edge[0] == edge[1] {
-            return Err(Error::invalid(format!("edge has both ends at {}", edge[0])));
-        }
+        ensure!(edge[0] != edge[1], "edge has both ends at {}", edge[0]);
         above_zero("stiffness", stiffness)?;
         Ok(Self {
             edge,

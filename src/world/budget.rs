@@ -10,7 +10,7 @@
 use std::time::Instant;
 
 use super::World;
-use crate::base::{Error, Result, StepReport, above_zero, check_clock};
+use crate::base::{Error, Result, StepReport, above_zero, check_clock, ensure};
 
 /// How often a step is tried over a shorter time, because its motion needs shorter substeps than were known.
 const TRIES: u32 = 16;
@@ -96,9 +96,7 @@ impl World {
     /// [`Error::Unstable`]: as [`World::step`]; nothing has moved then, and nothing is added to what is left.
     pub fn step_with_budget(&mut self, dt: f32, work: u32) -> Result<BudgetReport> {
         above_zero("dt", dt)?;
-        if work == 0 {
-            return Err(Error::invalid("work is 0: must be at least 1"));
-        }
+        ensure!(work != 0, "work is 0: must be at least 1");
         if self.definition.substeps > 0 || self.definition.tolerance > 0.0 {
             return Err(Error::Unsupported(
                 "a step with a budget takes as many substeps as it may: the world has fixed substeps or a tolerance"

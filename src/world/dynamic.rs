@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::World;
-use crate::base::{Error, Result, ToolId, memory};
+use crate::base::{Error, Result, ToolId, ensure, memory};
 use crate::contact::{DynamicTool, MassProperties, Pose, Rigid, Tool};
 use crate::def::finite_vector;
 use crate::solver::Outcome;
@@ -38,9 +38,7 @@ impl World {
             it.rigid = None;
             return Ok(());
         };
-        if it.is_plane() {
-            return Err(Error::invalid("tool is a plane: a plane cannot be dynamic"));
-        }
+        ensure!(!it.is_plane(), "tool is a plane: a plane cannot be dynamic");
         if self.is_holding(place) {
             return Err(Error::invalid(
                 "tool holds attachments: release them before it is dynamic",
@@ -116,11 +114,10 @@ impl World {
             orientation: orientation.unwrap_or(it.pose.orientation),
         };
         let pose = pose.checked()?;
-        if self.is_holding(place) {
-            return Err(Error::invalid(
-                "tool holds attachments: release them before it is moved at once",
-            ));
-        }
+        ensure!(
+            !self.is_holding(place),
+            "tool holds attachments: release them before it is moved at once"
+        );
         self.wake_near(tool)?;
         let it = self.tools.get_mut(tool.0)?;
         (it.pose, it.led_to, it.target) = (pose, pose, None);
@@ -146,9 +143,11 @@ impl World {
 
     /// Refuses a dynamic tool, for what leads one.
     pub(super) fn check_kinematic(&self, tool: ToolId) -> Result<()> {
-        if self.tools.get(tool.0)?.rigid.is_some() {
-            return Err(Error::invalid(format!("tool is {}: it is dynamic", tool.0)));
-        }
+        ensure!(
+            self.tools.get(tool.0)?.rigid.is_none(),
+            "tool is {}: it is dynamic",
+            tool.0
+        );
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! Settings of a world and of its bodies that change between steps.
 
 use super::World;
-use crate::base::{BodyId, Error, Result, memory};
+use crate::base::{BodyId, Error, Result, ensure, memory};
 use crate::def::{BodyContact, BodySettings};
 use crate::solver::CoarseStep;
 
@@ -16,9 +16,7 @@ impl World {
     /// # Errors
     /// [`Error::InvalidArgument`]: `max_substeps` is 0. [`Error::OutOfMemory`]. Nothing has changed then.
     pub fn set_substeps(&mut self, substeps: u32, max_substeps: u32) -> Result<()> {
-        if max_substeps == 0 {
-            return Err(Error::invalid("max_substeps is 0: must be at least 1"));
-        }
+        ensure!(max_substeps != 0, "max_substeps is 0: must be at least 1");
         if self.definition.tolerance > 0.0 && substeps == 0 {
             // What a tolerance compares is kept from now on.
             let bodies = || self.bodies.iter().filter(|(_, body)| body.system().coarse.is_none());

@@ -1,7 +1,7 @@
 //! A world to bytes and back.
 
 use super::{World, WorldDefinition};
-use crate::base::{Error, Result, WorldTag, memory};
+use crate::base::{Error, Result, WorldTag, ensure, memory};
 use crate::body::Body;
 use crate::codec::{Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section};
 use crate::contact::Tool;
@@ -72,12 +72,11 @@ impl World {
     /// [`Error::Unsupported`], as [`World::save`], and [`Error::InvalidArgument`]: there are more or fewer bytes. Then nothing is written.
     pub fn save_into(&self, bytes: &mut [u8]) -> Result<()> {
         let size = self.snapshot_size()?;
-        if bytes.len() != size {
-            return Err(Error::invalid(format!(
-                "size is {}: the world takes {size} bytes",
-                bytes.len()
-            )));
-        }
+        ensure!(
+            bytes.len() == size,
+            "size is {}: the world takes {size} bytes",
+            bytes.len()
+        );
         self.write(&mut Writer::new(Some(bytes)));
         seal(bytes);
         Ok(())
@@ -198,11 +197,10 @@ impl World {
         let mut from = section(&mut bytes, *b"TISS", kernel)?;
         world.tissue = Saved::load(&mut from)?;
         at_end(&from)?;
-        if !bytes.is_empty() {
-            return Err(Error::invalid(
-                "bytes are no world: something is behind its last section",
-            ));
-        }
+        ensure!(
+            bytes.is_empty(),
+            "bytes are no world: something is behind its last section"
+        );
         if walk_count > world.bodies.places() {
             return Err(Error::invalid(
                 "bytes are no world: bodies that are not there go together",

@@ -2,7 +2,7 @@
 
 use super::World;
 use super::attachments::{Which, check_limit, refuse_one_point};
-use crate::base::{AttachmentId, BodyId, Error, Result};
+use crate::base::{AttachmentId, BodyId, Error, Result, ensure};
 use crate::def::Anchor;
 use crate::tissue::{Thread, distance};
 
@@ -109,9 +109,7 @@ impl World {
             force_limit,
         } = *definition;
         length.map_or(Ok(()), check_length)?;
-        if !(stiffness > 0.0) {
-            return Err(Error::invalid(format!("stiffness is {stiffness}: must be above 0")));
-        }
+        ensure!(stiffness > 0.0, "stiffness is {stiffness}: must be above 0");
         check_limit(force_limit)?;
         let [own, others] = ["", "other_"].map(|prefix| Which { prefix, index: None });
         let pair = [self.bound(body, own, anchor)?, self.bound(other, others, other_anchor)?];
@@ -154,11 +152,10 @@ impl World {
 }
 
 fn check_length(length: f32) -> Result<()> {
-    if !(length >= 0.0 && length.is_finite()) {
-        return Err(Error::invalid(format!(
-            "length is {length}: must be at least 0 and finite"
-        )));
-    }
+    ensure!(
+        length >= 0.0 && length.is_finite(),
+        "length is {length}: must be at least 0 and finite"
+    );
     Ok(())
 }
 

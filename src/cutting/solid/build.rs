@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::body::{CutSolid, FACES, Face, SolidCell, SolidTetrahedron, SolidTriangle, SolidVertex};
 use super::sever::{Mark, SolidStroke};
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 use crate::cutting::divided::{NONE, Node, SNAP};
 use crate::cutting::tracked::Tracked;
 
@@ -19,9 +19,10 @@ impl CutSolid {
         if let Some(at) = rest.iter().position(|place| !place.is_finite()) {
             return Err(Error::invalid(format!("rest position {at} is {}", rest[at])));
         }
-        if rest.len().max(cells.len()) >= (NONE / 4) as usize {
-            return Err(Error::invalid("more than 2^30 nodes or cells"));
-        }
+        ensure!(
+            rest.len().max(cells.len()) < (NONE / 4) as usize,
+            "more than 2^30 nodes or cells"
+        );
         let mut nodes = memory::reserved(rest.len())?;
         nodes.extend(rest.iter().map(|&rest| Node { rest, first: NONE }));
         let mut vertices = memory::reserved(rest.len())?;
@@ -44,11 +45,7 @@ impl CutSolid {
             }
             let places = corners.map(|node| rest[node as usize].as_dvec3());
             let volume = volume_of(places);
-            if !(volume.abs() > 0.0) {
-                return Err(Error::invalid(format!(
-                    "cell {number} of nodes {corners:?} has no volume"
-                )));
-            }
+            ensure!(volume.abs() > 0.0, "cell {number} of nodes {corners:?} has no volume");
             let mut next = [NONE; 4];
             for (k, &node) in corners.iter().enumerate() {
                 next[k] = std::mem::replace(&mut nodes[node as usize].first, 4 * number as u32 + k as u32);
@@ -100,12 +97,11 @@ impl CutSolid {
         let mut star = Vec::new();
         for (vertex, &count) in counts.iter().enumerate() {
             self.star(vertex as u32, &mut star)?;
-            if star.len() != count {
-                return Err(Error::invalid(format!(
-                    "node {vertex} has {count} cells, of which {} hang together by faces at it",
-                    star.len()
-                )));
-            }
+            ensure!(
+                star.len() == count,
+                "node {vertex} has {count} cells, of which {} hang together by faces at it",
+                star.len()
+            );
         }
         Ok(())
     }
@@ -168,25 +164,23 @@ fn put_in_order(
     tetrahedra: &mut [SolidTetrahedron],
     given: &[[u32; 3]],
 ) -> Result<()> {
-    if given.len() != triangles.len() {
-        return Err(Error::invalid(format!(
-            "there are {} triangles, and cells have {} outer faces",
-            given.len(),
-            triangles.len()
-        )));
-    }
+    ensure!(
+        given.len() == triangles.len(),
+        "there are {} triangles, and cells have {} outer faces",
+        given.len(),
+        triangles.len()
+    );
     let mut places = memory::reserved(given.len())?;
     places.extend((0..given.len() as u32).map(|place| (from_lowest(given[place as usize]), place)));
     places.sort_unstable();
     let mut known = memory::copied(triangles)?;
     known.sort_unstable_by_key(|triangle| from_lowest(triangle.corners));
     for (&(corners, place), triangle) in places.iter().zip(known) {
-        if from_lowest(triangle.corners) != corners {
-            return Err(Error::invalid(format!(
-                "triangle {place} of nodes {:?} is no outer face of a cell, turned outward, or is there twice",
-                given[place as usize]
-            )));
-        }
+        ensure!(
+            from_lowest(triangle.corners) == corners,
+            "triangle {place} of nodes {:?} is no outer face of a cell, turned outward, or is there twice",
+            given[place as usize]
+        );
         let it = &mut tetrahedra[triangle.tetrahedron as usize];
         for (drawn, face) in it.drawn.iter_mut().zip(FACES) {
             if *drawn != NONE && from_lowest(face.map(|k| it.corners[k])) == corners {

@@ -11,7 +11,7 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use super::tidy::{LoadedMesh, NO_NODE, RawMesh};
-use crate::base::above_zero;
+use crate::base::{above_zero, ensure};
 use crate::{Error, Result};
 use scanner::Scanner;
 
@@ -69,12 +69,11 @@ pub fn load(path: impl AsRef<Path>, format: MeshFormat, scale: f32) -> Result<Lo
     };
     for vertex in &mut raw.vertices {
         *vertex *= f64::from(scale);
-        if !vertex.as_vec3().is_finite() {
-            return Err(Error::invalid(format!(
-                "scale is {scale}: a point of {} would be at {vertex}",
-                path.display()
-            )));
-        }
+        ensure!(
+            vertex.as_vec3().is_finite(),
+            "scale is {scale}: a point of {} would be at {vertex}",
+            path.display()
+        );
     }
     let loaded = raw.tidy()?;
     if loaded.mesh.triangles.is_empty() && loaded.mesh.tetrahedra.is_empty() {

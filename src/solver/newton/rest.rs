@@ -3,7 +3,7 @@
 use glam::{BVec3, DVec3, Vec3};
 
 use super::descent::{Descent, DescentReport, Goal};
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 use crate::solver::System;
 
 /// Linearised equations solved at most.
@@ -114,12 +114,11 @@ fn find(
     gravity: Vec3,
     definition: &RestStateDefinition,
 ) -> Result<RestStateReport> {
-    if !(definition.tolerance >= 0.0 && definition.tolerance.is_finite()) {
-        return Err(Error::invalid(format!(
-            "tolerance is {}: must be at least 0 and finite",
-            definition.tolerance
-        )));
-    }
+    ensure!(
+        definition.tolerance >= 0.0 && definition.tolerance.is_finite(),
+        "tolerance is {}: must be at least 0 and finite",
+        definition.tolerance
+    );
     set_up(descent, body, gravity);
     let parts = Parts::new(descent)?;
     parts.balance(descent, body)?;

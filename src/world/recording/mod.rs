@@ -28,7 +28,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::World;
-use crate::base::{Error, Result, StepReport, memory};
+use crate::base::{Error, Result, StepReport, ensure, memory};
 use difference::difference;
 pub use player::{ReplayDifference, ReplayReport};
 
@@ -104,9 +104,7 @@ impl World {
     /// # Errors
     /// [`Error::Io`]: the file cannot be created. [`Error::InvalidArgument`]: the world is recorded already. [`Error::OutOfMemory`].
     pub fn start_recording(&mut self, path: &Path) -> Result<()> {
-        if self.recorder.is_some() {
-            return Err(Error::invalid("world is recorded already: stop that first"));
-        }
+        ensure!(self.recorder.is_none(), "world is recorded already: stop that first");
         let mut frame = Vec::new();
         put(&mut frame, &MAGIC)?;
         put(&mut frame, &VERSION.to_le_bytes())?;

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::super::World;
 use super::difference::applied;
 use super::{BEGIN, END, MAGIC, VERSION};
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 use crate::codec::seal;
 
 /// What came of a replay.
@@ -94,9 +94,7 @@ impl FrameReader {
             left,
         };
         let (magic, version) = (frames.array::<8>()?, frames.array::<4>()?);
-        if magic != Some(MAGIC) {
-            return Err(Error::invalid(format!("{name} is no recording")));
-        }
+        ensure!(magic == Some(MAGIC), "{name} is no recording");
         match version.map(u32::from_le_bytes) {
             Some(VERSION) => Ok(frames),
             other => Err(Error::Unsupported(format!(
