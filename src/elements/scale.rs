@@ -116,22 +116,15 @@ impl Elements {
     /// Makes the sums over the tetrahedra at the nodes of a region what they are now.
     fn add_up_again(&mut self, region: &Region) {
         let whole = f64::from(self.law.whole());
-        let Self {
-            stiffnesses,
-            rings,
-            parts,
-            offsets,
-            ..
-        } = self;
         for &node in region.nodes() {
-            stiffnesses[node as usize] = 0.0;
-            if let Some(rings) = rings {
+            self.stiffnesses[node as usize] = 0.0;
+            if let Some(rings) = &mut self.rings {
                 // Of a volume of 1 m³, until it is known how large it is.
-                offsets.scale(node, 1.0 / rings.volumes[node as usize]);
+                self.offsets.scale(node, 1.0 / rings.volumes[node as usize]);
                 rings.volumes[node as usize] = 0.0;
             }
         }
-        for part in parts {
+        for part in &self.parts {
             let Some(inside) = InsideBits::of(part, region) else {
                 continue;
             };
@@ -144,8 +137,8 @@ impl Elements {
                 for ((node, place), gradient) in corners.into_iter().zip(places).zip(rest.gradients()) {
                     if inside.has(place) {
                         let stiffness: f64 = rest.volume * whole * DVec3::length_squared(gradient);
-                        stiffnesses[node as usize] += stiffness as f32;
-                        if let Some(rings) = rings {
+                        self.stiffnesses[node as usize] += stiffness as f32;
+                        if let Some(rings) = &mut self.rings {
                             rings.volumes[node as usize] += 0.25 * rest.volume as f32;
                         }
                     }
@@ -153,8 +146,8 @@ impl Elements {
             });
         }
         for &node in region.nodes() {
-            if let Some(rings) = rings {
-                offsets.scale(node, rings.volumes[node as usize]);
+            if let Some(rings) = &mut self.rings {
+                self.offsets.scale(node, rings.volumes[node as usize]);
             }
         }
     }

@@ -162,16 +162,12 @@ pub(super) struct Rows<'a, 'm, S> {
 impl<S: RowStorage> WithEights for Rows<'_, '_, S> {
     #[inline(always)]
     fn run<E: Eights>(self, eights: E) {
-        let Self {
-            storage,
-            tile,
-            motion,
-            forces,
-        } = self;
-        if motion.velocities.is_some() {
-            storage.tile_forces::<true>(tile, motion, eights, forces);
+        if self.motion.velocities.is_some() {
+            self.storage
+                .tile_forces::<true>(self.tile, self.motion, eights, self.forces);
         } else {
-            storage.tile_forces::<false>(tile, motion, eights, forces);
+            self.storage
+                .tile_forces::<false>(self.tile, self.motion, eights, self.forces);
         }
     }
 }

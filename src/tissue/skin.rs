@@ -341,14 +341,8 @@ impl Skin {
         self.is_closed &= !body.is_cut_open;
         let (bindings, motion_of) = body.motion();
         self.take(origin, bindings, duration, motion_of);
-        let Self {
-            changing,
-            triangles,
-            starts,
-            ..
-        } = self;
-        if let Some(wound) = changing.as_mut().and_then(|changing| changing.wound.as_mut()) {
-            wound.turn(triangles, starts);
+        if let Some(wound) = self.changing.as_mut().and_then(|changing| changing.wound.as_mut()) {
+            wound.turn(&self.triangles, &self.starts);
         }
         // Edges that were flat let others in by up to half of this: they are not passed over once that is a quarter of what is kept apart.
         self.bent += (self.moved.max - self.moved.min).length();

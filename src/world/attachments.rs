@@ -405,39 +405,29 @@ impl World {
 
     /// A tool is gone: lets go of what is attached to it.
     pub(super) fn release_all_of(&mut self, tool: ToolId) {
-        let Self {
-            attachments, bodies, ..
-        } = self;
-        attachments.retain(|attachment| attachment.holder != Holder::Tool(tool));
-        for (_, body) in bodies.iter_mut() {
+        self.attachments
+            .retain(|attachment| attachment.holder != Holder::Tool(tool));
+        for (_, body) in self.bodies.iter_mut() {
             body.system_mut().let_go_of(tool.0.index());
         }
     }
 
     /// Ends what the last step was too much for.
     pub(super) fn end_slipped(&mut self) {
-        let Self {
-            bodies,
-            attachments,
-            slipped,
-            outcomes,
-            tissue,
-            ..
-        } = self;
-        slipped.clear();
-        for (place, body) in bodies.iter_mut() {
-            if let Some(Outcome::Done { .. }) = outcomes[place] {
+        self.slipped.clear();
+        for (place, body) in self.bodies.iter_mut() {
+            if let Some(Outcome::Done { .. }) = self.outcomes[place] {
                 body.system_mut().slip(|id| {
-                    if attachments.remove(id).is_ok() {
-                        slipped.push(AttachmentId(id));
+                    if self.attachments.remove(id).is_ok() {
+                        self.slipped.push(AttachmentId(id));
                     }
                 });
             }
         }
-        if let Some(tissue) = tissue {
-            tissue.bonds.slip(bodies, |id| {
-                if attachments.remove(id).is_ok() {
-                    slipped.push(AttachmentId(id));
+        if let Some(tissue) = &mut self.tissue {
+            tissue.bonds.slip(&mut self.bodies, |id| {
+                if self.attachments.remove(id).is_ok() {
+                    self.slipped.push(AttachmentId(id));
                 }
             });
         }

@@ -165,36 +165,25 @@ impl World {
 
     /// Begins a step: each dynamic tool is divided among the bodies that it pressed in the last.
     pub(super) fn divide_as_before(&mut self) {
-        let Self {
-            dynamic,
-            tools,
-            bodies,
-            definition,
-            ..
-        } = self;
-        dynamic.clear();
-        for (index, (slot, tool)) in tools.iter().enumerate() {
+        self.dynamic.clear();
+        for (index, (slot, tool)) in self.tools.iter().enumerate() {
             let Some(rigid) = &tool.rigid else { continue };
-            let contacts = bodies.iter().filter_map(|(_, body)| body.system().contacts.as_ref());
+            let contacts = self
+                .bodies
+                .iter()
+                .filter_map(|(_, body)| body.system().contacts.as_ref());
             let shares = contacts.filter(|contacts| contacts.touched(slot)[0]).count().max(1) as u32;
-            dynamic.push(DynamicTool::new(index, rigid, definition.gravity, shares));
+            self.dynamic
+                .push(DynamicTool::new(index, rigid, self.definition.gravity, shares));
         }
     }
 
     /// Whether each dynamic tool was divided among as many bodies as it pressed in the step that was tried; else it is in the next try. After so many
     /// `rounds` it is divided among all, which is always enough.
     pub(super) fn are_divided(&mut self, rounds: u32) -> bool {
-        let Self {
-            dynamic,
-            tools,
-            bodies,
-            outcomes,
-            definition,
-            ..
-        } = self;
         let mut are_divided = true;
-        for tool in dynamic.iter_mut() {
-            let taken = bodies.iter().filter(|&(place, _)| is_done(&outcomes[place]));
+        for tool in &mut self.dynamic {
+            let taken = self.bodies.iter().filter(|&(place, _)| is_done(&self.outcomes[place]));
             let pressed = taken.filter(|(_, body)| {
                 let contacts = body.system().contacts.as_ref();
                 contacts.is_some_and(|contacts| contacts.loads()[tool.index].impulse != DVec3::ZERO)
@@ -204,16 +193,16 @@ impl World {
             if is_divided || rounds >= DIVISIONS {
                 continue;
             }
-            let Some((_, it)) = tools.iter().nth(tool.index) else {
+            let Some((_, it)) = self.tools.iter().nth(tool.index) else {
                 continue;
             };
             let shares = if rounds + 1 < DIVISIONS {
                 pressed
             } else {
-                bodies.iter().count() as u32
+                self.bodies.iter().count() as u32
             };
             if let Some(rigid) = &it.rigid {
-                *tool = DynamicTool::new(tool.index, rigid, definition.gravity, shares);
+                *tool = DynamicTool::new(tool.index, rigid, self.definition.gravity, shares);
             }
             are_divided = false;
         }
@@ -229,24 +218,17 @@ impl World {
 
     /// Puts together where bodies moved each dynamic tool.
     pub(super) fn end_flights(&mut self, dt: f32) {
-        let Self {
-            dynamic,
-            tools,
-            bodies,
-            outcomes,
-            ..
-        } = self;
-        let mut rigid = tools.iter_mut().filter_map(|(_, tool)| {
+        let mut rigid = self.tools.iter_mut().filter_map(|(_, tool)| {
             let Tool {
                 rigid, pose, led_to, ..
             } = tool;
             Some((rigid.as_deref_mut()?, pose, led_to))
         });
-        for tool in dynamic.iter() {
+        for tool in &self.dynamic {
             let Some((rigid, pose, led_to)) = rigid.next() else {
                 break;
             };
-            let taken = bodies.iter().filter(|&(place, _)| is_done(&outcomes[place]));
+            let taken = self.bodies.iter().filter(|&(place, _)| is_done(&self.outcomes[place]));
             let ends = taken.flat_map(|(_, body)| body.system().contacts.iter());
             let ends = ends.filter_map(|contacts| contacts.dynamic_end(tool.index, dt));
             rigid.arrive(tool.joined(dt, ends));

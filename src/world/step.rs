@@ -244,55 +244,35 @@ impl World {
         let islands = self.tissue.as_ref().map(|tissue| &tissue.islands);
         let goes_alone = |place: usize| islands.is_none_or(|islands| !islands.has(place));
         commit_bodies(&mut self.bodies, &self.outcomes, moved_by, (dt, goes_alone), team);
-        let Self {
-            bodies,
-            tools,
-            paths,
-            outcomes,
-            ..
-        } = self;
-        for (index, (_, tool)) in tools.iter_mut().enumerate() {
-            let [force, torque] = wrench(bodies, outcomes, (index, &paths[index]), dt);
+        for (index, (_, tool)) in self.tools.iter_mut().enumerate() {
+            let [force, torque] = wrench(&self.bodies, &self.outcomes, (index, &self.paths[index]), dt);
             // Finite, whatever the step's length.
             tool.force = force.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
             tool.torque = torque.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
-            tool.force_error = force_error(bodies, outcomes, index);
-            tool.pose = paths[index].end();
+            tool.force_error = force_error(&self.bodies, &self.outcomes, index);
+            tool.pose = self.paths[index].end();
             tool.led_to = tool.target.take().unwrap_or(tool.pose);
             tool.reach = None;
         }
         self.end_flights(dt);
-        let Self {
-            bodies,
-            tissue,
-            outcomes,
-            ..
-        } = self;
-        if let Some(tissue) = tissue {
-            tissue.bonds.commit(outcomes, dt);
+        if let Some(tissue) = &mut self.tissue {
+            tissue.bonds.commit(&self.outcomes, dt);
             tissue.pushes.commit();
             tissue.touches.commit();
-            let is_asleep = |place: usize| matches!(outcomes.get(place), Some(Some(Outcome::Asleep)));
+            let is_asleep = |place: usize| matches!(self.outcomes.get(place), Some(Some(Outcome::Asleep)));
             tissue.touching.commit(is_asleep);
-            let took = |place: usize| matches!(outcomes.get(place), Some(Some(Outcome::Done { .. })));
-            rest_islands(tissue, bodies, took);
+            let took = |place: usize| matches!(self.outcomes.get(place), Some(Some(Outcome::Done { .. })));
+            rest_islands(tissue, &mut self.bodies, took);
         }
         self.end_slipped();
     }
 
     /// Whether no tool presses harder than it can; else those that do go less far in the next try, which may be the `last`.
     fn are_within_limits(&mut self, dt: f32, last: bool) -> bool {
-        let Self {
-            bodies,
-            tools,
-            paths,
-            outcomes,
-            ..
-        } = self;
         let mut are_within = true;
-        for (index, (_, tool)) in tools.iter_mut().enumerate() {
+        for (index, (_, tool)) in self.tools.iter_mut().enumerate() {
             if let Some(reach) = &mut tool.reach {
-                let [force, _] = wrench(bodies, outcomes, (index, &paths[index]), dt);
+                let [force, _] = wrench(&self.bodies, &self.outcomes, (index, &self.paths[index]), dt);
                 are_within &= reach.is_allowed(force.length() as f32, tool.force_limit, last);
             }
         }

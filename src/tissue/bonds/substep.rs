@@ -164,14 +164,9 @@ impl Bonds {
     /// Makes the velocities of the points of each bond equal, or those that its thread asks for, one after the other: the largest difference
     /// that there was, m/s.
     pub(in crate::tissue) fn sweep(&mut self, skins: &mut [Option<Skin>], moment: &Span) -> f32 {
-        let Self {
-            bonds,
-            ends,
-            is_opening,
-        } = self;
         let mut largest = 0.0_f32;
-        for bond in bonds.iter_mut().filter(|bond| bond.acts) {
-            let [velocity, size] = bond.velocity(ends, skins);
+        for bond in self.bonds.iter_mut().filter(|bond| bond.acts) {
+            let [velocity, size] = bond.velocity(&self.ends, skins);
             let (given, change) = match &bond.thread {
                 None => {
                     let counts = velocity.abs().cmpgt(size * ROUNDING) & bond.masses.cmpgt(Vec3::ZERO);
@@ -179,7 +174,7 @@ impl Bonds {
                     (-change * bond.masses, change)
                 }
                 Some(thread) => {
-                    let before = bond.load * bond.duration(moment, *is_opening) + bond.impulse;
+                    let before = bond.load * bond.duration(moment, self.is_opening) + bond.impulse;
                     let all = thread.impulse(velocity.as_dvec3(), before.as_dvec3());
                     let given = all.as_vec3().clamp(Vec3::MIN, Vec3::MAX) - before;
                     let answer = bond.masses.recip();
@@ -194,7 +189,7 @@ impl Bonds {
             }
             bond.impulse += given;
             for corner in bond.used() {
-                ends[corner.end].quicken(given * corner.weight, skins);
+                self.ends[corner.end].quicken(given * corner.weight, skins);
             }
             largest = largest.max(change.length());
         }
@@ -203,27 +198,22 @@ impl Bonds {
 
     /// Gives bodies what was found, and foresees the same for the next substep.
     pub(in crate::tissue) fn give(&mut self, bodies: &mut impl Systems, skins: &[Option<Skin>], moment: &Span) {
-        let Self {
-            bonds,
-            ends,
-            is_opening,
-        } = self;
-        ends.iter_mut().for_each(|end| end.given = Vec3::ZERO);
-        for bond in bonds.iter_mut().filter(|bond| bond.acts) {
-            let duration = bond.duration(moment, *is_opening);
+        self.ends.iter_mut().for_each(|end| end.given = Vec3::ZERO);
+        for bond in self.bonds.iter_mut().filter(|bond| bond.acts) {
+            let duration = bond.duration(moment, self.is_opening);
             let all = bond.load * duration + bond.impulse;
             if !bond.has_equation {
                 bond.load += bond.impulse / duration;
             }
             for corner in bond.used() {
-                ends[corner.end].given += all * corner.weight;
+                self.ends[corner.end].given += all * corner.weight;
             }
             bond.sum += all.as_dvec3();
             if let Some(thread) = &mut bond.thread {
                 thread.go_on(moment);
             }
         }
-        for end in ends.iter_mut().filter(|end| end.is_in_turn) {
+        for end in self.ends.iter_mut().filter(|end| end.is_in_turn) {
             if let Some(body) = bodies.at_mut(end.body)
                 && moment.concerns(body)
             {
@@ -231,7 +221,7 @@ impl Bonds {
                 body.draw(end.node as usize, end.velocity, end.given, moment);
             }
         }
-        *is_opening = false;
+        self.is_opening = false;
     }
 
     /// Moves what is apart at the end of a substep of `duration` seconds together, without giving it speed.
