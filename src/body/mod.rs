@@ -109,7 +109,10 @@ pub struct Body {
     user_data: usize,
 }
 
-saved!(Body { system, cuttable, tears, corners, published, choice } leaves { user_data: 0, shown: None, query_tree: QueryTree::default() } where Self::is_sound);
+saved! { Body {
+    system, cuttable, tears, corners, published, choice } leaves { user_data: 0, shown: None,
+    query_tree: QueryTree::default(),
+} where Self::is_sound }
 
 impl Systems for Slots<Body> {
     fn at(&self, place: usize) -> Option<&System> {

@@ -36,7 +36,7 @@ struct Member {
 saved! { Member { node, cavity, end } }
 
 /// The triangles of all cavities, cavity by cavity, and those about each node.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct CavitySurface {
     /// In the body's own numbers, turned so that volumes are positive.
     pub triangles: Vec<[u32; 3]>,
@@ -104,12 +104,7 @@ pub(super) fn close(
     }
     let mut made = CavitySurface {
         triangles: memory::reserved(triangles.len())?,
-        blocks: Vec::new(),
-        starts: Vec::new(),
-        members: Vec::new(),
-        tiles: Vec::new(),
-        about: Vec::new(),
-        nodes_are_shared: false,
+        ..CavitySurface::default()
     };
     let mut cavities = Vec::new();
     for wall in order_of_walls.chunk_by(same_wall) {

@@ -9,7 +9,7 @@ use crate::threads::Ragged;
 
 /// A node that is held, along all axes or along some. Along the others `force` and `travel` are 0, and what else is kept means
 /// nothing.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Pin {
     pub node: u32,
     /// Where the next step leads it, in the caller's coordinates; `None`: it stays.
@@ -35,14 +35,8 @@ impl Pin {
     fn new(node: u32, axes: BVec3) -> Self {
         Self {
             node,
-            target: None,
-            force: Vec3::ZERO,
-            closing_share: 0.0,
-            goal: Vec3::ZERO,
-            travel: Vec3::ZERO,
-            force_sum: DVec3::ZERO,
-            solved: Vec3::ZERO,
             axes,
+            ..Self::default()
         }
     }
 

@@ -28,7 +28,7 @@ pub(crate) struct ClosingKick {
     pub gravity: Vec3,
 }
 
-saved!(ClosingKick { substep, gravity });
+saved! { ClosingKick { substep, gravity } }
 
 impl ClosingKick {
     /// What gravity gives in it, m/s.

@@ -16,12 +16,7 @@ pub(crate) struct CoarseStep {
     middle_difference: f32,
 }
 
-saved!(CoarseStep {
-    middle,
-    positions,
-    velocities,
-    middle_difference
-});
+saved! { CoarseStep { middle, positions, velocities, middle_difference } }
 
 impl CoarseStep {
     pub fn new(node_count: usize) -> Result<Self> {

@@ -13,7 +13,7 @@ pub(crate) struct Early {
     pub is_seen: bool,
 }
 
-saved!(Early { velocities, is_seen });
+saved! { Early { velocities, is_seen } }
 
 impl System {
     /// Makes room for velocities from before the last half kick of a step.

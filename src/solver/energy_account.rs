@@ -62,20 +62,9 @@ pub(crate) struct EnergyAccount {
     group: u64,
 }
 
-saved!(EnergyAccount {
-    reference,
-    work,
-    gravity,
-    substeps,
-    time,
-    comparisons,
-    kinetic,
-    recent,
-    removed,
-    refinement,
-    refined_at,
-    group
-});
+saved! { EnergyAccount {
+    reference, work, gravity, substeps, time, comparisons, kinetic, recent, removed, refinement, refined_at, group,
+} }
 
 impl EnergyAccount {
     pub const UNKNOWN: Self = Self {

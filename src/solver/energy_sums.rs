@@ -60,15 +60,7 @@ pub(crate) struct TileSums {
     elastic: f64,
 }
 
-saved!(TileSums {
-    kinetic,
-    momentum,
-    moment,
-    mass,
-    free_mass,
-    shadow,
-    elastic
-});
+saved! { TileSums { kinetic, momentum, moment, mass, free_mass, shadow, elastic } }
 
 impl TileSums {
     fn plus(self, other: &Self) -> Self {

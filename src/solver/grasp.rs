@@ -32,14 +32,7 @@ pub(crate) struct Grasp {
     pub force: Vec3,
 }
 
-saved!(Grasp {
-    id,
-    tool,
-    nodes,
-    weights,
-    limit,
-    force
-});
+saved! { Grasp { id, tool, nodes, weights, limit, force } }
 
 /// So many nodes a grasp holds at most: the corners of a triangle are bound to nodes of one cell.
 const MOST: usize = 4;
@@ -62,16 +55,7 @@ pub(crate) struct HeldNode {
     course: HeldMotion,
 }
 
-saved!(HeldNode {
-    node,
-    tool,
-    parts,
-    offset,
-    force,
-    torque,
-    gain,
-    course
-});
+saved! { HeldNode { node, tool, parts, offset, force, torque, gain, course } }
 
 /// Weights are added up in so many parts of 1.
 const PARTS: f64 = (1_u64 << 40) as f64;
@@ -104,15 +88,7 @@ struct HeldMotion {
     torque_sum: DVec3,
 }
 
-saved!(HeldMotion {
-    offset,
-    gap,
-    velocity,
-    gain,
-    pin_sum,
-    force_sum,
-    torque_sum
-});
+saved! { HeldMotion { offset, gap, velocity, gain, pin_sum, force_sum, torque_sum } }
 
 /// What a substep made of forces.
 #[derive(Clone, Copy, Debug)]
@@ -137,7 +113,7 @@ pub(crate) struct Grasps {
     nodes: Vec<HeldNode>,
 }
 
-saved!(Grasps { grasps, nodes });
+saved! { Grasps { grasps, nodes } }
 
 impl Grip {
     /// A node by itself.

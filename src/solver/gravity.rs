@@ -17,7 +17,7 @@ pub(crate) struct GravityKicks {
     pub velocities: Bounds,
 }
 
-saved!(GravityKicks { residual, velocities });
+saved! { GravityKicks { residual, velocities } }
 
 impl GravityKicks {
     /// Nothing left over, for nodes with velocities in this box.

@@ -254,7 +254,7 @@ pub(crate) struct Survey {
     pub finite: bool,
 }
 
-saved!(Survey { velocities, finite });
+saved! { Survey { velocities, finite } }
 
 impl Survey {
     pub const NOTHING: Self = Self {

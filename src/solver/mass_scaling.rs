@@ -64,17 +64,7 @@ pub(crate) struct Sliver {
     settled: f32,
 }
 
-saved!(Sliver {
-    node,
-    beside,
-    stiffness,
-    damping,
-    growth,
-    settled_growth,
-    rate,
-    added,
-    settled
-});
+saved! { Sliver { node, beside, stiffness, damping, growth, settled_growth, rate, added, settled } }
 
 impl Sliver {
     /// A node as it is, with nothing but what it carries beside its springs.
@@ -162,23 +152,10 @@ pub(crate) struct MassScaling {
     changed: bool,
 }
 
-saved!(MassScaling {
-    most,
-    total,
-    reserve,
-    unscaled,
-    uniform_inverse_mass,
-    slivers,
-    complete_to,
-    step,
-    weight_share,
-    growths,
-    margin,
-    relief,
-    settled_relief,
-    settled_margin,
-    changed
-});
+saved! { MassScaling {
+    most, total, reserve, unscaled, uniform_inverse_mass, slivers, complete_to, step, weight_share, growths, margin,
+    relief, settled_relief, settled_margin, changed,
+} }
 
 impl MassScaling {
     /// Finds the nodes of a body that are to be made heavier where it takes the longest substeps that `fraction` of its mass

@@ -22,7 +22,7 @@ pub(crate) struct Pace {
     age: f32,
 }
 
-saved!(Pace { shortest, age });
+saved! { Pace { shortest, age } }
 
 impl Pace {
     /// That of a body that has not been stepped.

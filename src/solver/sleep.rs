@@ -38,11 +38,7 @@ struct Tile {
     pull: f32,
 }
 
-saved!(Tile {
-    quiet,
-    is_touched,
-    pull
-});
+saved! { Tile { quiet, is_touched, pull } }
 
 /// What of a body sleeps.
 #[derive(Debug)]
@@ -68,20 +64,9 @@ pub(crate) struct Sleeper {
     knew_forces: bool,
 }
 
-saved!(Sleeper {
-    sleep,
-    tiles,
-    asleep,
-    asleep_count,
-    neighbours,
-    starts,
-    in_parts,
-    bounds,
-    margin,
-    step,
-    before,
-    knew_forces
-});
+saved! { Sleeper {
+    sleep, tiles, asleep, asleep_count, neighbours, starts, in_parts, bounds, margin, step, before, knew_forces,
+} }
 
 impl Sleeper {
     #[inline]

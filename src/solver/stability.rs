@@ -45,12 +45,7 @@ pub(crate) struct Stability {
     reach: f32,
 }
 
-saved!(Stability {
-    now,
-    anywhere,
-    found,
-    reach
-});
+saved! { Stability { now, anywhere, found, reach } }
 
 impl Stability {
     pub const UNKNOWN: Self = Self {

@@ -94,14 +94,7 @@ pub(crate) struct Carry {
     pub pace: Pace,
 }
 
-saved!(Carry {
-    stability,
-    gravity,
-    closing,
-    masses_for,
-    energy,
-    pace
-});
+saved! { Carry { stability, gravity, closing, masses_for, energy, pace } }
 
 impl Carry {
     /// A change from outside: the body has another energy, and may need fewer substeps.

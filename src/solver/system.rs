@@ -33,7 +33,7 @@ pub(crate) struct MayBeCut {
     pub is_solid: bool,
 }
 
-saved!(MayBeCut { toughness, is_solid });
+saved! { MayBeCut { toughness, is_solid } }
 
 /// A body as solvers and contact see it, in its own numbers and coordinates.
 #[derive(Debug)]
@@ -99,7 +99,12 @@ pub(crate) struct System {
     pub acceleration: Vec3,
 }
 
-saved!(System { order, forces, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, origin, predicted_velocities, implicit, applied, early, contacts, contact, bindings, node_room, is_cut_open, grasps, carry, forces_current, forces_applied, coarse, sleeper, may_be_cut, gravity_scale, acceleration } where Self::is_sound);
+saved! { System {
+    order, forces, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys,
+    tile_sums, boxes, surface, state, origin, predicted_velocities, implicit, applied, early, contacts, contact,
+    bindings, node_room, is_cut_open, grasps, carry, forces_current, forces_applied, coarse, sleeper, may_be_cut,
+    gravity_scale, acceleration,
+} where Self::is_sound }
 
 impl System {
     /// Of a definition, in this order, with these forces and the surface in the caller's numbers. Its nodes have no positions yet, and nothing

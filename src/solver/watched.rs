@@ -18,7 +18,7 @@ pub(crate) struct Candidate {
     pub node: u32,
 }
 
-saved!(Candidate { limit, node });
+saved! { Candidate { limit, node } }
 
 impl Candidate {
     fn before(&self, other: &Self) -> std::cmp::Ordering {
@@ -37,11 +37,7 @@ pub(crate) struct Watched {
     others: f32,
 }
 
-saved!(Watched {
-    candidates,
-    most,
-    others
-});
+saved! { Watched { candidates, most, others } }
 
 impl Watched {
     /// Room for the watched nodes of a body; none are yet.

@@ -178,7 +178,9 @@ pub(super) struct Stencils<L: StencilLaw<N>, const N: usize> {
     pub(super) added: Vec<Stencil<L::Shape, N>>,
 }
 
-saved!([L: StencilLaw<N>, const N: usize] Stencils<L, N> { law, all, starts, visitor_starts, visitors, later, changed, added });
+saved! { [L: StencilLaw<N>, const N: usize] Stencils<L, N> {
+    law, all, starts, visitor_starts, visitors, later, changed, added,
+} }
 
 pub(super) fn tile_of(node: u32) -> usize {
     node as usize / TILE

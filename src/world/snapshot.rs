@@ -14,7 +14,9 @@ use crate::tissue::Tissue;
 use super::attachments::Attachment;
 use super::blade::Blade;
 
-saved!(WorldDefinition { gravity, substeps, max_substeps, tolerance, kernel } leaves { thread_count: 1, tasks: None });
+saved! { WorldDefinition {
+    gravity, substeps, max_substeps, tolerance, kernel } leaves { thread_count: 1, tasks: None,
+} }
 
 /// Of everything that is written.
 const SHAPE: u64 = {

@@ -25,7 +25,7 @@ pub(super) struct Noise {
     pub energy: f64,
 }
 
-saved!(Noise { error, square, energy });
+saved! { Noise { error, square, energy } }
 
 /// What of the stiffness of rings stands on the diagonal, as a part of what it were if each tetrahedron kept its volume: about a node in
 /// the middle of even ones, of which some twenty have it in common.
@@ -40,7 +40,7 @@ pub(super) struct Blocks {
     inverse: [Vec<f32>; 6],
 }
 
-saved!(Blocks { stiffness, inverse });
+saved! { Blocks { stiffness, inverse } }
 
 impl Blocks {
     pub fn new(node_count: usize) -> Result<Self> {

@@ -52,17 +52,7 @@ pub(super) struct Coarse {
     sums: Vec<f64>,
 }
 
-saved!(Coarse {
-    clusters,
-    count,
-    places,
-    free,
-    stiffness,
-    inverse,
-    loads,
-    motions,
-    sums
-});
+saved! { Coarse { clusters, count, places, free, stiffness, inverse, loads, motions, sums } }
 
 impl Coarse {
     /// Clusters of nodes at these positions.

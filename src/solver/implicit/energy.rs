@@ -41,7 +41,7 @@ pub(super) struct Total {
     pub size: f64,
 }
 
-saved!(Total { energy, size });
+saved! { Total { energy, size } }
 
 /// The energy before a step.
 #[derive(Clone, Copy, Debug)]

@@ -34,13 +34,7 @@ pub(super) struct Spectrum {
     smallest: f64,
 }
 
-saved!(Spectrum {
-    diagonal,
-    beside,
-    steps,
-    most,
-    smallest
-});
+saved! { Spectrum { diagonal, beside, steps, most, smallest } }
 
 impl Spectrum {
     /// With room for the solutions of so many nodes.

@@ -23,7 +23,7 @@ pub(super) struct Partial {
     pub second: f64,
 }
 
-saved!(Partial { first, second });
+saved! { Partial { first, second } }
 
 /// When the gradient may stop.
 #[derive(Clone, Copy, Debug)]

@@ -63,15 +63,7 @@ pub(crate) struct History {
     pressed: Option<Pressed>,
 }
 
-saved!(History {
-    ways,
-    gains,
-    remainders,
-    step,
-    energy,
-    credit,
-    pressed
-});
+saved! { History { ways, gains, remainders, step, energy, credit, pressed } }
 
 /// How a substep ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,11 +102,7 @@ struct Experience {
     worn: bool,
 }
 
-saved!(Experience {
-    smallest,
-    fresh_products,
-    worn
-});
+saved! { Experience { smallest, fresh_products, worn } }
 
 /// What a body that is moved implicitly has beside its state.
 #[derive(Debug)]
@@ -183,43 +171,12 @@ pub(crate) struct Implicit {
     pub told: SolverReport,
 }
 
-saved!(Implicit {
-    order,
-    budget,
-    left,
-    accuracy,
-    histories,
-    is_deflected,
-    settled,
-    taken,
-    is_attached,
-    latest,
-    pushes,
-    means,
-    corrections,
-    residuals,
-    searches,
-    changes,
-    products,
-    preconditioned,
-    inertia,
-    all_inertia,
-    noise,
-    prepared,
-    blocks,
-    coarse,
-    stiffened,
-    loads,
-    partials,
-    spectrum,
-    stale,
-    was_stale,
-    memory,
-    kept,
-    newton,
-    report,
-    told
-} leaves { allowed: u32::MAX } where Self::ends);
+saved! { Implicit {
+    order, budget, left, accuracy, histories, is_deflected, settled, taken, is_attached, latest, pushes, means,
+    corrections, residuals, searches, changes, products, preconditioned, inertia, all_inertia, noise, prepared, blocks,
+    coarse, stiffened, loads, partials, spectrum, stale, was_stale, memory, kept, newton, report,
+    told } leaves { allowed: u32::MAX,
+} where Self::ends }
 
 impl Experience {
     const NONE: Self = Self {

@@ -23,7 +23,7 @@ pub(super) struct Pressed {
     acts: bool,
 }
 
-saved!(Pressed { forces, acts });
+saved! { Pressed { forces, acts } }
 
 impl Pressed {
     /// Nothing presses.

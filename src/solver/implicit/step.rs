@@ -31,7 +31,7 @@ pub(super) struct Formula {
     pub carried: f64,
 }
 
-saved!(Formula { time, carried });
+saved! { Formula { time, carried } }
 
 impl Formula {
     pub(super) fn new(order: u32, step: f64, last_step: f64) -> Self {

@@ -37,14 +37,7 @@ pub(super) struct Descent {
     factor: Matrix,
 }
 
-saved!(Descent {
-    network,
-    equation,
-    residuals,
-    gradient,
-    matrix,
-    factor
-});
+saved! { Descent { network, equation, residuals, gradient, matrix, factor } }
 
 /// When a descent is done.
 #[derive(Clone, Copy, Debug)]

@@ -42,19 +42,7 @@ pub(super) struct Equation {
     areas: Vec<[DVec3; 4]>,
 }
 
-saved!(Equation {
-    anchors,
-    ways,
-    inertia,
-    loads,
-    masses,
-    drifts,
-    holds,
-    pins,
-    rate,
-    pressures,
-    areas
-});
+saved! { Equation { anchors, ways, inertia, loads, masses, drifts, holds, pins, rate, pressures, areas } }
 
 /// What of the stiffness of rings stands in the factor, as a part of what it were if each tetrahedron kept its volume.
 const PART_OF_RINGS: f32 = 0.05;

@@ -30,14 +30,7 @@ pub(super) struct Gradient {
     pressure_changes: Vec<f64>,
 }
 
-saved!(Gradient {
-    corrections,
-    searches,
-    residuals,
-    preconditioned,
-    products,
-    pressure_changes
-});
+saved! { Gradient { corrections, searches, residuals, preconditioned, products, pressure_changes } }
 
 /// How the iterations ended.
 #[derive(Clone, Copy, Debug)]

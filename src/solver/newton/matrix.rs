@@ -13,7 +13,7 @@ pub(super) struct Matrix {
     pub beside: Vec<DMat3>,
 }
 
-saved!(Matrix { diagonal, beside });
+saved! { Matrix { diagonal, beside } }
 
 impl Matrix {
     pub fn new(node_count: usize, spring_count: usize) -> Result<Self> {

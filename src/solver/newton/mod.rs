@@ -37,11 +37,7 @@ pub(crate) struct Newton {
     growths: Vec<f64>,
 }
 
-saved!(Newton {
-    descent,
-    remainders,
-    growths
-});
+saved! { Newton { descent, remainders, growths } }
 
 impl Newton {
     /// For a body that these forces move.

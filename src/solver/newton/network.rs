@@ -31,19 +31,9 @@ pub(super) struct Network {
     ring_members: Vec<u32>,
 }
 
-saved!(Network {
-    starts,
-    links,
-    tetrahedra,
-    loads,
-    beside,
-    edges,
-    law,
-    volumes,
-    ring_loads,
-    ring_starts,
-    ring_members
-});
+saved! { Network {
+    starts, links, tetrahedra, loads, beside, edges, law, volumes, ring_loads, ring_starts, ring_members,
+} }
 
 /// A tetrahedron, and where its pairs of corners are.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +44,7 @@ pub(super) struct Tetrahedron {
     pub places: [usize; 6],
 }
 
-saved!(Tetrahedron { corners, rest, places });
+saved! { Tetrahedron { corners, rest, places } }
 
 /// A tetrahedron with the law and the load of the equation.
 #[derive(Clone, Copy)]

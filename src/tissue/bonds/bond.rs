@@ -15,7 +15,7 @@ pub(super) const OF_POINT: usize = 4;
 pub(super) const CORNERS: usize = 2 * OF_POINT;
 
 /// One of the points of a bond, as the caller knows it and as the solvers do.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BondPoint {
     /// By the body's place in the world.
     pub body: usize,
@@ -49,7 +49,7 @@ pub(crate) struct BondCorner {
 saved! { BondCorner { body, node, weight, end } }
 
 /// Two points that are kept together.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bond {
     /// Its name among the world's attachments.
     pub id: SlotId,
@@ -91,7 +91,7 @@ saved! { Bond {
 } }
 
 /// A node at which bonds are.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct BondEnd {
     pub body: usize,
     pub node: u32,
@@ -133,15 +133,7 @@ impl BondEnd {
             body: corner.body,
             node: corner.node,
             is_used: true,
-            is_on_skin: false,
-            is_in_turn: false,
-            velocity: Vec3::ZERO,
-            answer: Vec3::ZERO,
-            given: Vec3::ZERO,
-            place: DVec3::ZERO,
-            shift: DVec3::ZERO,
-            pending: Vec3::ZERO,
-            is_pending: false,
+            ..Self::default()
         }
     }
 }

@@ -81,18 +81,7 @@ impl Bonds {
             corners: corners_of(&points),
             thread,
             limit: if limit > 0.0 { limit } else { f32::INFINITY },
-            foreseen: Vec3::ZERO,
-            mean: Vec3::ZERO,
-            is_in_turn: false,
-            load: Vec3::ZERO,
-            impulse: Vec3::ZERO,
-            sum: DVec3::ZERO,
-            work: 0.0,
-            masses: Vec3::ZERO,
-            gap: DVec3::ZERO,
-            miss: 0.0,
-            acts: false,
-            has_equation: false,
+            ..Bond::default()
         };
         memory::push(&mut self.bonds, bond)
     }

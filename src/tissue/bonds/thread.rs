@@ -20,7 +20,7 @@ const RESOLVED: f64 = 0.5;
 /// stiff as the tissue there. What is to be nearer than contacts let it could not be had, and what pulls and presses would grow without end.
 const LEAST_GIVE: f64 = 0.2;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Thread {
     /// How long it is while nothing pulls, and what it is to become, m.
     pub length: f64,
@@ -104,20 +104,10 @@ impl Thread {
             target,
             compliance,
             most: f64::INFINITY,
-            lead: None,
-            pace: 0.0,
             current: length,
             reach: length,
-            gentle: 0.0,
-            led: DVec3::ZERO,
-            speed: DVec3::ZERO,
-            apart: DVec3::ZERO,
-            line: None,
-            drift: 0.0,
-            duration: 0.0,
-            give: 0.0,
-            answer: DVec3::ZERO,
             gave: compliance,
+            ..Self::default()
         }
     }
 
