@@ -140,15 +140,10 @@ impl Body {
         if cuttable.material.solid().is_some() {
             return self.tear_solid(cuttable, spring, skin);
         }
-        let mut why = Withheld::NoWay;
-        for (vertex, load) in self.torn_apart(cuttable, spring)? {
-            match self.tear_through(cuttable, vertex, &load, skin.as_deref_mut())? {
-                Torn::Made => return Ok(Torn::Made),
-                Torn::Not(Withheld::NoWay) => {}
-                Torn::Not(other) => why = other,
-            }
-        }
-        Ok(Torn::Not(why))
+        let places = self.torn_apart(cuttable, spring)?;
+        first_made(places, |vertex, load| {
+            self.tear_through(cuttable, vertex, load, skin.as_deref_mut())
+        })
     }
 
     /// Where a spring may tear the surface, what is to be tried first before the others.
@@ -234,6 +229,16 @@ impl Body {
             }
             Err(error) => Err(error),
         };
+        self.end_tear(cuttable, applied, nodes)
+    }
+
+    /// Counts a tear at these nodes that was applied, or takes its cut back.
+    pub(super) fn end_tear(
+        &mut self,
+        cuttable: &mut Cuttable,
+        applied: Result<CutReport>,
+        nodes: Vec<u32>,
+    ) -> Result<Torn> {
         match applied {
             Ok(CutReport { pieces_parted, .. }) => {
                 if let Some(tears) = &mut self.tears {
@@ -264,6 +269,22 @@ impl Body {
         let [pulled, pushed] = [0, 1].map(|kind| tensors[kind] - along_itself(sums[kind]));
         0.5 * (pulled - pushed)
     }
+}
+
+/// Tears at the first of some places where that can be done; else says why it cannot.
+pub(super) fn first_made(
+    places: Vec<(u32, VertexLoad)>,
+    mut tear: impl FnMut(u32, &VertexLoad) -> Result<Torn>,
+) -> Result<Torn> {
+    let mut why = Withheld::NoWay;
+    for (place, load) in places {
+        match tear(place, &load)? {
+            Torn::Made => return Ok(Torn::Made),
+            Torn::Not(Withheld::NoWay) => {}
+            Torn::Not(other) => why = other,
+        }
+    }
+    Ok(Torn::Not(why))
 }
 
 /// The matrix with the vector as its eigenvector, and the vector's length as its value; nothing across it.

@@ -1,8 +1,8 @@
 //! Tears of solids, along faces of their material.
 
+use super::Body;
 use super::cuttable::Cuttable;
-use super::tear::Torn;
-use super::{Body, CutReport};
+use super::tear::{Torn, first_made};
 use crate::base::{Result, memory};
 use crate::cutting::{CutMaterial, Divided, VertexLoad};
 use crate::def::Withheld;
@@ -16,15 +16,10 @@ impl Body {
         spring: [u32; 2],
         mut skin: Option<&mut Skin>,
     ) -> Result<Torn> {
-        let mut why = Withheld::NoWay;
-        for (node, load) in self.stretched_at(cuttable, spring)? {
-            match self.tear_node(cuttable, node, &load, skin.as_deref_mut())? {
-                Torn::Made => return Ok(Torn::Made),
-                Torn::Not(Withheld::NoWay) => {}
-                Torn::Not(other) => why = other,
-            }
-        }
-        Ok(Torn::Not(why))
+        let places = self.stretched_at(cuttable, spring)?;
+        first_made(places, |node, load| {
+            self.tear_node(cuttable, node, load, skin.as_deref_mut())
+        })
     }
 
     /// The nodes at which a spring may tear its solid, in the order in which they are to be tried.
@@ -94,18 +89,7 @@ impl Body {
             }
             Err(error) => Err(error),
         };
-        match applied {
-            Ok(CutReport { pieces_parted, .. }) => {
-                let order = &self.system.order;
-                if let Some(tears) = &mut self.tears {
-                    tears.made(pieces_parted, nodes.into_iter().map(|node| order.own(node)));
-                }
-                Ok(Torn::Made)
-            }
-            Err(error) => {
-                cuttable.material.undo();
-                Err(error)
-            }
-        }
+        nodes.iter_mut().for_each(|node| *node = self.system.order.own(*node));
+        self.end_tear(cuttable, applied, nodes)
     }
 }

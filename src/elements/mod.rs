@@ -156,11 +156,7 @@ impl Elements {
             memory: Memory::new(law, viscosity, yielding, &parts, ring_count)?,
             copies: Copies::new(&parts, node_count)?,
             forces: Sums::new(count, parts.len(), false, ring_count)?,
-            rings: if law.rings {
-                Some(rings::of(&parts, node_count)?)
-            } else {
-                None
-            },
+            rings: law.rings.then(|| rings::of(&parts, node_count)).transpose()?,
             parts,
             starts,
             stiffnesses: memory::filled(0.0, node_count)?,

@@ -170,6 +170,12 @@ impl Stability {
         Some(([node, other], shortest))
     }
 
+    /// What the last estimate tells of the springs that it looked at.
+    fn tightest_known(&self) -> Option<Tightest> {
+        let shortest = self.reach / TRAVEL_BEFORE_ESTIMATE;
+        self.now.map(|limit| Tightest { limit, shortest })
+    }
+
     /// The same after springs of these nodes, given in order, have come or changed: no other node has to be looked at. Where they
     /// became softer it may be lower than it has to be.
     pub fn changed(
@@ -180,12 +186,8 @@ impl Stability {
         positions: &Vectors,
         watched: &mut Watched,
     ) -> Self {
-        let Some(now) = self.now else {
+        let Some(mut found) = self.tightest_known() else {
             return self;
-        };
-        let mut found = Tightest {
-            limit: now,
-            shortest: self.reach / TRAVEL_BEFORE_ESTIMATE,
         };
         let is_few = nodes.len() <= FEW;
         if !is_few {
@@ -212,12 +214,8 @@ impl Stability {
         positions: &Vectors,
         (watched, mut candidates): (&mut Watched, Vec<Candidate>),
     ) -> Self {
-        let Some(now) = self.now else {
+        let Some(mut found) = self.tightest_known() else {
             return self;
-        };
-        let mut found = Tightest {
-            limit: now,
-            shortest: self.reach / TRAVEL_BEFORE_ESTIMATE,
         };
         for &node in nodes {
             if let Some(sums) = NodeBound::of(node as usize, springs, &masses, positions) {

@@ -185,13 +185,6 @@ impl StencilLaw<2> for Arms {
         }
     }
 
-    const IS_STRING: bool = true;
-
-    #[inline(always)]
-    fn weights(_shape: &Arm) -> [f32; 2] {
-        [-1.0, 1.0]
-    }
-
     #[inline(always)]
     fn numbers(arm: &Arm) -> [f32; 2] {
         [arm.rest_length, arm.load]

@@ -76,14 +76,6 @@ impl StencilLaw<1> for Home {
         parting.of_node(node).for_each(|part| see(part.nodes, part.part));
     }
 
-    fn scaled(&self, shape: &HomeShape, _length: f64) -> (HomeShape, f64) {
-        (*shape, 1.0)
-    }
-
-    fn is_finite(&self, _shape: &HomeShape) -> bool {
-        true
-    }
-
     fn move_origin(&self, shape: &mut HomeShape, origin: DVec3) {
         shape.local = (shape.rest.as_dvec3() - origin).as_vec3();
     }

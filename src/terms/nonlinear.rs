@@ -251,13 +251,6 @@ impl StencilLaw<2> for Stiffening {
         (rest_length > 0.0).then_some(rest_length)
     }
 
-    const IS_STRING: bool = true;
-
-    #[inline(always)]
-    fn weights(_shape: &f32) -> [f32; 2] {
-        [-1.0, 1.0]
-    }
-
     #[inline(always)]
     fn numbers(&rest_length: &f32) -> [f32; 2] {
         [rest_length, 0.0]

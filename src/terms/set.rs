@@ -157,13 +157,6 @@ impl StencilLaw<2> for Sets {
         }
     }
 
-    const IS_STRING: bool = true;
-
-    #[inline(always)]
-    fn weights(_shape: &Set) -> [f32; 2] {
-        [-1.0, 1.0]
-    }
-
     #[inline(always)]
     fn numbers(set: &Set) -> [f32; 2] {
         [set.longer, set.rest_length]

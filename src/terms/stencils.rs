@@ -91,10 +91,14 @@ pub(super) trait StencilLaw<const N: usize>: Saved + Debug + Send + Sync + 'stat
 
     /// Whether it is a string: it pulls along one vector, the sum of what its nodes have, weighted by numbers that add up to 0. What
     /// follows is for those, to be worked out side by side in `f32`, and marked `#[inline(always)]`.
-    const IS_STRING: bool = false;
+    const IS_STRING: bool = Self::IS_OF_SPRINGS;
 
+    /// Those of a spring, unless it says otherwise.
+    #[inline(always)]
     fn weights(_shape: &Self::Shape) -> [f32; N] {
-        [0.0; N]
+        let mut weights = [0.0; N];
+        (weights[0], weights[N - 1]) = (-1.0, 1.0);
+        weights
     }
 
     /// What of a shape counts beside its length.

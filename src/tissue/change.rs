@@ -90,11 +90,7 @@ impl Changing {
             roles,
             triangles: of_edge,
             first_later: body.node_count() as u32,
-            wound: if wound {
-                Some(Wound::new(body, sides.len())?)
-            } else {
-                None
-            },
+            wound: wound.then(|| Wound::new(body, sides.len())).transpose()?,
         })
     }
 

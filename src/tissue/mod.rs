@@ -137,11 +137,8 @@ impl Tissue {
         let lists = self.islands.room() + self.skins.len() + 1;
         self.pairs.reserve(lists, features)?;
         let spare = body.spare_nodes();
-        let clearances = if body.contact.with_bodies {
-            Some(Clearances::new(skin.nodes.len() + spare, skin.edges.len() + 3 * spare)?)
-        } else {
-            None
-        };
+        let of_corners_and_edges = || Clearances::new(skin.nodes.len() + spare, skin.edges.len() + 3 * spare);
+        let clearances = body.contact.with_bodies.then(of_corners_and_edges).transpose()?;
         while self.skins.len() <= place {
             memory::push(&mut self.skins, None)?;
         }
