@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use super::{Error, Result};
+use super::{Result, ensure};
 
 /// Refuses what is not above 0 and finite.
 pub(crate) fn above_zero<N: Display + Copy + Into<f64>>(name: &str, value: N) -> Result<()> {
@@ -20,8 +20,9 @@ pub(crate) fn finite(name: &str, value: f32) -> Result<()> {
 }
 
 fn in_range<N: Display + Copy + Into<f64>>(name: &str, value: N, holds: fn(f64) -> bool, range: &str) -> Result<()> {
-    if holds(value.into()) && value.into().is_finite() {
-        return Ok(());
-    }
-    Err(Error::invalid(format!("{name} is {value}: must be {range}")))
+    ensure!(
+        holds(value.into()) && value.into().is_finite(),
+        "{name} is {value}: must be {range}"
+    );
+    Ok(())
 }

@@ -394,13 +394,12 @@ impl Body {
     }
 
     pub(crate) fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
-        if (node as usize) < self.node_count() {
-            return Ok(());
-        }
-        Err(Error::invalid(format!(
+        ensure!(
+            (node as usize) < self.node_count(),
             "{name} is {node}: the body has {} nodes",
             self.node_count()
-        )))
+        );
+        Ok(())
     }
 
     /// Whether it is a point that is bound to nodes.

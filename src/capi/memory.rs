@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use glam::{Quat, Vec3};
 
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 
 /// A struct that begins with `struct_size`, so that it can grow.
 ///
@@ -349,10 +349,8 @@ fn known_size<T: Versioned>(name: &dyn fmt::Display, size: usize) -> Result<()> 
 }
 
 fn aligned<T>(name: &str, pointer: *const T) -> Result<()> {
-    if pointer.is_aligned() {
-        return Ok(());
-    }
-    Err(Error::invalid(format!("{name} is not aligned")))
+    ensure!(pointer.is_aligned(), "{name} is not aligned");
+    Ok(())
 }
 
 pub(super) fn null(name: &str) -> Error {
@@ -361,10 +359,8 @@ pub(super) fn null(name: &str) -> Error {
 
 /// Refuses a reserved field that is not zero.
 pub(super) fn reserved(name: &str, value: u32) -> Result<()> {
-    if value == 0 {
-        return Ok(());
-    }
-    Err(Error::invalid(format!("{name} is {value}: reserved fields are 0")))
+    ensure!(value == 0, "{name} is {value}: reserved fields are 0");
+    Ok(())
 }
 
 /// A flag of the caller's.

@@ -1,6 +1,6 @@
 //! What meets what, and what a body asks of contact.
 
-use crate::base::{Error, Result, StateHasher, not_negative};
+use crate::base::{Error, Result, StateHasher, ensure, not_negative};
 use crate::codec::{saved, saved_enum};
 use crate::mesh::FURTHEST;
 
@@ -188,10 +188,6 @@ impl BodyContact {
 
 /// Refuses a length with which squares of distances would not stay finite.
 pub(crate) fn check_reach(name: &str, value: f32) -> Result<()> {
-    if value <= FURTHEST {
-        return Ok(());
-    }
-    Err(Error::invalid(format!(
-        "{name} is {value}: must be at most {FURTHEST:e} m"
-    )))
+    ensure!(value <= FURTHEST, "{name} is {value}: must be at most {FURTHEST:e} m");
+    Ok(())
 }

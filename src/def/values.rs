@@ -56,19 +56,13 @@ impl Values<'_> {
 }
 
 pub(crate) fn expect_count(name: &str, count: usize, expected: usize) -> Result<()> {
-    if count == expected {
-        return Ok(());
-    }
-    Err(Error::invalid(format!(
-        "{name} has {count} entries: must have {expected}"
-    )))
+    ensure!(count == expected, "{name} has {count} entries: must have {expected}");
+    Ok(())
 }
 
 pub(crate) fn finite_vector(name: &str, vector: Vec3) -> Result<()> {
-    if vector.is_finite() {
-        return Ok(());
-    }
-    Err(Error::invalid(format!("{name} is {vector}: must be finite")))
+    ensure!(vector.is_finite(), "{name} is {vector}: must be finite");
+    Ok(())
 }
 
 pub(crate) fn finite_vectors(name: &str, vectors: &[Vec3]) -> Result<()> {

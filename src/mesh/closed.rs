@@ -267,13 +267,12 @@ impl ClosedSurface {
 
     fn check_volume(&mut self) -> Result<()> {
         self.volume = self.enclosed(0..self.triangles.len());
-        if self.volume > 0.0 {
-            return Ok(());
-        }
-        Err(Error::invalid(format!(
+        ensure!(
+            self.volume > 0.0,
             "the surface encloses {:e} m³: its triangles face inward, or enclose nothing",
             self.volume
-        )))
+        );
+        Ok(())
     }
 
     /// Refuses parts that are inside out: those that face outward lie outside of all others, those that face inward within one.

@@ -130,17 +130,14 @@ impl Camera {
 }
 
 fn check_direction(name: &str, vector: Vec3) -> Result<()> {
-    if vector.is_finite() {
-        return Ok(());
-    }
-    Err(Error::invalid(format!("{name} is {vector}, not finite")))
+    ensure!(vector.is_finite(), "{name} is {vector}, not finite");
+    Ok(())
 }
 
 fn check_angle(field_of_view: f32) -> Result<()> {
-    if field_of_view > 0.0 && field_of_view < std::f32::consts::PI {
-        return Ok(());
-    }
-    Err(Error::invalid(format!(
+    ensure!(
+        field_of_view > 0.0 && field_of_view < std::f32::consts::PI,
         "field_of_view is {field_of_view}, not between 0 and pi"
-    )))
+    );
+    Ok(())
 }

@@ -11,42 +11,8 @@ use crate::Result;
 use crate::base::memory;
 
 /// Statements that say nothing about points, triangles, lines: looks, groups, smooth surfaces.
-const IGNORED: [&str; 34] = [
-    "vn",
-    "vt",
-    "vp",
-    "g",
-    "o",
-    "s",
-    "mg",
-    "usemtl",
-    "mtllib",
-    "usemap",
-    "maplib",
-    "bevel",
-    "c_interp",
-    "d_interp",
-    "lod",
-    "shadow_obj",
-    "trace_obj",
-    "ctech",
-    "stech",
-    "cstype",
-    "deg",
-    "bmat",
-    "step",
-    "curv",
-    "curv2",
-    "surf",
-    "parm",
-    "trim",
-    "hole",
-    "scrv",
-    "sp",
-    "end",
-    "con",
-    "call",
-];
+const IGNORED: &str = "vn vt vp g o s mg usemtl mtllib usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj ctech stech \
+    cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con call";
 
 pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
     let mut raw = RawMesh::default();
@@ -82,7 +48,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
             }
             [b"f", ..] => return Err(fail("a face needs three corners".into())),
             [b"l" | b"p", ..] => raw.ignored_cells += 1,
-            [word, ..] if IGNORED.iter().any(|name| name.as_bytes() == *word) => {}
+            [word, ..] if IGNORED.split(' ').any(|name| name.as_bytes() == *word) => {}
             [word, ..] => return Err(fail(format!("{} is no statement", shown(word)))),
         }
     }
