@@ -11,8 +11,7 @@ pub(crate) struct DisjointSets {
 impl DisjointSets {
     /// Each of `count` numbers is alone.
     pub(crate) fn new(count: usize) -> Result<Self> {
-        let mut parents = memory::reserved(count)?;
-        parents.extend(0..count as u32);
+        let parents = memory::collected(0..count as u32)?;
         Ok(Self { parents })
     }
 

@@ -16,6 +16,13 @@ pub(crate) fn reserved<T>(count: usize) -> Result<Vec<T>> {
     Ok(values)
 }
 
+/// The values in a vector that has room for no more.
+pub(crate) fn collected<T>(values: impl ExactSizeIterator<Item = T>) -> Result<Vec<T>> {
+    let mut all = reserved(values.len())?;
+    all.extend(values);
+    Ok(all)
+}
+
 /// A copy of `values`.
 pub(crate) fn copied<T: Copy>(values: &[T]) -> Result<Vec<T>> {
     let mut copy = reserved(values.len())?;

@@ -46,8 +46,7 @@ impl Bearing {
             first,
         };
         // In the order of their nodes, which is that of their places in memory.
-        let mut order = memory::reserved(springs.len())?;
-        order.extend(0..springs.len() as u32);
+        let mut order = memory::collected(0..springs.len() as u32)?;
         order.sort_unstable_by_key(|&at| sorted(springs[at as usize].nodes));
         for at in order {
             let spring = springs[at as usize];

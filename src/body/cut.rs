@@ -190,23 +190,20 @@ impl Body {
         let copies = changes.cells.iter().filter(|piece| piece.cell != piece.source);
         let items = material.items_changed(changes)?;
         cuttable.search.reserve(material, copies.clone().count(), &items)?;
-        let mut gone = memory::reserved(rewiring.removed.len())?;
-        gone.extend(
+        let gone = memory::collected(
             rewiring
                 .removed
                 .iter()
                 .map(|spring| spring.nodes.map(|node| self.system.order.caller(node))),
-        );
+        )?;
         cuttable.log.reserve(changes, gone.len())?;
         let (known_triangles, new) = split_at(&changes.triangles, first_triangle);
-        let mut changed = memory::reserved(known_triangles.len())?;
-        changed.extend(
+        let changed = memory::collected(
             known_triangles
                 .iter()
                 .map(|&triangle| (triangle, material.corner_points(triangle))),
-        );
-        let mut added = memory::reserved(new.len())?;
-        added.extend(new.iter().map(|&triangle| material.corner_points(triangle)));
+        )?;
+        let added = memory::collected(new.iter().map(|&triangle| material.corner_points(triangle)))?;
         let change = SurfaceChange {
             changed: &changed,
             added: &added,
@@ -221,8 +218,7 @@ impl Body {
         if let Some(scaling) = &mut self.system.scaling {
             scaling.reserve(touched.len())?;
         }
-        let mut changing = memory::reserved(touched.len())?;
-        changing.extend(touched.iter().map(|touched| touched.node));
+        let changing = memory::collected(touched.iter().map(|touched| touched.node))?;
         let candidates = memory::reserved(touched.len())?;
         let of_pieces = parts.elements.iter().flat_map(|piece| piece.nodes);
         let mut at_pieces = memory::reserved(4 * parts.elements.len() + touched.len())?;
@@ -355,10 +351,8 @@ impl Body {
         changes: &Changes,
         (change, nodes): (&SurfaceChange, &[NewNode]),
     ) -> Result<Option<SkinChange>> {
-        let mut bared = memory::reserved(changes.triangles.len())?;
-        bared.extend(changes.triangles.iter().map(|&triangle| material.is_bared(triangle)));
-        let mut bound = memory::reserved(changes.bound.len())?;
-        bound.extend(changes.bound.iter().map(|bound| self.bound(bound)));
+        let bared = memory::collected(changes.triangles.iter().map(|&triangle| material.is_bared(triangle)))?;
+        let bound = memory::collected(changes.bound.iter().map(|bound| self.bound(bound)))?;
         let to_be = SurfaceToBe {
             change,
             bared: &bared,
@@ -384,9 +378,7 @@ impl Body {
             }
         }
         nodes.sort_unstable_by_key(|&(node, _)| node);
-        let mut new = memory::reserved(nodes.len())?;
-        new.extend(nodes.into_iter().map(|(_, new)| new));
-        Ok(new)
+        memory::collected(nodes.into_iter().map(|(_, new)| new))
     }
 
     /// Binds points to the copies that move them now.

@@ -59,8 +59,7 @@ impl Cuttable {
         };
         let mut material = match (drawn, tetrahedra) {
             ([], []) => {
-                let mut pairs = memory::reserved(springs.len())?;
-                pairs.extend(springs.iter().map(|spring| spring.nodes));
+                let pairs = memory::collected(springs.iter().map(|spring| spring.nodes))?;
                 CutMaterial::Springs(pairs)
             }
             (_, []) => CutMaterial::Surface(CutSurface::new(rest, drawn).map_err(refused)?),

@@ -10,8 +10,7 @@ use crate::springs::costs;
 
 /// The order that suits these springs best.
 pub(super) fn order_for_springs(positions: &[Vec3], springs: &[Spring], rounding: Rounding) -> Result<NodeOrder> {
-    let mut pairs = memory::reserved(springs.len())?;
-    pairs.extend(springs.iter().map(|spring| spring.nodes));
+    let pairs = memory::collected(springs.iter().map(|spring| spring.nodes))?;
     match best_order(positions, &pairs, costs(springs, rounding)?)? {
         Some(order) => NodeOrder::new(order),
         None => Ok(NodeOrder::default()),
@@ -21,12 +20,11 @@ pub(super) fn order_for_springs(positions: &[Vec3], springs: &[Spring], rounding
 /// The order that suits the edges of these tetrahedra best.
 pub(super) fn order_for_tetrahedra(positions: &[Vec3], tetrahedra: &[[u32; 4]]) -> Result<NodeOrder> {
     let edges = crate::mesh::edges(&[], tetrahedra)?;
-    let mut springs = memory::reserved(edges.len())?;
-    springs.extend(edges.into_iter().map(|nodes| Spring {
+    let springs = memory::collected(edges.into_iter().map(|nodes| Spring {
         nodes,
         stiffness: 0.0,
         rest_length: 0.0,
         damping: 0.0,
-    }));
+    }))?;
     order_for_springs(positions, &springs, Rounding { reach: 0.0 })
 }

@@ -204,8 +204,7 @@ impl Tears {
 /// Adds the edges of tetrahedra along which there is no spring, as springs without stiffness.
 fn add_edges(definition: &BodyDefinition, springs: &mut Vec<Spring>, order: &NodeOrder) -> Result<()> {
     let rest = definition.rest_positions.unwrap_or(definition.positions);
-    let mut known = memory::reserved(springs.len())?;
-    known.extend(springs.iter().map(|spring| sorted(spring.nodes)));
+    let mut known = memory::collected(springs.iter().map(|spring| sorted(spring.nodes)))?;
     known.sort_unstable();
     for edge in crate::mesh::edges(&[], definition.tetrahedra)? {
         let nodes = sorted(edge.map(|node| order.own(node)));

@@ -81,8 +81,7 @@ impl Body {
             (nodes, std::cmp::Reverse(*index))
         });
         changes.dedup_by_key(|(_, change)| (change.node, change.after.neighbour));
-        let mut once = memory::reserved(changes.len())?;
-        once.extend(changes.into_iter().map(|(_, change)| change));
+        let once = memory::collected(changes.into_iter().map(|(_, change)| change))?;
         self.change_springs(&once)
     }
 

@@ -226,11 +226,7 @@ impl CutMaterial {
         match self {
             Self::Springs(_) => Ok(Vec::new()),
             Self::Surface(_) => memory::copied(&changes.triangles),
-            Self::Solid(_) => {
-                let mut items = memory::reserved(changes.cells.len())?;
-                items.extend(changes.cells.iter().map(|piece| piece.cell));
-                Ok(items)
-            }
+            Self::Solid(_) => memory::collected(changes.cells.iter().map(|piece| piece.cell)),
         }
     }
 

@@ -67,8 +67,7 @@ fn parted<const N: usize>(
     sides: impl Iterator<Item = [u32; 2]>,
     most: usize,
 ) -> Result<Option<u32>> {
-    let mut live = memory::reserved(floods.open.len())?;
-    live.extend(0..floods.open.len());
+    let mut live = memory::collected(0..floods.open.len())?;
     while live.len() > 1 {
         for &flood in &live {
             if floods.reached.len() > most {

@@ -156,8 +156,7 @@ impl CutSurface {
             rest.len().max(cells.len()) < (NONE / 3) as usize,
             "more than 2^32 / 3 nodes or cells"
         );
-        let mut nodes = memory::reserved(rest.len())?;
-        nodes.extend(rest.iter().map(|&rest| Node { rest, first: NONE }));
+        let mut nodes = memory::collected(rest.iter().map(|&rest| Node { rest, first: NONE }))?;
         let mut vertices = memory::reserved(rest.len())?;
         vertices.extend((0..rest.len() as u32).map(|node| SurfaceVertex {
             nodes: [node; 3],
@@ -301,8 +300,7 @@ impl CutSurface {
     }
 
     fn check_fans(&self) -> Result<()> {
-        let mut counts = memory::reserved(self.vertices.values().len())?;
-        counts.resize(self.vertices.values().len(), 0);
+        let mut counts = memory::filled(0, self.vertices.values().len())?;
         for corner in self.triangles.values().iter().flat_map(|triangle| triangle.corners) {
             counts[corner as usize] += 1;
         }

@@ -65,8 +65,7 @@ impl<T: Copy> Tracked<T> {
     pub(crate) fn before(&self) -> Result<Vec<(u32, T)>> {
         let mut before = memory::copied(&self.before)?;
         // A stable sort would need memory that may not be refused; the first of equals is found by its place.
-        let mut places: Vec<usize> = memory::reserved(before.len())?;
-        places.extend(0..before.len());
+        let mut places: Vec<usize> = memory::collected(0..before.len())?;
         places.sort_unstable_by_key(|&place| (self.before[place].0, place));
         places.dedup_by_key(|place| self.before[*place].0);
         before.clear();

@@ -57,8 +57,7 @@ pub(super) fn places(tetrahedra: &[[u32; 4]]) -> Result<Vec<TetrahedronPlace>> {
 
 /// Tetrahedra in the order in which they fill parts.
 fn in_order(tetrahedra: &[[u32; 4]]) -> Result<Vec<u32>> {
-    let mut order: Vec<u32> = memory::reserved(tetrahedra.len())?;
-    order.extend(0..tetrahedra.len() as u32);
+    let mut order: Vec<u32> = memory::collected(0..tetrahedra.len() as u32)?;
     let lowest = |index: u32| tetrahedra[index as usize].into_iter().min();
     order.sort_unstable_by_key(|&index| (lowest(index), index));
     Ok(order)

@@ -39,11 +39,10 @@ impl Binding {
     /// Each vertex to the tetrahedron that it is in, the one that is nearest, or among several the one that it is deepest in; and which that is.
     pub fn to_tetrahedra(vertices: &[Vec3], positions: &[Vec3], tetrahedra: &[[u32; 4]]) -> Result<(Self, Vec<u32>)> {
         let corners = |place: u32| tetrahedra[place as usize].map(|node| positions[node as usize]);
-        let mut solids: Vec<PlacedTetrahedron> = memory::reserved(tetrahedra.len())?;
-        solids.extend(
+        let solids: Vec<PlacedTetrahedron> = memory::collected(
             (0..tetrahedra.len() as u32)
                 .map(|place| PlacedTetrahedron::of(corners(place).map(|corner| corner.as_dvec3()))),
-        );
+        )?;
         ensure!(
             solids.iter().any(PlacedTetrahedron::has_volume),
             "tetrahedra: none of them has a volume"
@@ -90,10 +89,9 @@ impl Binding {
     /// The same with the cells of a solid that has been cut: the one whose material is there or nearest.
     pub fn to_solid(vertices: &[Vec3], positions: &[Vec3], solid: &CutSolid) -> Result<(Self, Vec<u32>)> {
         let count = solid.vertices().len() as u32;
-        let mut places: Vec<Vec3> = memory::reserved(count as usize)?;
-        places.extend((0..count).map(|vertex| solid.place(vertex, positions)));
-        let mut pieces: Vec<[u32; 4]> = memory::reserved(solid.tetrahedra().len())?;
-        pieces.extend(solid.tetrahedra().iter().map(|tetrahedron| tetrahedron.corners));
+        let places: Vec<Vec3> = memory::collected((0..count).map(|vertex| solid.place(vertex, positions)))?;
+        let pieces: Vec<[u32; 4]> =
+            memory::collected(solid.tetrahedra().iter().map(|tetrahedron| tetrahedron.corners))?;
         let (_, mut homes) = Self::to_tetrahedra(vertices, &places, &pieces)?;
         let mut bound = memory::reserved(vertices.len())?;
         for (vertex, home) in vertices.iter().zip(&mut homes) {
@@ -111,10 +109,8 @@ impl Binding {
     /// Each vertex to the cell of a surface that may be cut whose material is nearest, and which that is.
     pub fn to_surface(vertices: &[Vec3], positions: &[Vec3], surface: &CutSurface) -> Result<(Self, Vec<u32>)> {
         let count = surface.vertices().len() as u32;
-        let mut places: Vec<Vec3> = memory::reserved(count as usize)?;
-        places.extend((0..count).map(|vertex| surface.place(vertex, positions)));
-        let mut pieces: Vec<[u32; 3]> = memory::reserved(surface.triangles().len())?;
-        pieces.extend(surface.triangles().iter().map(|triangle| triangle.corners));
+        let places: Vec<Vec3> = memory::collected((0..count).map(|vertex| surface.place(vertex, positions)))?;
+        let pieces: Vec<[u32; 3]> = memory::collected(surface.triangles().iter().map(|triangle| triangle.corners))?;
         let mut homes = nearest_triangles(vertices, &places, &pieces)?;
         let mut bound = memory::reserved(vertices.len())?;
         for (vertex, home) in vertices.iter().zip(&mut homes) {

@@ -70,8 +70,7 @@ pub(super) fn close(
     );
     let walls = walls((name, value), triangles)?;
     let rest = definition.rest_positions.unwrap_or(definition.positions);
-    let mut order_of_walls: Vec<u32> = memory::reserved(triangles.len())?;
-    order_of_walls.extend(0..triangles.len() as u32);
+    let mut order_of_walls: Vec<u32> = memory::collected(0..triangles.len() as u32)?;
     let lowest = |triangle: u32| {
         triangles[triangle as usize]
             .into_iter()
@@ -157,8 +156,7 @@ fn walls((name, value): (&str, f32), triangles: &[[u32; 3]]) -> Result<Vec<u32>>
         edges.extend([[a, b], [b, c], [c, a]].map(|[a, b]| ([a.min(b), a.max(b)], a < b, index)));
     }
     edges.sort_unstable();
-    let mut walls: Vec<u32> = memory::reserved(triangles.len())?;
-    walls.extend(0..triangles.len() as u32);
+    let mut walls: Vec<u32> = memory::collected(0..triangles.len() as u32)?;
     for same in edges.chunk_by(|a, b| a.0 == b.0) {
         let ups = same.iter().filter(|(_, goes_up, _)| *goes_up).count();
         if 2 * ups != same.len() {

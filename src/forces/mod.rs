@@ -303,13 +303,12 @@ impl Forces {
 
 /// The tetrahedra of a definition as elements, in the body's own numbers.
 fn elements_of(law: Law, definition: &BodyDefinition, order: &NodeOrder) -> Result<Elements> {
-    let mut tetrahedra = memory::reserved(definition.tetrahedra.len())?;
-    tetrahedra.extend(
+    let tetrahedra = memory::collected(
         definition
             .tetrahedra
             .iter()
             .map(|corners| corners.map(|corner| order.own(corner))),
-    );
+    )?;
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let at_rest = |own: u32| rest[order.caller(own) as usize].as_dvec3();
     let node_count = definition.positions.len();

@@ -51,8 +51,7 @@ saved! { TreeNode { min, max, first, count } }
 impl Tree {
     /// Over `count` triangles, halved at the median along the longest side of their centres' box.
     pub fn new(count: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<Self> {
-        let mut order: Vec<u32> = memory::reserved(count)?;
-        order.extend(0..count as u32);
+        let mut order: Vec<u32> = memory::collected(0..count as u32)?;
         let mut centres: Vec<Vec3> = memory::reserved(count)?;
         centres.extend(order.iter().map(|&triangle| {
             let [a, b, c] = corners(triangle);

@@ -18,8 +18,7 @@ pub(super) fn of(elements: &Filled, density: f32, definition: &BodyDefinition) -
             triangle_area(corners(triangle, rest)) * thickness
         }),
     }
-    let mut masses = memory::reserved(volumes.len())?;
-    masses.extend(volumes.iter().map(|volume| (f64::from(density) * volume) as f32));
+    let masses = memory::collected(volumes.iter().map(|volume| (f64::from(density) * volume) as f32))?;
     if let Some(node) = volumes.iter().position(|&volume| volume == 0.0) {
         return Err(Error::invalid(format!(
             "density is {density} kg/m³: node {node} belongs to none of the {}, and would have no mass",

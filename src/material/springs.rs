@@ -100,8 +100,7 @@ fn check_surface(springs: &[[u32; 2]], elements: &Filled, definition: &BodyDefin
 fn merged(springs: &[[u32; 2]], exact: &[f64], definition: &BodyDefinition) -> Result<Vec<f32>> {
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let reach = f64::from(definition.rounding().reach);
-    let mut order: Vec<u32> = memory::reserved(springs.len())?;
-    order.extend(0..springs.len() as u32);
+    let mut order: Vec<u32> = memory::collected(0..springs.len() as u32)?;
     order.sort_unstable_by(|&a, &b| exact[a as usize].total_cmp(&exact[b as usize]).then(a.cmp(&b)));
     let mut stiffnesses = memory::filled(0.0, springs.len())?;
     let mut left = &*order;

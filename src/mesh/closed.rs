@@ -124,8 +124,7 @@ impl ClosedSurface {
     /// Names nodes at the same place by the first of them.
     fn weld(&mut self) -> Result<()> {
         let positions = &self.positions;
-        let mut order: Vec<u32> = memory::reserved(positions.len())?;
-        order.extend(0..positions.len() as u32);
+        let mut order: Vec<u32> = memory::collected(0..positions.len() as u32)?;
         // Adding 0 makes one of the two zeros.
         let place = |node: u32| (positions[node as usize] + 0.0).to_array().map(f32::to_bits);
         order.sort_unstable_by_key(|&node| (place(node), node));
@@ -277,8 +276,7 @@ impl ClosedSurface {
 
     /// Refuses parts that are inside out: those that face outward lie outside of all others, those that face inward within one.
     fn check_parts(&self, parts: Vec<u32>) -> Result<()> {
-        let mut order: Vec<u32> = memory::reserved(parts.len())?;
-        order.extend(0..parts.len() as u32);
+        let mut order: Vec<u32> = memory::collected(0..parts.len() as u32)?;
         order.sort_unstable_by_key(|&triangle| (parts[triangle as usize], triangle));
         let same = |a: &u32, b: &u32| parts[*a as usize] == parts[*b as usize];
         if order.chunk_by(same).nth(1).is_none() {

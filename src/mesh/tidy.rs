@@ -91,8 +91,7 @@ impl LoadedMesh {
     /// Errors: [`Error::InvalidArgument`] where [`Mesh::check`] gives it, [`Error::OutOfMemory`].
     pub fn unchanged(mesh: Mesh) -> Result<Self> {
         mesh.check()?;
-        let mut node_of_vertex = memory::reserved(mesh.positions.len())?;
-        node_of_vertex.extend(0..mesh.positions.len() as u32);
+        let node_of_vertex = memory::collected(0..mesh.positions.len() as u32)?;
         Ok(LoadedMesh {
             mesh,
             node_of_vertex,
@@ -245,8 +244,7 @@ fn rename<const N: usize>(elements: &mut Vec<[u32; N]>, names: &[u32]) -> usize 
 
 /// Keeps the first of all elements with the same key, in their order; returns how many were dropped.
 fn keep_first<const N: usize>(elements: &mut Vec<[u32; N]>, key: impl Fn(&[u32; N]) -> [u32; N]) -> Result<usize> {
-    let mut order = memory::reserved(elements.len())?;
-    order.extend(elements.iter().enumerate().map(|(i, e)| (key(e), i)));
+    let mut order = memory::collected(elements.iter().enumerate().map(|(i, e)| (key(e), i)))?;
     order.sort_unstable();
     let mut keep = memory::filled(true, elements.len())?;
     for pair in order.windows(2) {
@@ -263,8 +261,7 @@ fn keep_first<const N: usize>(elements: &mut Vec<[u32; N]>, key: impl Fn(&[u32; 
 /// Every vertex is compared with the firsts of the cells of a grid that its ball reaches. Firsts lie apart, so a cell
 /// holds few of them and the time is linear.
 fn weld(vertices: &[DVec3], used: &[bool]) -> Result<Vec<u32>> {
-    let mut first_of_vertex = memory::reserved(vertices.len())?;
-    first_of_vertex.extend(0..vertices.len() as u32);
+    let mut first_of_vertex = memory::collected(0..vertices.len() as u32)?;
 
     let in_use = || vertices.iter().zip(used).filter(|(_, used)| **used);
     let low = in_use().fold(DVec3::INFINITY, |low, (p, _)| low.min(*p));

@@ -193,9 +193,7 @@ impl Pins {
 
     /// Pins of these nodes, for all axes, to be [held](Self::hold_all).
     pub fn of(nodes: &[u32]) -> Result<Vec<Pin>> {
-        let mut pins = memory::reserved(nodes.len())?;
-        pins.extend(nodes.iter().map(|&node| Pin::new(node, BVec3::TRUE)));
-        Ok(pins)
+        memory::collected(nodes.iter().map(|&node| Pin::new(node, BVec3::TRUE)))
     }
 
     /// Holds nodes by these pins, which are in order; none of them is held yet, and there is room.

@@ -29,9 +29,7 @@ pub(super) fn along_curve(positions: &[Vec3]) -> Result<Vec<u32>> {
         (key(place.to_array().map(|c| c as u32)), node)
     }));
     keyed.sort_unstable();
-    let mut order = memory::reserved(keyed.len())?;
-    order.extend(keyed.iter().map(|&(_, node)| node));
-    Ok(order)
+    memory::collected(keyed.iter().map(|&(_, node)| node))
 }
 
 /// How far along the curve a place is (Skilling 2004, "Programming the Hilbert curve"): from the coarsest cubes to the

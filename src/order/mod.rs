@@ -67,8 +67,7 @@ pub(crate) fn best_order(positions: &[Vec3], springs: &[[u32; 2]], costs: Costs)
     }
     if !best.is_settled() {
         best.offer(given)?;
-        let mut names = memory::reserved(curve.len())?;
-        names.extend(0..curve.len() as u32);
+        let names = memory::collected(0..curve.len() as u32)?;
         best.offer(names)?;
         best.offer(reverse_cuthill_mckee(&links)?)?;
     }

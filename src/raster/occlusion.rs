@@ -32,8 +32,8 @@ impl Occlusion {
     /// `reach`, in metres, is how far something may be and still hide the sky.
     pub fn new(geometry: &Geometry, small: &View, size: [u32; 2], scale: f64, reach: f32) -> Result<Self> {
         let [width, height] = size.map(|length| length as usize);
-        let mut depths = filled(width * height, f32::INFINITY)?;
-        let mut normals = filled(width * height, Vec3::ZERO)?;
+        let mut depths = memory::filled(f32::INFINITY, width * height)?;
+        let mut normals = memory::filled(Vec3::ZERO, width * height)?;
         let window = Window::new(size[0], size[1]);
         let eye = small.origin().as_vec3();
         for triangle in 0..geometry.triangles.len() as u32 {
@@ -55,9 +55,9 @@ impl Occlusion {
             height,
             scale,
             depths,
-            open: filled(width * height, 1.0)?,
+            open: memory::filled(1.0, width * height)?,
         };
-        let mut positions = filled(width * height, Vec3::ZERO)?;
+        let mut positions = memory::filled(Vec3::ZERO, width * height)?;
         for (place, position) in positions.iter_mut().enumerate() {
             let depth = occlusion.depths[place];
             if depth.is_finite() {
@@ -97,7 +97,7 @@ impl Occlusion {
 
     /// Averages over the pixels whose spirals differ, along rows and then columns, within one surface.
     fn blur(&mut self, reach: f32) -> Result<()> {
-        let mut result = filled(self.open.len(), 1.0)?;
+        let mut result = memory::filled(1.0, self.open.len())?;
         for step in [1, self.width] {
             for (place, value) in result.iter_mut().enumerate() {
                 let depth = self.depths[place];
@@ -170,10 +170,4 @@ fn open_sky(spiral: &[[f32; 2]; TAPS], normal: Vec3, reach: f32, way: impl Fn(f3
         hidden += (1.0 - squared).max(0.0) * (height / reach) / (squared + 0.01);
     }
     (1.0 - STRENGTH * hidden / TAPS as f32).clamp(0.0, 1.0)
-}
-
-fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>> {
-    let mut buffer = memory::reserved(count)?;
-    buffer.resize(count, value);
-    Ok(buffer)
 }

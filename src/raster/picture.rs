@@ -135,8 +135,7 @@ impl<'a> Painter<'a> {
     /// Appends all pixels, band by band.
     fn paint(&self, pixels: &mut Vec<[u8; 4]>) -> Result<()> {
         let positions = &self.geometry.positions;
-        let mut points = memory::reserved(positions.len())?;
-        points.extend(positions.iter().map(|&point| self.view.transform(point)));
+        let points = memory::collected(positions.iter().map(|&point| self.view.transform(point)))?;
         let ghosts = self.geometry.parts.iter().any(|part| part.look.show_through > 0.0);
 
         let fine_width = self.width * FINE;

@@ -51,8 +51,7 @@ impl ShadowMap {
             SIZE,
         );
         let count = SIZE as usize * SIZE as usize;
-        let mut depths = memory::reserved(count)?;
-        depths.resize(count, f32::INFINITY);
+        let mut depths = memory::filled(f32::INFINITY, count)?;
         let window = Window::new(SIZE, SIZE);
         for triangle in solid() {
             view.triangle(&window, geometry.corners(triangle), |fragment| {

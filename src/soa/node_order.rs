@@ -77,8 +77,6 @@ impl NodeOrder {
 
     /// The body's own numbers of the corners of triangles.
     pub fn own_triangles(&self, triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>> {
-        let mut owned = memory::reserved(triangles.len())?;
-        owned.extend(triangles.iter().map(|corners| corners.map(|corner| self.own(corner))));
-        Ok(owned)
+        memory::collected(triangles.iter().map(|corners| corners.map(|corner| self.own(corner))))
     }
 }

@@ -353,8 +353,7 @@ impl System {
         nodes.dedup();
         nodes.retain(|&node| grasps.place_of(node).is_err());
         let mut held = memory::reserved(nodes.len())?;
-        let mut untouched = memory::reserved(nodes.len())?;
-        untouched.extend(nodes.iter().map(|&node| (node, tool)));
+        let untouched = memory::collected(nodes.iter().map(|&node| (node, tool)))?;
         let pins = Pins::of(&nodes)?;
         // From here on nothing fails.
         close(self);

@@ -100,8 +100,7 @@ impl Parting {
 
     /// Each node that was added with its source, in order.
     pub fn know_nodes(&mut self) -> Result<Vec<(u32, u32)>> {
-        let mut by_node = memory::reserved(self.nodes.len())?;
-        by_node.extend(self.nodes.iter().map(|piece| (piece.node, piece.source)));
+        let mut by_node = memory::collected(self.nodes.iter().map(|piece| (piece.node, piece.source)))?;
         by_node.sort_unstable();
         Ok(by_node)
     }

@@ -151,8 +151,7 @@ pub(super) fn of_springs<T>(
     goes_by_strain: bool,
     shape: impl Fn(f32) -> T,
 ) -> Result<Vec<Stencil<T, 2>>> {
-    let mut all = memory::reserved(springs.len())?;
-    all.extend(springs.iter().map(|spring| {
+    memory::collected(springs.iter().map(|spring| {
         let mut nodes = spring.nodes.map(|node| order.own(node));
         nodes.sort_unstable();
         let is_there = spring.rest_length > 0.0 || !goes_by_strain;
@@ -161,8 +160,7 @@ pub(super) fn of_springs<T>(
             stiffness: if is_there { spring.stiffness } else { 0.0 },
             shape: shape(spring.rest_length),
         }
-    }));
-    Ok(all)
+    }))
 }
 
 /// Terms of one law.
@@ -227,8 +225,7 @@ impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
                 starts[tile] += starts[tile - 1];
             }
         }
-        let mut visitors = memory::reserved(visits.len())?;
-        visitors.extend(visits.iter().map(|&(_, index)| index));
+        let visitors = memory::collected(visits.iter().map(|&(_, index)| index))?;
         Ok(Self {
             law,
             all,

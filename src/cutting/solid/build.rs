@@ -23,8 +23,7 @@ impl CutSolid {
             rest.len().max(cells.len()) < (NONE / 4) as usize,
             "more than 2^30 nodes or cells"
         );
-        let mut nodes = memory::reserved(rest.len())?;
-        nodes.extend(rest.iter().map(|&rest| Node { rest, first: NONE }));
+        let mut nodes = memory::collected(rest.iter().map(|&rest| Node { rest, first: NONE }))?;
         let mut vertices = memory::reserved(rest.len())?;
         vertices.extend((0..rest.len() as u32).map(|node| SolidVertex {
             nodes: [node; 4],
@@ -89,8 +88,7 @@ impl CutSolid {
     }
 
     fn check_stars(&self) -> Result<()> {
-        let mut counts = memory::reserved(self.vertices.values().len())?;
-        counts.resize(self.vertices.values().len(), 0);
+        let mut counts = memory::filled(0, self.vertices.values().len())?;
         for corner in self.tetrahedra().iter().flat_map(|tetrahedron| tetrahedron.corners) {
             counts[corner as usize] += 1;
         }
@@ -170,8 +168,8 @@ fn put_in_order(
         given.len(),
         triangles.len()
     );
-    let mut places = memory::reserved(given.len())?;
-    places.extend((0..given.len() as u32).map(|place| (from_lowest(given[place as usize]), place)));
+    let mut places =
+        memory::collected((0..given.len() as u32).map(|place| (from_lowest(given[place as usize]), place)))?;
     places.sort_unstable();
     let mut known = memory::copied(triangles)?;
     known.sort_unstable_by_key(|triangle| from_lowest(triangle.corners));

@@ -66,8 +66,7 @@ impl Coarse {
             let size = nodes.len() as f32;
             centres.push(nodes.map(|node| positions.get(node)).sum::<Vec3>() / size);
         }
-        let mut order: Vec<u32> = memory::reserved(blocks)?;
-        order.extend(0..blocks as u32);
+        let mut order: Vec<u32> = memory::collected(0..blocks as u32)?;
         let mut clusters = memory::filled(0, blocks)?;
         let mut next = 0;
         split(&centres, &mut order, count, &mut next, &mut clusters);

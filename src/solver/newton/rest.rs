@@ -238,8 +238,7 @@ struct Parts {
 impl Parts {
     fn new(descent: &Descent) -> Result<Self> {
         let node_count = descent.network.node_count();
-        let mut lowest = memory::reserved(node_count)?;
-        lowest.extend(0..node_count as u32);
+        let lowest = memory::collected(0..node_count as u32)?;
         let mut parts = Self { lowest };
         for (_, node, link) in descent.network.springs() {
             if link.stiffness > 0.0 {

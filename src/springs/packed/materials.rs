@@ -81,9 +81,7 @@ impl Kinds {
 
     /// The table that a spring's kind is a place in.
     pub fn materials(&self) -> Result<Vec<SpringMaterial>> {
-        let mut materials = memory::reserved(self.kinds.len())?;
-        materials.extend(self.kinds.iter().map(|kind| kind.material));
-        Ok(materials)
+        memory::collected(self.kinds.iter().map(|kind| kind.material))
     }
 
     /// Bytes held from the allocator.
