@@ -191,11 +191,10 @@ impl sinew_detector_def {
         );
         let bodies = [world.body(a)?, world.body(b)?];
         let sides = [self.side(0, bodies[0])?, self.side(1, bodies[1])?];
-        if !sides.iter().any(|side| side.was_closed) {
-            return Err(Error::invalid(
-                "bodies: both are open, or were cut open: one at least must be closed, so that the other can be inside of it",
-            ));
-        }
+        ensure!(
+            sides.iter().any(|side| side.was_closed),
+            "bodies: both are open, or were cut open: one at least must be closed, so that the other can be inside of it"
+        );
         let has_volume = method == Detection::ImageSpace
             && image.form == Form::Intervals
             && sides.iter().all(|side| side.was_closed);

@@ -142,11 +142,10 @@ impl ClosedSurface {
 
     fn check_corners(&self) -> Result<()> {
         for (index, &[a, b, c]) in self.triangles.iter().enumerate() {
-            if a == b || b == c || c == a {
-                return Err(Error::invalid(format!(
-                    "triangle {index} has no area: nodes {a}, {b} and {c}, counted once where they are at the same place"
-                )));
-            }
+            ensure!(
+                a != b && b != c && c != a,
+                "triangle {index} has no area: nodes {a}, {b} and {c}, counted once where they are at the same place"
+            );
         }
         Ok(())
     }

@@ -140,6 +140,9 @@ pub(super) struct DynamicBulk<L> {
 saved! { [L: Saved] DynamicBulk<L> { kernel, spring_count, springs_per_node, nodes } }
 
 impl<L: KeptLink> DynamicBulk<L> {
+    /// Which storage it is, in bytes.
+    pub const SAVED_AS: u8 = 4 + L::DAMPED as u8;
+
     /// Arrays of `springs_per_node` places; 0: chosen from the springs.
     pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
         let ends = Ends::of(node_count, springs)?;
@@ -203,11 +206,6 @@ fn least_memory<L>(node_count: usize, ends: &Ends) -> usize {
         (0..node_count).map(of_node).sum::<usize>()
     };
     CHOICE.min_by_key(bytes).unwrap_or(*CHOICE.end())
-}
-
-impl<L: KeptLink> DynamicBulk<L> {
-    /// Which storage it is, in bytes.
-    pub const SAVED_AS: u8 = 4 + L::DAMPED as u8;
 }
 
 impl<L: KeptLink> Springs for DynamicBulk<L> {

@@ -30,6 +30,9 @@ pub(super) struct Efficient {
 saved! { Efficient { spring_count, damped, lists } }
 
 impl Efficient {
+    /// Which storage it is, in bytes.
+    pub const SAVED_AS: u8 = 1;
+
     pub fn new(node_count: usize, springs: &[Spring]) -> Result<Self> {
         let ends = Ends::of(node_count, springs)?;
         let mut lists = memory::reserved(node_count)?;
@@ -87,11 +90,6 @@ fn fetch(lists: &[Chain<DampedLink>]) {
             }
         }
     }
-}
-
-impl Efficient {
-    /// Which storage it is, in bytes.
-    pub const SAVED_AS: u8 = 1;
 }
 
 impl Springs for Efficient {

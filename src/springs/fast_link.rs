@@ -35,6 +35,9 @@ impl<L> FastLink<L> {
 }
 
 impl<L: KeptLink> FastLink<L> {
+    /// Which storage it is, in bytes.
+    pub const SAVED_AS: u8 = 2 + L::DAMPED as u8;
+
     /// Rows of `springs_per_node` places; 0: as many as the node with the most springs needs, at least one.
     pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
         let ends = Ends::of(node_count, springs)?;
@@ -123,11 +126,6 @@ impl<L: KeptLink> RowStorage for FastLink<L> {
             gather.node_of_rows(node, [row].into_iter(), eights, forces);
         }
     }
-}
-
-impl<L: KeptLink> FastLink<L> {
-    /// Which storage it is, in bytes.
-    pub const SAVED_AS: u8 = 2 + L::DAMPED as u8;
 }
 
 impl<L: KeptLink> Springs for FastLink<L> {

@@ -435,11 +435,7 @@ impl World {
 }
 
 pub(super) fn check_limit(force_limit: f32) -> Result<()> {
-    if force_limit.is_nan() || force_limit < 0.0 {
-        return Err(Error::invalid(format!(
-            "force_limit is {force_limit}: must be at least 0"
-        )));
-    }
+    ensure!(force_limit >= 0.0, "force_limit is {force_limit}: must be at least 0");
     Ok(())
 }
 

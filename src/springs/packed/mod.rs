@@ -89,6 +89,9 @@ pub(crate) fn costs(springs: &[Spring], rounding: Rounding) -> Result<Costs> {
 }
 
 impl Packed {
+    /// Which storage it is, in bytes.
+    pub const SAVED_AS: u8 = 0;
+
     /// Packs `springs` of `node_count` nodes.
     pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring], rounding: Rounding) -> Result<Self> {
         let kinds = Kinds::of(springs, rounding)?;
@@ -228,11 +231,6 @@ impl Packed {
         }
         self.packed(nodes, &mut links)
     }
-}
-
-impl Packed {
-    /// Which storage it is, in bytes.
-    pub const SAVED_AS: u8 = 0;
 }
 
 impl Springs for Packed {
