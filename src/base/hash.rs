@@ -20,6 +20,12 @@ impl StateHasher {
         }
     }
 
+    pub fn write_doubles(&mut self, values: &[f64]) {
+        for value in values {
+            self.write_u64(value.to_bits());
+        }
+    }
+
     pub fn finish(&self) -> u64 {
         self.0.digest()
     }

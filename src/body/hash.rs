@@ -7,9 +7,7 @@ impl Body {
     pub(crate) fn hash_state(&self, hasher: &mut StateHasher) {
         let system = &self.system;
         hasher.write_u64(self.node_count() as u64);
-        for value in system.origin.to_array() {
-            hasher.write_u64(value.to_bits());
-        }
+        hasher.write_doubles(&system.origin.to_array());
         let mut vectors = vec![system.state.positions(), system.state.velocities()];
         vectors.extend(system.state.remainders());
         // Without damping the forces follow from the positions.

@@ -112,8 +112,7 @@ impl Offsets {
             hasher.write_u64(u64::from(node));
             hasher.write_floats(&[self.of_nodes[node as usize]]);
         }
-        hasher.write_u64(self.taken.to_bits());
-        hasher.write_u64(self.waited.to_bits());
+        hasher.write_doubles(&[self.taken, self.waited]);
     }
 }
 

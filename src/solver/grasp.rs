@@ -148,9 +148,7 @@ impl Grasps {
         for held in &self.nodes {
             hasher.write_u64(u64::from(held.node) << 32 | held.tool as u64);
             hasher.write_u64(u64::from(held.offset.is_some()));
-            for value in held.offset.unwrap_or_default().to_array() {
-                hasher.write_u64(value.to_bits());
-            }
+            hasher.write_doubles(&held.offset.unwrap_or_default().to_array());
             hasher.write_floats(&held.gain.to_array());
         }
         for grasp in &self.grasps {

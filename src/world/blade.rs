@@ -284,14 +284,10 @@ impl Blade {
             }
             let offsets = proxy.holds.iter().map(|hold| hold.offset);
             for vector in offsets.chain([proxy.forward, proxy.behind]) {
-                for value in vector.to_array() {
-                    hasher.write_u64(value.to_bits());
-                }
+                hasher.write_doubles(&vector.to_array());
             }
             hasher.write_u64(proxy.was_outside.map_or(2, u64::from));
-            for value in [proxy.force, proxy.uncut, proxy.size] {
-                hasher.write_u64(value.to_bits());
-            }
+            hasher.write_doubles(&[proxy.force, proxy.uncut, proxy.size]);
         }
     }
 }

@@ -59,9 +59,7 @@ impl SolidStroke {
         for end in self.end {
             hasher.write_floats(&end.to_array());
         }
-        for value in self.normal.to_array() {
-            hasher.write_u64(value.to_bits());
-        }
+        hasher.write_doubles(&self.normal.to_array());
     }
 
     /// What was cut has moved since: the edge is here now.
@@ -143,9 +141,8 @@ impl Mark {
         }
         hasher.write_u64((vertex as u64) << 32 | u64::from(self.stroke));
         hasher.write_u64(self.side as u64);
-        for value in self.plane.normal.to_array().into_iter().chain([self.plane.offset]) {
-            hasher.write_u64(value.to_bits());
-        }
+        hasher.write_doubles(&self.plane.normal.to_array());
+        hasher.write_doubles(&[self.plane.offset]);
     }
 
     fn is_on(&self) -> bool {

@@ -427,9 +427,7 @@ impl Implicit {
         }
         hasher.write_floats(&[*step, self.accuracy]);
         let [energy, size] = energy.map_or([f64::NAN; 2], |total| [total.energy, total.size]);
-        hasher.write_u64(energy.to_bits());
-        hasher.write_u64(size.to_bits());
-        hasher.write_u64(credit.to_bits());
+        hasher.write_doubles(&[energy, size, *credit]);
         for force in history.pressing().into_iter().flat_map(Vectors::iter) {
             hasher.write_floats(&force.to_array());
         }

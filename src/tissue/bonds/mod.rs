@@ -276,13 +276,9 @@ impl Bonds {
             hasher.write_floats(&[bond.limit]);
             hasher.write_floats(&bond.foreseen.to_array());
             if let Some(thread) = &bond.thread {
-                for value in [thread.length, thread.target, thread.compliance, thread.most] {
-                    hasher.write_u64(value.to_bits());
-                }
+                hasher.write_doubles(&[thread.length, thread.target, thread.compliance, thread.most]);
                 for place in thread.lead.iter().flat_map(|lead| [lead.from, lead.to]) {
-                    for value in place.to_array() {
-                        hasher.write_u64(value.to_bits());
-                    }
+                    hasher.write_doubles(&place.to_array());
                 }
             }
         }
