@@ -15,11 +15,12 @@ use crate::geometry::Bounds;
 /// seen most squarely.
 const SAME: f32 = 1e-4;
 
-/// Faces that meet a corner in points, and from directions, less than this part of the distance from each other hold it alike: the closest one does.
+/// Faces of another body that meet a corner in points, and from directions, less than this part of the distance from each other hold it alike: the
+/// closest one does. A surface that crumples needs them all.
 const ALIKE: f32 = 0.05;
 
-/// Edges need not meet that come closest nearer than this part of what they keep apart to an end of one of them: its corner meets faces there. With a
-/// quarter what lies on a tip trembles.
+/// Edges of two bodies need not meet that come closest nearer than this part of what they keep apart to an end of one of them: its corner meets faces
+/// there. With a quarter what lies on a tip trembles.
 const NEAR_END: f32 = 0.05;
 
 /// A corner lies over a face that it is seen from this squarely, as a cosine.
@@ -323,8 +324,9 @@ impl PairSearch<'_> {
                 break;
             };
             let side = side_of(triangle, &found);
+            let alike = if self.is_of_one() { SAME } else { ALIKE };
             let is_alike = |(_, _, closer, (other, _)): &FeatureMet<usize>| {
-                let most = ALIKE * found.offset.length();
+                let most = alike * found.offset.length();
                 (other.offset - found.offset).length() <= most
                     && place_of(&side_of(*closer, other)).distance(place_of(&side)) <= most
             };
@@ -403,7 +405,12 @@ impl PairSearch<'_> {
                 };
                 // At an end of either it is a corner that meets.
                 let edges = [segment.ends[1] - segment.ends[0], corners.points[1] - corners.points[0]];
-                let is_across = found.is_across_beyond(NEAR_END * clearance.radius, edges);
+                let near_end = if self.is_of_one() {
+                    0.0
+                } else {
+                    NEAR_END * clearance.radius
+                };
+                let is_across = found.is_across_beyond(near_end, edges);
                 let is_known = touched.iter().flatten().any(|(_, _, edge, _)| *edge == other);
                 if is_across && !is_known {
                     keep_closest(&mut touched, (is_ahead, start, other, (found, clearance)));

@@ -24,9 +24,11 @@ struct WarmStart {
     key: Key,
     impulse: f32,
     friction: Vec3,
+    /// Whether a contact of the substep in progress has begun with it.
+    is_recalled: bool,
 }
 
-saved! { WarmStart { key, impulse, friction } }
+saved! { WarmStart { key, impulse, friction, is_recalled } }
 
 /// The impulses of earlier substeps, in the order of their sides.
 #[derive(Debug, Default)]
@@ -67,6 +69,7 @@ impl Pushes {
             self.last
                 .extend(of_body.take_while(|push| push.key[0].0 == place as usize));
         }
+        self.last.iter_mut().for_each(|push| push.is_recalled = false);
         self.last.sort_unstable_by_key(|push| push.key);
     }
 
@@ -82,6 +85,7 @@ impl Pushes {
                 key: link.key(),
                 impulse,
                 friction,
+                is_recalled: false,
             }
         }));
         self.last.sort_unstable_by_key(|push| push.key);
@@ -114,11 +118,26 @@ impl Pushes {
         self.settled.retain(|push| push.key.iter().all(|side| side.0 != place));
     }
 
-    /// Has a new contact recall what it gave.
-    pub(super) fn recall(&self, link: &mut Link) {
+    /// Has a new contact recall what it gave, or a corner what it gave in a contact with a face beside this one: which of faces that hold it alike
+    /// does so may change.
+    pub(super) fn recall(&mut self, link: &mut Link) {
         let key = link.key();
-        if let Ok(place) = self.last.binary_search_by_key(&key, |push| push.key) {
-            link.recall(self.last[place].impulse, self.last[place].friction);
+        let (own, nodes) = (key[0], key[1].1);
+        let known = self.last.binary_search_by_key(&key, |push| push.key).ok();
+        let place = known.or_else(|| {
+            let first = self.last.partition_point(|push| push.key[0] < own);
+            let of_corner = self.last[first..].iter().take_while(|push| push.key[0] == own);
+            let is_beside = |push: &WarmStart| {
+                let (body, others) = push.key[1];
+                !push.is_recalled && body == key[1].0 && others.iter().any(|node| nodes.contains(node))
+            };
+            let is_corner = own.1[0] == own.1[2];
+            let beside = of_corner.enumerate().find(|(_, push)| is_corner && is_beside(push));
+            beside.map(|(after, _)| first + after)
+        });
+        if let Some(push) = place.map(|place| &mut self.last[place]) {
+            push.is_recalled = true;
+            link.recall(push.impulse, push.friction);
         }
     }
 
