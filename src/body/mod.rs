@@ -110,9 +110,8 @@ pub struct Body {
 }
 
 saved! { Body {
-    system, cuttable, tears, corners, published, choice } leaves { user_data: 0, shown: None,
-    query_tree: QueryTree::default(),
-} where Self::is_sound }
+    system, cuttable, tears, corners, published, choice
+} leaves { user_data: 0, shown: None, query_tree: QueryTree::default() } where Self::is_sound }
 
 impl Systems for Slots<Body> {
     fn at(&self, place: usize) -> Option<&System> {

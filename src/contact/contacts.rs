@@ -424,7 +424,8 @@ impl Contacts {
     }
 
     /// Finds the contacts that the equation of the substep is to know of: all that may touch with these velocities, or are open by
-    /// no more than the slack. `stiffness_of` tells how stiff a node is, N/m. `false`: something goes too far to tell.
+    /// no more than the slack. `stiffness_of` tells how stiff a node is, N/m. `false`: something goes too far to tell. That is never so in a short
+    /// substep where slow tools press the body already.
     pub fn foresee(&mut self, mut meeting: Meeting, is_long: bool, stiffness_of: impl Fn(usize) -> f32) -> bool {
         self.holds.clear();
         self.clear_contacts();

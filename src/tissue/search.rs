@@ -319,12 +319,12 @@ impl PairSearch<'_> {
             weights: found.weights,
         };
         let place_of = |side: &ContactSide| side.weighted(|node| of_faces.skin.starts.get(node));
+        let alike = if self.is_of_one() { SAME } else { ALIKE };
         for place in 0..FACES {
             let Some((is_ahead, _, triangle, (found, clearance))) = touched[place] else {
                 break;
             };
             let side = side_of(triangle, &found);
-            let alike = if self.is_of_one() { SAME } else { ALIKE };
             let is_alike = |(_, _, closer, (other, _)): &FeatureMet<usize>| {
                 let most = alike * found.offset.length();
                 (other.offset - found.offset).length() <= most
@@ -364,6 +364,11 @@ impl PairSearch<'_> {
             ends: ways.map(|(place, _)| place),
             steps: ways.map(|(_, step)| step),
             radius: self.radius_of(kept.as_deref(), SurfaceFeature::Edge(index)),
+        };
+        let near_end = if self.is_of_one() {
+            0.0
+        } else {
+            NEAR_END * segment.radius
         };
         let far = self.reach_of_edges();
         let way = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
@@ -405,11 +410,6 @@ impl PairSearch<'_> {
                 };
                 // At an end of either it is a corner that meets.
                 let edges = [segment.ends[1] - segment.ends[0], corners.points[1] - corners.points[0]];
-                let near_end = if self.is_of_one() {
-                    0.0
-                } else {
-                    NEAR_END * clearance.radius
-                };
                 let is_across = found.is_across_beyond(near_end, edges);
                 let is_known = touched.iter().flatten().any(|(_, _, edge, _)| *edge == other);
                 if is_across && !is_known {

@@ -306,7 +306,7 @@ impl Substep<'_> {
 
 impl Implicit {
     /// Whether it takes long steps beside tools whatever is allowed.
-    pub fn has_small_budget(&self) -> bool {
+    fn has_small_budget(&self) -> bool {
         self.newton.is_none() && self.budget < SMALL
     }
 
