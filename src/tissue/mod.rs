@@ -236,6 +236,10 @@ impl Tissue {
         if !moment.drifts {
             self.touches
                 .note(&self.links, self.duration, |places| !any_is_explicit(bodies, places));
+            let members = self.islands.members(island);
+            if !members.iter().any(|&place| is_explicit(bodies, place as usize)) {
+                return;
+            }
         } else if moment.begins {
             self.touches.begin_island(self.islands.members(island));
         }

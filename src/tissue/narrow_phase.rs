@@ -149,6 +149,7 @@ impl Tissue {
         known.clear();
         known.extend(0..links.len() as u32);
         known.sort_unstable_by_key(|&link| key(&links[link as usize]));
+        let first_new = links.len();
         // Without room for all, what only comes near gives way to what meets.
         let mut replaced = links.len()..links.capacity();
         for (number, [a, b]) in islands.searches(island).enumerate() {
@@ -202,6 +203,7 @@ impl Tissue {
                 }
             });
         }
+        pushes.recall_beside(&mut links[first_new..]);
         if measures {
             for &place in islands.members(island) {
                 if let Some(Some(kept)) = clearances.get_mut(place as usize) {

@@ -4,9 +4,10 @@ use glam::{DVec3, Vec3};
 
 use super::Tissue;
 use super::islands::Reach;
-use super::meet_each_other;
 use super::skin::Skin;
+use super::{is_explicit, meet_each_other};
 use crate::geometry::Bounds;
+use crate::nodes::parts;
 use crate::solver::{System, Systems};
 
 /// It is foreseen that a body becomes so many times as fast in a step; where it is faster, the step is taken again.
@@ -14,6 +15,10 @@ pub(super) const FASTER: f32 = 2.0;
 
 /// How far bodies come against each other in a substep, as a part of the short edges.
 const TRAVEL: f32 = 0.5;
+
+/// A substep in which what an implicit body is made of follows contacts, by what frequency its nodes would have between their neighbours: in 2.2 bodies
+/// of 60 kPa press each other 3 % too weakly, in 4.9 those of 250 kPa 8 %, and energy is gained.
+const FOLLOWED: f32 = 1.2;
 
 /// How much further than they can come bodies count as near, as a part of their extents.
 const MARGIN: f32 = 0.005;
@@ -110,7 +115,21 @@ impl Tissue {
         let meets_itself = |place: &usize| bodies.at(*place).is_some_and(|body| body.contact.with_itself);
         let of_one = members.filter(meets_itself).map(|place| [place; 2]);
         let all = of_one.chain(self.islands.pairs(island)).filter_map(wished);
-        all.fold(1.0, f32::max).ceil().min(1e6) as u32
+        let wished = all.fold(1.0, f32::max).max(self.substeps_pressed(island, bodies, dt));
+        wished.ceil().min(1e6) as u32
+    }
+
+    /// In how many substeps the forces within bodies that press each other follow what contacts give after the equations of implicit ones.
+    fn substeps_pressed(&self, island: usize, bodies: &impl Systems, dt: f32) -> f32 {
+        let members = self.islands.members(island);
+        if members.iter().all(|&place| is_explicit(bodies, place as usize)) {
+            return 0.0;
+        }
+        let rates = self.pushes.settled(members).map(|sides| {
+            let [a, b] = sides.map(|(place, nodes)| bodies.at(place).map_or(f32::INFINITY, |body| rate(body, nodes)));
+            Some(a.min(b)).filter(|rate| rate.is_finite())
+        });
+        dt / FOLLOWED * rates.flatten().fold(0.0, f32::max)
     }
 
     /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after a step in this gravity.
@@ -122,6 +141,22 @@ impl Tissue {
             all.magnitudes().length() + dt * body.pull(gravity).length()
         });
         speeds.fold(0.0, f32::max)
+    }
+}
+
+/// How fast these nodes would swing if all others were held, 1/s; infinite where nothing moves them.
+fn rate(body: &System, nodes: [u32; 3]) -> f32 {
+    let [mut stiffness, mut mass] = [0.0; 2];
+    for (node, _) in nodes.into_iter().flat_map(|node| parts(body.bindings.as_ref(), node)) {
+        if body.inverse_masses[node as usize] > 0.0 {
+            stiffness += body.forces.stiffness_at(node as usize, 0.0);
+            mass += body.masses[node as usize];
+        }
+    }
+    if mass > 0.0 {
+        (stiffness / mass).sqrt()
+    } else {
+        f32::INFINITY
     }
 }
 

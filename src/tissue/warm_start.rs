@@ -18,17 +18,29 @@ const AFTER_FIRST: f32 = 2.0;
 /// One of so many contacts that there is room for presses at most; what others gave is not recalled.
 pub(super) const PRESSING: usize = 3;
 
+/// A contact takes up what one with a face beside its own gave if the cosine between their normals is more.
+const BESIDE: f32 = 0.99;
+
 /// What a contact gave in the last substep, N s.
 #[derive(Clone, Copy, Debug)]
 struct WarmStart {
     key: Key,
     impulse: f32,
     friction: Vec3,
+    /// From the second side to the first.
+    normal: Vec3,
     /// Whether a contact of the substep in progress has begun with it.
     is_recalled: bool,
 }
 
-saved! { WarmStart { key, impulse, friction, is_recalled } }
+saved! { WarmStart { key, impulse, friction, normal, is_recalled } }
+
+impl WarmStart {
+    fn recall(&mut self, link: &mut Link) {
+        self.is_recalled = true;
+        link.recall(self.impulse, self.friction);
+    }
+}
 
 /// The impulses of earlier substeps, in the order of their sides.
 #[derive(Debug, Default)]
@@ -63,11 +75,9 @@ impl Pushes {
     pub(super) fn begin_island(&mut self, members: &[u32], recalls: bool) {
         self.last.clear();
         (self.substeps, self.recalls) = (0, recalls);
-        for &place in members.iter().filter(|_| recalls) {
-            let first = self.settled.partition_point(|push| push.key[0].0 < place as usize);
-            let of_body = self.settled[first..].iter();
-            self.last
-                .extend(of_body.take_while(|push| push.key[0].0 == place as usize));
+        if recalls {
+            let settled = settled(&self.settled, members);
+            self.last.extend(settled);
         }
         self.last.iter_mut().for_each(|push| push.is_recalled = false);
         self.last.sort_unstable_by_key(|push| push.key);
@@ -85,6 +95,7 @@ impl Pushes {
                 key: link.key(),
                 impulse,
                 friction,
+                normal: link.normal,
                 is_recalled: false,
             }
         }));
@@ -118,26 +129,37 @@ impl Pushes {
         self.settled.retain(|push| push.key.iter().all(|side| side.0 != place));
     }
 
-    /// Has a new contact recall what it gave, or a corner what it gave in a contact with a face beside this one: which of faces that hold it alike
-    /// does so may change.
+    /// The sides of contacts of these bodies that pressed as the last step ended.
+    pub(super) fn settled<'a>(&'a self, members: &'a [u32]) -> impl Iterator<Item = Key> + 'a {
+        settled(&self.settled, members).map(|push| push.key)
+    }
+
+    /// Has a new contact recall what it gave.
     pub(super) fn recall(&mut self, link: &mut Link) {
         let key = link.key();
-        let (own, nodes) = (key[0], key[1].1);
-        let known = self.last.binary_search_by_key(&key, |push| push.key).ok();
-        let place = known.or_else(|| {
-            let first = self.last.partition_point(|push| push.key[0] < own);
-            let of_corner = self.last[first..].iter().take_while(|push| push.key[0] == own);
-            let is_beside = |push: &WarmStart| {
-                let (body, others) = push.key[1];
-                !push.is_recalled && body == key[1].0 && others.iter().any(|node| nodes.contains(node))
-            };
-            let is_corner = own.1[0] == own.1[2];
-            let beside = of_corner.enumerate().find(|(_, push)| is_corner && is_beside(push));
-            beside.map(|(after, _)| first + after)
-        });
-        if let Some(push) = place.map(|place| &mut self.last[place]) {
-            push.is_recalled = true;
-            link.recall(push.impulse, push.friction);
+        if let Ok(place) = self.last.binary_search_by_key(&key, |push| push.key) {
+            self.last[place].recall(link);
+        }
+    }
+
+    /// Has new contacts of corners that recalled nothing take up what no other has: which of faces that hold a corner alike meets it may change.
+    pub(super) fn recall_beside(&mut self, links: &mut [Link]) {
+        for link in links.iter_mut().filter(|link| !link.presses()) {
+            let [(body, nodes), (other, others)] = link.key();
+            if nodes[0] != nodes[2] {
+                continue;
+            }
+            let first = self.last.partition_point(|push| push.key[0] < (body, nodes));
+            let of_corner = self.last[first..].iter_mut();
+            let mut of_corner = of_corner.take_while(|push| push.key[0] == (body, nodes));
+            let beside = of_corner.find(|push| {
+                let (pushed, corners) = push.key[1];
+                let shares = pushed == other && corners.iter().any(|node| others.contains(node));
+                shares && !push.is_recalled && push.normal.dot(link.normal) > BESIDE
+            });
+            if let Some(push) = beside {
+                push.recall(link);
+            }
         }
     }
 
@@ -150,6 +172,14 @@ impl Pushes {
             hasher.write_floats(&[push.impulse, push.friction.x, push.friction.y, push.friction.z]);
         }
     }
+}
+
+/// What contacts gave whose first side is of one of these bodies, of what all did in order.
+fn settled<'a>(all: &'a [WarmStart], members: &'a [u32]) -> impl Iterator<Item = &'a WarmStart> {
+    members.iter().map(|&place| place as usize).flat_map(|place| {
+        let first = all.partition_point(|push| push.key[0].0 < place);
+        all[first..].iter().take_while(move |push| push.key[0].0 == place)
+    })
 }
 
 /// Gives nodes what new contacts recall, or the best share of it up to `most`: the fastest that one makes its sides by that, m/s.

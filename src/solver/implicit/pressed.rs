@@ -11,9 +11,6 @@ use super::{History, Implicit};
 use crate::codec::saved;
 use crate::soa::Vectors;
 
-/// What of the last impulses an equation takes for granted. With all of them a body would swing on its contacts.
-const SUSTAINED: f32 = 0.9;
-
 /// The forces on the nodes of a body.
 #[derive(Debug)]
 pub(super) struct Pressed {
@@ -120,7 +117,7 @@ impl Implicit {
         let latest = self.latest;
         if let Some(pressed) = &mut self.histories[1 - self.settled].pressed {
             let undamped = undamped(rates, node, latest);
-            let force = pressed.forces.get(node) + impulse * (SUSTAINED * undamped / latest);
+            let force = pressed.forces.get(node) + impulse * (undamped / latest);
             pressed.forces.set(node, force.clamp(Vec3::MIN, Vec3::MAX));
             pressed.acts = true;
         }
