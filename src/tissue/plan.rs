@@ -119,17 +119,23 @@ impl Tissue {
         wished.ceil().min(1e6) as u32
     }
 
-    /// In how many substeps the forces within bodies that press each other follow what contacts give after the equations of implicit ones.
+    /// In how many substeps the forces within bodies that press each other follow what contacts give after the equations of implicit ones: by the
+    /// mean, as nodes of slivers bear little.
     fn substeps_pressed(&self, island: usize, bodies: &impl Systems, dt: f32) -> f32 {
         let members = self.islands.members(island);
         if members.iter().all(|&place| is_explicit(bodies, place as usize)) {
             return 0.0;
         }
-        let rates = self.pushes.settled(members).map(|sides| {
+        let rates = self.pushes.settled(members).filter_map(|(sides, impulse)| {
             let [a, b] = sides.map(|(place, nodes)| bodies.at(place).map_or(f32::INFINITY, |body| rate(body, nodes)));
-            Some(a.min(b)).filter(|rate| rate.is_finite())
+            Some([impulse * a.min(b), impulse]).filter(|[rate, _]| rate.is_finite())
         });
-        dt / FOLLOWED * rates.flatten().fold(0.0, f32::max)
+        let [all, impulse] = rates.fold([0.0; 2], |sums, more| [sums[0] + more[0], sums[1] + more[1]]);
+        if impulse > 0.0 {
+            dt / FOLLOWED * (all / impulse)
+        } else {
+            0.0
+        }
     }
 
     /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after a step in this gravity.

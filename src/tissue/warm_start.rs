@@ -129,9 +129,9 @@ impl Pushes {
         self.settled.retain(|push| push.key.iter().all(|side| side.0 != place));
     }
 
-    /// The sides of contacts of these bodies that pressed as the last step ended.
-    pub(super) fn settled<'a>(&'a self, members: &'a [u32]) -> impl Iterator<Item = Key> + 'a {
-        settled(&self.settled, members).map(|push| push.key)
+    /// The sides of contacts of these bodies that pressed as the last step ended, and what they gave along their normals, N s.
+    pub(super) fn settled<'a>(&'a self, members: &'a [u32]) -> impl Iterator<Item = (Key, f32)> + 'a {
+        settled(&self.settled, members).map(|push| (push.key, push.impulse))
     }
 
     /// Has a new contact recall what it gave.
