@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::base::{BodyId, Error, Result, memory};
+use crate::base::{BodyId, Result, ensure, memory};
 use crate::body::Body;
 use crate::contact::{Contact, Form, Pose, Tool};
 use crate::def::finite_vector;
@@ -208,11 +208,7 @@ impl PictureDefinition {
         };
         finite_vector("eye", eye)?;
         finite_vector("target", target)?;
-        if eye == target {
-            return Err(Error::invalid(format!(
-                "eye and target are both {eye}: there is no direction"
-            )));
-        }
+        ensure!(eye != target, "eye and target are both {eye}: there is no direction");
         Ok(Camera {
             eye,
             target,

@@ -25,7 +25,7 @@ mod tools;
 
 use glam::Vec3;
 
-use crate::base::{AttachmentId, Error, Profile, Result, StateHasher, WorldTag, not_negative};
+use crate::base::{AttachmentId, Profile, Result, StateHasher, WorldTag, ensure, not_negative};
 use crate::body::Body;
 use crate::contact::{DynamicTool, Tool, ToolPath};
 use crate::def::finite_vector;
@@ -167,9 +167,7 @@ impl World {
     fn with_tag(definition: WorldDefinition, tag: WorldTag) -> Result<Self> {
         finite_vector("gravity", definition.gravity)?;
         not_negative("tolerance", definition.tolerance)?;
-        if definition.max_substeps == 0 {
-            return Err(Error::invalid("max_substeps is 0: must be at least 1"));
-        }
+        ensure!(definition.max_substeps != 0, "max_substeps is 0: must be at least 1");
         Ok(Self {
             kernel: definition.kernel.choose()?,
             threads: match definition.tasks {

@@ -47,7 +47,7 @@ use cuttable::Cuttable;
 pub(crate) use tear::Torn;
 pub use tune::SpringState;
 
-use crate::base::{BodyId, Error, Result, memory};
+use crate::base::{BodyId, Result, ensure, memory};
 use crate::codec::saved;
 use crate::contact::{Contact, Contacts, ToolPath, ToolPlaces};
 use crate::cutting::CutMaterial;
@@ -176,11 +176,10 @@ impl Body {
                 ("stiffness", definition.stiffnesses.uniform(), law.is_none()),
                 ("spring_damping", definition.spring_dampings.uniform(), law.is_none()),
             ] {
-                if value > 0.0 && !is_used {
-                    return Err(Error::invalid(format!(
-                        "{name} is {value}, and the body has no springs, nor elements that use it"
-                    )));
-                }
+                ensure!(
+                    value <= 0.0 || is_used,
+                    "{name} is {value}, and the body has no springs, nor elements that use it"
+                );
             }
         }
         let mut surface = surface_of(definition)?;

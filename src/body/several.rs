@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::Body;
-use crate::base::{Error, Result, memory};
+use crate::base::{Result, ensure, memory};
 use crate::def::finite_vector;
 
 impl Body {
@@ -87,11 +87,10 @@ impl Body {
     fn nodes_in(&self, min: Vec3, max: Vec3) -> Result<Vec<u32>> {
         finite_vector("min", min)?;
         finite_vector("max", max)?;
-        if !min.cmple(max).all() {
-            return Err(Error::invalid(format!(
-                "min is {min}: must be at most max, which is {max}, along each axis"
-            )));
-        }
+        ensure!(
+            min.cmple(max).all(),
+            "min is {min}: must be at most max, which is {max}, along each axis"
+        );
         let mut nodes = Vec::new();
         for (node, position) in (0..).zip(self.positions()) {
             if min.cmple(*position).all() && position.cmple(max).all() && !self.is_bound(node) {

@@ -7,7 +7,7 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{sinew_tool_id, write_wrench};
 use crate::base::memory::reserved;
-use crate::base::{AttachmentId, BodyId, Error, Result, ToolId, ensure};
+use crate::base::{AttachmentId, BodyId, Result, ToolId, ensure};
 use crate::def::{Anchor, SurfacePoint};
 use crate::world::World;
 
@@ -89,11 +89,10 @@ impl sinew_attachment_def {
                 AttachedEnds::Points(points) => world.attach_points(body, &points, self.tool.id(), limit),
             };
         }
-        if self.tool.id() != ToolId::default() {
-            return Err(Error::invalid(
-                "tool is given beside other or its nodes or points".to_owned(),
-            ));
-        }
+        ensure!(
+            self.tool.id() == ToolId::default(),
+            "tool is given beside other or its nodes or points"
+        );
         let others = self::ends(other_names, other_arrays, self.count)?.anchors()?;
         world.attach_to_body(body, &ends.anchors()?, self.other.id(), &others, limit)
     }
@@ -124,9 +123,7 @@ unsafe fn ends<'a>(
     count: usize,
 ) -> Result<AttachedEnds<'a>> {
     if triangles.is_null() && weights.is_null() {
-        if nodes.is_null() && count > 0 {
-            return Err(Error::invalid(format!("{of_nodes} and {of_triangles} are NULL")));
-        }
+        ensure!(!nodes.is_null() || count == 0, "{of_nodes} and {of_triangles} are NULL");
         return memory::array(of_nodes, nodes, count).map(AttachedEnds::Nodes);
     }
     ensure!(nodes.is_null(), "{of_nodes} is given beside points");

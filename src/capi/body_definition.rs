@@ -156,12 +156,11 @@ impl sinew_body_def {
     /// Every array is NULL or has as many entries as the definition states.
     pub(super) unsafe fn definition<'a>(&self) -> Result<BodyDefinition<'a>> {
         memory::reserved("reserved", self.reserved)?;
-        if self.springs.is_null() && self.spring_count > 0 {
-            return Err(Error::invalid(format!(
-                "springs is NULL while spring_count is {}",
-                self.spring_count
-            )));
-        }
+        ensure!(
+            !self.springs.is_null() || self.spring_count == 0,
+            "springs is NULL while spring_count is {}",
+            self.spring_count
+        );
         let springs = self.spring_count;
         let nodes = self.node_count;
         let tetrahedra = self.tetrahedron_count;

@@ -223,11 +223,10 @@ impl sinew_detector_def {
             thickness >= 0.0 && thickness.is_finite(),
             "thickness of body {side} is {thickness} m: must be finite and at least 0"
         );
-        if thickness != 0.0 && self.detection == SINEW_DETECTION_EXACT {
-            return Err(Error::invalid(format!(
-                "thickness of body {side} is {thickness} m while detection is SINEW_DETECTION_EXACT: must be 0"
-            )));
-        }
+        ensure!(
+            thickness == 0.0 || self.detection != SINEW_DETECTION_EXACT,
+            "thickness of body {side} is {thickness} m while detection is SINEW_DETECTION_EXACT: must be 0"
+        );
         let (node_count, triangles) = (body.node_count(), body.surface());
         let was_closed = mesh::is_closed(triangles)? && !body.system().is_cut_open;
         let surface = if was_closed {

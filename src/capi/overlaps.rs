@@ -6,7 +6,7 @@ use super::body::sinew_body_id;
 use super::detector::{SINEW_NO_TRIANGLE, sinew_detector_report, sinew_edge_inside, sinew_point_inside};
 use super::memory::Versioned;
 use crate::base::memory::reserved;
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, ensure};
 use crate::body::Body;
 use crate::detection::exact::{self, Exact};
 use crate::detection::image_space::{self, ImageSpace, Surface};
@@ -47,16 +47,15 @@ impl DetectorSide {
                  this is another world"
             )));
         };
-        if body.node_count() != self.surface.node_count() || body.surface() != self.surface.triangles() {
-            return Err(Error::invalid(format!(
-                "world: body {number} of the detector, of index1 {index1} and generation {generation}, has another surface now, of {} nodes \
+        ensure!(
+            body.node_count() == self.surface.node_count() && body.surface() == self.surface.triangles(),
+            "world: body {number} of the detector, of index1 {index1} and generation {generation}, has another surface now, of {} nodes \
                  and {} triangles: the detector was made for {} and {}",
-                body.node_count(),
-                body.surface().len(),
-                self.surface.node_count(),
-                self.surface.triangles().len()
-            )));
-        }
+            body.node_count(),
+            body.surface().len(),
+            self.surface.node_count(),
+            self.surface.triangles().len()
+        );
         Ok(body)
     }
 }

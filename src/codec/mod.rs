@@ -81,11 +81,10 @@ pub(crate) fn opened(bytes: &[u8], shape: u64) -> Result<&[u8]> {
         bytes[..known] == MAGIC[..known],
         "bytes are no world: they begin with something else"
     );
-    if size < HEADER {
-        return Err(Error::invalid(format!(
-            "size is {size}: bytes of a world have a header of {HEADER}"
-        )));
-    }
+    ensure!(
+        size >= HEADER,
+        "size is {size}: bytes of a world have a header of {HEADER}"
+    );
     let number = |at: usize| bytes[at..].first_chunk().copied().map_or(0, u64::from_le_bytes);
     let version = bytes[8..].first_chunk().copied().map_or(0, u32::from_le_bytes);
     if version != VERSION || number(12) != shape {
@@ -99,11 +98,10 @@ pub(crate) fn opened(bytes: &[u8], shape: u64) -> Result<&[u8]> {
         "size is {size}: the world in bytes was saved as {}",
         number(20)
     );
-    if number(CHECKSUM) != checksum(bytes) {
-        return Err(Error::invalid(
-            "bytes are no world: some have changed since it was saved, as their checksum tells",
-        ));
-    }
+    ensure!(
+        number(CHECKSUM) == checksum(bytes),
+        "bytes are no world: some have changed since it was saved, as their checksum tells"
+    );
     Ok(&bytes[HEADER..])
 }
 

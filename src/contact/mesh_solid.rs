@@ -12,7 +12,7 @@ use super::image_space::LayeredImage;
 use super::ridges::Ridges;
 use super::sweep::FLAT;
 
-use crate::base::{Error, Result, StateHasher, memory, not_negative};
+use crate::base::{Result, StateHasher, ensure, memory, not_negative};
 use crate::codec::{Reader, Saved, Writer, shape_of_name};
 use crate::def::Detection;
 use crate::geometry::Bounds;
@@ -141,18 +141,17 @@ impl MeshSolid {
             Found::Field(field) => is_fine && field.is_inside_somewhere(BESIDE * sides.min_element()),
             Found::Image(image) => is_fine && image.is_inside_somewhere(),
         };
-        if !is_seen {
-            return Err(Error::invalid(format!(
-                "resolution is {resolution} m: {} that are {grain} m apart do not show a solid of which the least extent is {least} m: \
+        ensure!(
+            is_seen,
+            "resolution is {resolution} m: {} that are {grain} m apart do not show a solid of which the least extent is {least} m: \
                  a quarter of that would do",
-                if detection == Detection::ImageSpace {
-                    "rays"
-                } else {
-                    "samples"
-                },
-                least = sides.min_element()
-            )));
-        }
+            if detection == Detection::ImageSpace {
+                "rays"
+            } else {
+                "samples"
+            },
+            least = sides.min_element()
+        );
         let mut hasher = StateHasher::new();
         hasher.write_u64(detection as u64);
         hasher.write_floats(&[resolution]);

@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 
 use super::contacts::ToolLoad;
 use super::tool::{Form, Pose};
-use crate::base::{Error, Result, StateHasher, above_zero};
+use crate::base::{Error, Result, StateHasher, above_zero, ensure};
 use crate::codec::saved;
 use crate::def::finite_vector;
 use crate::geometry::rotation::turned;
@@ -119,20 +119,19 @@ impl MassProperties {
 
     /// Refused where a number is out of its range.
     fn checked(&self) -> Result<RigidMass> {
-        if !(self.mass >= 1.0 / HEAVIEST && self.mass <= HEAVIEST) {
-            return Err(Error::invalid(format!(
-                "mass is {}: must be {:e} to {HEAVIEST:e} kg",
-                self.mass,
-                1.0 / HEAVIEST
-            )));
-        }
+        ensure!(
+            self.mass >= 1.0 / HEAVIEST && self.mass <= HEAVIEST,
+            "mass is {}: must be {:e} to {HEAVIEST:e} kg",
+            self.mass,
+            1.0 / HEAVIEST
+        );
         finite_vector("center_of_mass", self.center_of_mass)?;
-        if self.center_of_mass.abs().max_element() > FURTHEST {
-            return Err(Error::invalid(format!(
-                "center_of_mass is {}: must be within {:e} m of the tool's position",
-                self.center_of_mass, FURTHEST
-            )));
-        }
+        ensure!(
+            self.center_of_mass.abs().max_element() <= FURTHEST,
+            "center_of_mass is {}: must be within {:e} m of the tool's position",
+            self.center_of_mass,
+            FURTHEST
+        );
         if let Some(bad) = self.inertia.iter().position(|moment| !moment.is_finite()) {
             return Err(Error::invalid(format!(
                 "inertia[{bad}] is {}: must be finite",
@@ -149,12 +148,11 @@ impl MassProperties {
         // J = tr(I)/2 - I has the second moments of mass as its principal values: none is below 0.
         let second = DMat3::from_diagonal(DVec3::splat(0.5 * trace(&inertia))) - inertia;
         let rounding = 1e-6 * trace(&inertia);
-        if !(is_positive(&inertia, 1e-24) && is_positive(&second, -rounding) && mass.is_sound()) {
-            return Err(Error::invalid(format!(
-                "inertia is {:?}: must be positive definite, with no principal moment larger than the sum of the others",
-                self.inertia
-            )));
-        }
+        ensure!(
+            is_positive(&inertia, 1e-24) && is_positive(&second, -rounding) && mass.is_sound(),
+            "inertia is {:?}: must be positive definite, with no principal moment larger than the sum of the others",
+            self.inertia
+        );
         Ok(mass)
     }
 }

@@ -9,7 +9,7 @@ use super::limit::PressSearch;
 use super::mesh_solid::MeshSolid;
 use super::rigid::Rigid;
 use super::rounded;
-use crate::base::{Error, Result, StateHasher, above_zero, not_negative};
+use crate::base::{Error, Result, StateHasher, above_zero, ensure, not_negative};
 use crate::codec::{saved, saved_enum};
 use crate::def::{CollisionFilter, Detection, check_reach, finite_vector};
 use crate::geometry::rotation::{turn_between, turned};
@@ -114,21 +114,19 @@ impl Pose {
     /// The pose with its orientation normalised; refused where it has no direction, is not finite or too far away.
     pub(crate) fn checked(self) -> Result<Self> {
         finite_vector("position", self.position)?;
-        if self.position.abs().max_element() > FURTHEST {
-            return Err(Error::invalid(format!(
-                "position is {}: must be within {FURTHEST:e} m of the origin along each axis",
-                self.position
-            )));
-        }
+        ensure!(
+            self.position.abs().max_element() <= FURTHEST,
+            "position is {}: must be within {FURTHEST:e} m of the origin along each axis",
+            self.position
+        );
         let [x, y, z, w] = self.orientation.to_array();
         // In f64, so that neither large nor small quaternions overflow on the way.
         let exact = glam::DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into());
         let length = exact.length();
-        if !(length > 0.0 && length.is_finite()) {
-            return Err(Error::invalid(format!(
-                "orientation is {x} {y} {z} {w}: must be finite and not zero"
-            )));
-        }
+        ensure!(
+            length > 0.0 && length.is_finite(),
+            "orientation is {x} {y} {z} {w}: must be finite and not zero"
+        );
         let orientation = if (length - 1.0).abs() < 1e-7 {
             self.orientation
         } else {
@@ -286,11 +284,10 @@ impl Tool {
                 not_negative("half_length", half_length)?;
                 check_reach("half_length", half_length)?;
                 check_reach("radius + half_length", radius + half_length)?;
-                if detection == Detection::ImageSpace && half_length > SLENDEREST * radius {
-                    return Err(Error::invalid(format!(
-                        "half_length is {half_length}: at most {SLENDEREST} times the radius is possible in an image"
-                    )));
-                }
+                ensure!(
+                    detection != Detection::ImageSpace || half_length <= SLENDEREST * radius,
+                    "half_length is {half_length}: at most {SLENDEREST} times the radius is possible in an image"
+                );
                 rounded(radius, half_length)?
             }
             Shape::Plane => Form::HalfSpace,

@@ -286,12 +286,11 @@ impl BodyDefinition<'_> {
     /// Refuses whatever is out of range, with a message that names it.
     pub(crate) fn check(&self) -> Result<()> {
         let nodes = self.positions.len();
-        if nodes == 0 || nodes > u32::MAX as usize / 2 {
-            return Err(Error::invalid(format!(
-                "node_count is {nodes}: must be from 1 to {}",
-                u32::MAX / 2
-            )));
-        }
+        ensure!(
+            (1..=u32::MAX as usize / 2).contains(&nodes),
+            "node_count is {nodes}: must be from 1 to {}",
+            u32::MAX / 2
+        );
         self.sleep.check()?;
         finite_vectors("positions", self.positions)?;
         if let Some(rest) = self.rest_positions {
@@ -324,12 +323,11 @@ impl BodyDefinition<'_> {
             }
         }
         not_negative("volume_stiffness", self.volume_stiffness)?;
-        if self.volume_stiffness > 0.0 && self.tetrahedra.is_empty() {
-            return Err(Error::invalid(format!(
-                "volume_stiffness is {} Pa, and the body has no tetrahedra to keep their volume",
-                self.volume_stiffness
-            )));
-        }
+        ensure!(
+            self.volume_stiffness <= 0.0 || !self.tetrahedra.is_empty(),
+            "volume_stiffness is {} Pa, and the body has no tetrahedra to keep their volume",
+            self.volume_stiffness
+        );
         self.viscosity.check()?;
         self.yielding.check()?;
         let is_of_elements = |material: Material| material.model == Model::Tetrahedra;
@@ -344,12 +342,11 @@ impl BodyDefinition<'_> {
         not_negative("enclosed_stiffness", self.enclosed_stiffness)?;
         finite("pressure", self.pressure)?;
         not_negative("toughness", self.toughness)?;
-        if self.toughness > 0.0 && self.spare_nodes == 0 {
-            return Err(Error::invalid(format!(
-                "toughness is {} while spare_nodes is 0: the body cannot be cut",
-                self.toughness
-            )));
-        }
+        ensure!(
+            self.toughness <= 0.0 || self.spare_nodes != 0,
+            "toughness is {} while spare_nodes is 0: the body cannot be cut",
+            self.toughness
+        );
         if let Some(material) = &self.material {
             material.check(self)?;
         }
@@ -402,23 +399,21 @@ impl BodyDefinition<'_> {
 
     fn check_solver(&self) -> Result<()> {
         ensure!(self.order <= 2, "order is {}: must be 0, 1 or 2", self.order);
-        if self.accuracy != 0.0 && !(1e-6..=1.0).contains(&self.accuracy) {
-            return Err(Error::invalid(format!(
-                "accuracy is {}: must be 0, or from 1e-6 to 1",
-                self.accuracy
-            )));
-        }
+        ensure!(
+            self.accuracy == 0.0 || (1e-6..=1.0).contains(&self.accuracy),
+            "accuracy is {}: must be 0, or from 1e-6 to 1",
+            self.accuracy
+        );
         ensure!(
             self.iterations <= MOST_ITERATIONS,
             "iterations is {}: must be at most {MOST_ITERATIONS}",
             self.iterations
         );
-        if !(0.0..=1.0).contains(&self.mass_scaling) {
-            return Err(Error::invalid(format!(
-                "mass_scaling is {}: must be from 0 to 1",
-                self.mass_scaling
-            )));
-        }
+        ensure!(
+            (0.0..=1.0).contains(&self.mass_scaling),
+            "mass_scaling is {}: must be from 0 to 1",
+            self.mass_scaling
+        );
         Ok(())
     }
 }

@@ -110,12 +110,11 @@ fn check_tetrahedra(material: &Material, definition: &BodyDefinition) -> Result<
         !definition.tetrahedra.is_empty(),
         "material is of tetrahedra, and the body has none: tetrahedron_count is 0"
     );
-    if definition.volume_stiffness > 0.0 {
-        return Err(Error::invalid(format!(
-            "volume_stiffness is {} Pa beside a material of tetrahedra, which keeps volume by itself: must be 0",
-            definition.volume_stiffness
-        )));
-    }
+    ensure!(
+        definition.volume_stiffness <= 0.0,
+        "volume_stiffness is {} Pa beside a material of tetrahedra, which keeps volume by itself: must be 0",
+        definition.volume_stiffness
+    );
     ensure!(
         (0.0..=HIGHEST).contains(&material.poisson_ratio),
         "poisson_ratio is {}: must be from 0 to {HIGHEST}",

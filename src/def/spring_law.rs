@@ -1,6 +1,6 @@
 //! How springs stiffen as they are stretched.
 
-use crate::base::{Error, Result, above_zero, ensure};
+use crate::base::{Result, above_zero, ensure};
 use crate::codec::saved_enum;
 
 /// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
@@ -59,11 +59,10 @@ impl SpringLaw {
             SpringLaw::Exponential { steepness, limit } => {
                 above_zero("steepness of spring_law", steepness)?;
                 above_zero("limit of spring_law", limit)?;
-                if steepness * limit > STEEPEST {
-                    return Err(Error::invalid(format!(
-                        "steepness of spring_law is {steepness} and limit {limit}: their product must be at most {STEEPEST}"
-                    )));
-                }
+                ensure!(
+                    steepness * limit <= STEEPEST,
+                    "steepness of spring_law is {steepness} and limit {limit}: their product must be at most {STEEPEST}"
+                );
                 Ok(())
             }
             SpringLaw::Cubic {

@@ -98,11 +98,10 @@ impl Tearing {
         let of_springs = [("tear_strain", self.strain), ("tear_force", self.force)];
         for (name, value) in of_springs.into_iter().chain([("smallest_piece", self.smallest_piece)]) {
             not_negative(name, value)?;
-            if value > 0.0 && self.most_per_step == 0 {
-                return Err(Error::invalid(format!(
-                    "{name} is {value}, and most_tears is 0: must be at least 1"
-                )));
-            }
+            ensure!(
+                value <= 0.0 || self.most_per_step != 0,
+                "{name} is {value}, and most_tears is 0: must be at least 1"
+            );
         }
         if self.most_per_step == 0 {
             return Ok(());

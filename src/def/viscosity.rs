@@ -1,7 +1,7 @@
 //! Viscosity: an arm beside what is elastic, a spring and a dashpot in a row (the standard linear solid; Zener 1948), or the dashpot
 //! alone (Kelvin and Voigt).
 
-use crate::base::{Error, Result, not_negative};
+use crate::base::{Error, Result, ensure, not_negative};
 use crate::codec::saved;
 use crate::soa::Rates;
 
@@ -76,24 +76,22 @@ impl Viscosity {
     pub(crate) fn check(&self) -> Result<()> {
         not_negative("retardation_time", self.retardation_time)?;
         not_negative("relaxation_time", self.relaxation_time)?;
-        if self.retardation_time > LONGEST {
-            return Err(Error::invalid(format!(
-                "retardation_time is {} s: must be at most {LONGEST}",
-                self.retardation_time
-            )));
-        }
+        ensure!(
+            self.retardation_time <= LONGEST,
+            "retardation_time is {} s: must be at most {LONGEST}",
+            self.retardation_time
+        );
         if self.relaxation_time > 0.0 && !(SHORTEST..=LONGEST).contains(&self.relaxation_time) {
             return Err(Error::invalid(format!(
                 "relaxation_time is {} s: must be 0, or from {SHORTEST} to {LONGEST}",
                 self.relaxation_time
             )));
         }
-        if self.relaxation_time > 0.0 && self.retardation_time == 0.0 {
-            return Err(Error::invalid(format!(
-                "relaxation_time is {} s while retardation_time is 0: there is nothing to relax",
-                self.relaxation_time
-            )));
-        }
+        ensure!(
+            self.relaxation_time <= 0.0 || self.retardation_time != 0.0,
+            "relaxation_time is {} s while retardation_time is 0: there is nothing to relax",
+            self.relaxation_time
+        );
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! Yielding: what is deformed beyond a strain stays so.
 
-use crate::base::{Error, Result, not_negative};
+use crate::base::{Result, ensure, not_negative};
 
 /// From which strain on springs, and tetrahedra that are elements, take a set: they are at rest elsewhere from then on (perfect
 /// plasticity).
@@ -42,12 +42,11 @@ impl Default for Yielding {
 impl Yielding {
     pub(crate) fn check(&self) -> Result<()> {
         not_negative("yield_strain", self.strain)?;
-        if self.strain > 0.0 && !(self.largest > 0.0 && self.largest < 1.0) {
-            return Err(Error::invalid(format!(
-                "largest_set is {}: must be above 0 and below 1",
-                self.largest
-            )));
-        }
+        ensure!(
+            self.strain <= 0.0 || (self.largest > 0.0 && self.largest < 1.0),
+            "largest_set is {}: must be above 0 and below 1",
+            self.largest
+        );
         Ok(())
     }
 

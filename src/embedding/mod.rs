@@ -308,12 +308,11 @@ fn check(definition: &EmbeddingDefinition, node_count: usize) -> Result<()> {
         tetrahedra,
     } = definition;
     ensure!(!vertices.is_empty(), "vertices are 0: there is nothing to bind");
-    if u32::try_from(vertices.len()).is_err() {
-        return Err(Error::invalid(format!(
-            "{} vertices: too many to count",
-            vertices.len()
-        )));
-    }
+    ensure!(
+        u32::try_from(vertices.len()).is_ok(),
+        "{} vertices: too many to count",
+        vertices.len()
+    );
     let is_near = |vertex: &Vec3| vertex.is_finite() && vertex.abs().max_element() <= FURTHEST;
     if let Some(vertex) = vertices.iter().position(|vertex| !is_near(vertex)) {
         return Err(Error::invalid(format!(

@@ -1,6 +1,6 @@
 //! What a haptic handle is to be.
 
-use crate::base::{Error, Result, ToolId, above_zero, not_negative};
+use crate::base::{Error, Result, ToolId, above_zero, ensure, not_negative};
 
 use super::six::Vector6;
 
@@ -82,13 +82,12 @@ impl HapticDefinition {
             0.0 => stiffness,
             angular => f64::from(angular) / (lever * lever),
         };
-        if turning < SOFTEST * stiffness {
-            return Err(Error::invalid(format!(
-                "angular_stiffness is {}: must be 0 or at least {:e}",
-                self.angular_stiffness,
-                SOFTEST * stiffness * lever * lever
-            )));
-        }
+        ensure!(
+            turning >= SOFTEST * stiffness,
+            "angular_stiffness is {}: must be 0 or at least {:e}",
+            self.angular_stiffness,
+            SOFTEST * stiffness * lever * lever
+        );
         let critical = |stiffness: f64| 2.0 * (stiffness * mass).sqrt();
         let damping = |stiffness: f64| f64::from(self.damping_ratio) * critical(stiffness);
         Ok(Coupling {

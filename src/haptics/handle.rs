@@ -6,7 +6,7 @@ use super::definition::{Coupling, spread};
 use super::model::{HapticContact, WrenchModel};
 use super::observer::Observer;
 use super::six::{self, Vector6};
-use crate::base::{Error, Result};
+use crate::base::{Result, ensure};
 use crate::contact::Pose;
 use crate::def::finite_vector;
 use crate::geometry::rotation;
@@ -178,11 +178,10 @@ impl HapticHandle {
         let pose = pose.checked()?;
         velocity.map_or(Ok(()), |velocity| finite_vector("velocity", velocity))?;
         angular_velocity.map_or(Ok(()), |velocity| finite_vector("angular_velocity", velocity))?;
-        if !(dt > 0.0 && dt <= LONGEST) {
-            return Err(Error::invalid(format!(
-                "dt is {dt}: must be above 0 and at most {LONGEST}"
-            )));
-        }
+        ensure!(
+            dt > 0.0 && dt <= LONGEST,
+            "dt is {dt}: must be above 0 and at most {LONGEST}"
+        );
         let motion = self.motion(pose, [velocity, angular_velocity], f64::from(dt));
         self.clock += motion.dt;
         self.observer.hand_moved(&self.given, &motion.way);

@@ -148,11 +148,10 @@ fn common_edge(cells: &[[u32; 8]], rest: &[Vec3], Rounding { reach }: Rounding) 
                 }
             }
         }
-        if cell_volume(corners) < 0.5 * edge.powi(3) {
-            return Err(Error::invalid(format!(
-                "cells[{index}] is a mirrored cube: its corners are numbered by bits, x 1, y 2, z 4, right-handed"
-            )));
-        }
+        ensure!(
+            cell_volume(corners) >= 0.5 * edge.powi(3),
+            "cells[{index}] is a mirrored cube: its corners are numbered by bits, x 1, y 2, z 4, right-handed"
+        );
     }
     Ok(edge)
 }

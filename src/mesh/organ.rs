@@ -29,11 +29,10 @@ impl Mesh {
             );
         }
         let relative = f64::from(spacing) / f64::from(length);
-        if relative > COARSEST {
-            return Err(Error::invalid(format!(
-                "spacing is {spacing} m: at most {COARSEST} of the length, {length} m, shows the shape"
-            )));
-        }
+        ensure!(
+            relative <= COARSEST,
+            "spacing is {spacing} m: at most {COARSEST} of the length, {length} m, shows the shape"
+        );
         // The body is two units long here.
         let lattice = Lattice::around([LOW, HIGH], 2.0 * relative)
             .ok_or_else(|| Error::invalid(format!("spacing is {spacing} m: too fine to count the nodes")))?;
@@ -59,11 +58,10 @@ impl Mesh {
         mesh.triangles = boundary(&mesh.tetrahedra)?;
 
         let positive = |t: &[u32; 4]| tetrahedron_volume(mesh.corners(*t)) > 0.0;
-        if !is_closed(&mesh.triangles)? || !mesh.tetrahedra.iter().all(positive) {
-            return Err(Error::invalid(format!(
-                "spacing is {spacing} m: no sound mesh of {length} m comes of it"
-            )));
-        }
+        ensure!(
+            is_closed(&mesh.triangles)? && mesh.tetrahedra.iter().all(positive),
+            "spacing is {spacing} m: no sound mesh of {length} m comes of it"
+        );
         Ok(mesh)
     }
 }

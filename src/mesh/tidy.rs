@@ -6,8 +6,8 @@ use glam::DVec3;
 
 use super::topology::{boundary, smallest_first, sorted, turn_outward};
 use super::{Mesh, tetrahedron_volume};
-use crate::base::memory;
-use crate::{Error, Result};
+use crate::Result;
+use crate::base::{ensure, memory};
 
 /// In [`LoadedMesh::node_of_vertex`]: the vertex was dropped.
 pub const NO_NODE: u32 = u32::MAX;
@@ -115,11 +115,10 @@ impl LoadedMesh {
 /// [`Error::OutOfMemory`].
 pub fn tidy(mesh: &Mesh) -> Result<LoadedMesh> {
     mesh.check()?;
-    if !mesh.cells.is_empty() {
-        return Err(Error::invalid(
-            "cells are given: only triangles and tetrahedra are tidied",
-        ));
-    }
+    ensure!(
+        mesh.cells.is_empty(),
+        "cells are given: only triangles and tetrahedra are tidied"
+    );
     let mut raw = RawMesh::default();
     raw.vertices.try_reserve_exact(mesh.positions.len())?;
     raw.triangles.try_reserve_exact(mesh.triangles.len())?;

@@ -1,8 +1,8 @@
 //! Where a picture is taken from.
 
 use super::view::{View, axes};
+use crate::Result;
 use crate::base::ensure;
-use crate::{Error, Result};
 use glam::{DVec3, Vec3};
 
 /// How much of the half width or height a fitted view leaves free on each side.
@@ -106,9 +106,7 @@ impl Camera {
     /// a width or height of 0 or above 32768.
     pub fn view(&self, width: u32, height: u32) -> Result<View> {
         for (name, size) in [("width", width), ("height", height)] {
-            if size == 0 || size > 32_768 {
-                return Err(Error::invalid(format!("{name} is {size}, not 1 to 32768")));
-            }
+            ensure!((1..=32_768).contains(&size), "{name} is {size}, not 1 to 32768");
         }
         check_direction("eye", self.eye)?;
         check_direction("target", self.target)?;

@@ -8,8 +8,8 @@ use super::scene::Scene;
 use super::shade::{self, Encoder, Lights, SurfacePlace};
 use super::shadow::ShadowMap;
 use super::view::{Homogeneous, View};
-use crate::base::memory;
-use crate::{Error, Result};
+use crate::Result;
+use crate::base::{ensure, memory};
 use glam::Vec3;
 
 /// Samples per pixel along each axis.
@@ -60,9 +60,7 @@ impl Scene<'_> {
     /// [`Camera::view`] refuses. [`Error::OutOfMemory`].
     pub fn draw(&self, camera: &Camera, width: u32, height: u32) -> Result<Image> {
         for (name, size) in [("width", width), ("height", height)] {
-            if size == 0 || size > MAX_SIZE {
-                return Err(Error::invalid(format!("{name} is {size}, not 1 to {MAX_SIZE}")));
-            }
+            ensure!((1..=MAX_SIZE).contains(&size), "{name} is {size}, not 1 to {MAX_SIZE}");
         }
         let view = camera.view(width * FINE, height * FINE)?;
         let geometry = Geometry::new(self, &view, height)?;

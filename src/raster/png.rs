@@ -1,6 +1,7 @@
 //! Pictures to PNG files.
 
 use super::picture::Image;
+use crate::base::ensure;
 use crate::{Error, Result};
 use std::path::Path;
 
@@ -14,14 +15,13 @@ impl Image {
     /// [`Error::Unsupported`]: the crate was built without its feature `pictures`.
     pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
         let expected = u64::from(self.width) * u64::from(self.height);
-        if expected == 0 || self.pixels.len() as u64 != expected {
-            return Err(Error::invalid(format!(
-                "{} pixels are not {} x {}",
-                self.pixels.len(),
-                self.width,
-                self.height
-            )));
-        }
+        ensure!(
+            expected != 0 && self.pixels.len() as u64 == expected,
+            "{} pixels are not {} x {}",
+            self.pixels.len(),
+            self.width,
+            self.height
+        );
         write(self, path.as_ref())
     }
 }

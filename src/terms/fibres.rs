@@ -11,7 +11,7 @@ use super::Term;
 use super::parting::Parting;
 use super::stencils::{SeePart, Stencil, StencilLaw, Stencils, directed, lengthening, shares, weighted};
 use super::strings::Tension;
-use crate::base::{Error, Result, ensure, memory};
+use crate::base::{Result, ensure, memory};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, check_values, expect_count};
 use crate::soa::NodeOrder;
@@ -46,11 +46,10 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
     let mut fibres = memory::reserved(tetrahedra.len())?;
     for (index, (&corners, &direction)) in tetrahedra.iter().zip(directions).enumerate() {
         let length = direction.length();
-        if length != 0.0 && !((length - 1.0).abs() <= UNIT) {
-            return Err(Error::invalid(format!(
-                "fibre_directions[{index}] is {direction}, {length} long: must be 1 long, or 0"
-            )));
-        }
+        ensure!(
+            length == 0.0 || (length - 1.0).abs() <= UNIT,
+            "fibre_directions[{index}] is {direction}, {length} long: must be 1 long, or 0"
+        );
         let stiffness = f64::from(stiffnesses.get(index));
         if length == 0.0 || stiffness == 0.0 {
             continue;

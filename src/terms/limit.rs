@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::stencils::{StencilLaw, Stencils, directed, lengthening, of_springs};
 use super::strings::Tension;
-use crate::base::{Error, Result, ensure, not_negative};
+use crate::base::{Result, ensure, not_negative};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, Spring};
 use crate::soa::NodeOrder;
@@ -36,11 +36,10 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         stiffening > 0.0 && stiffening <= STIFFEST,
         "limit_stiffening is {stiffening}: must be above 0, and at most {STIFFEST}"
     );
-    if springs.is_empty() {
-        return Err(Error::invalid(format!(
-            "strain_limit is {strain} while the body has no springs"
-        )));
-    }
+    ensure!(
+        !springs.is_empty(),
+        "strain_limit is {strain} while the body has no springs"
+    );
     let limits = of_springs(springs, order, true, |rest_length| rest_length)?;
     let law = Limit {
         strain: f64::from(strain),

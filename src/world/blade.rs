@@ -200,11 +200,10 @@ impl Blade {
         } = *definition;
         for (name, end) in ["edge[0]", "edge[1]"].into_iter().zip(edge) {
             finite_vector(name, end)?;
-            if end.abs().max_element() > FURTHEST {
-                return Err(Error::invalid(format!(
-                    "{name} is {end}: must be within {FURTHEST:e} m of the origin along each axis"
-                )));
-            }
+            ensure!(
+                end.abs().max_element() <= FURTHEST,
+                "{name} is {end}: must be within {FURTHEST:e} m of the origin along each axis"
+            );
         }
         ensure!(edge[0] != edge[1], "edge has both ends at {}", edge[0]);
         above_zero("stiffness", stiffness)?;

@@ -39,11 +39,10 @@ impl World {
             return Ok(());
         };
         ensure!(!it.is_plane(), "tool is a plane: a plane cannot be dynamic");
-        if self.is_holding(place) {
-            return Err(Error::invalid(
-                "tool holds attachments: release them before it is dynamic",
-            ));
-        }
+        ensure!(
+            !self.is_holding(place),
+            "tool holds attachments: release them before it is dynamic"
+        );
         let mut rigid = Rigid::new(mass, &it.pose)?;
         if let Some(before) = &it.rigid {
             let (velocity, spin) = before.velocity();

@@ -203,11 +203,10 @@ impl World {
             bytes.is_empty(),
             "bytes are no world: something is behind its last section"
         );
-        if walk_count > world.bodies.places() {
-            return Err(Error::invalid(
-                "bytes are no world: bodies that are not there go together",
-            ));
-        }
+        ensure!(
+            walk_count <= world.bodies.places(),
+            "bytes are no world: bodies that are not there go together"
+        );
         world.walks = memory::filled(None, walk_count)?;
         world.outcomes = memory::reserved(world.bodies.places() + 1)?;
         world.paths = memory::reserved(world.tools.places() + 1)?;

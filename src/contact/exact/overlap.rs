@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::ExactSolid;
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, ensure};
 use crate::mesh::ClosedSurface;
 
 /// A solid, rigid or changing its shape, that finds what lies within it.
@@ -130,13 +130,12 @@ impl Exact {
     /// # Errors
     /// [`Error::InvalidArgument`] where there are not as many as the surface was made of, or one is not finite; then nothing changed.
     pub fn refit(&mut self, positions: &[Vec3]) -> Result<()> {
-        if positions.len() != self.node_count {
-            return Err(Error::invalid(format!(
-                "{} positions: the surface has {} nodes",
-                positions.len(),
-                self.node_count
-            )));
-        }
+        ensure!(
+            positions.len() == self.node_count,
+            "{} positions: the surface has {} nodes",
+            positions.len(),
+            self.node_count
+        );
         check_positions(positions)?;
         self.solid.refit(|node| positions[node]);
         Ok(())

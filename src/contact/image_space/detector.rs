@@ -9,7 +9,7 @@ use super::projection::{Frame, LARGEST_IMAGE, Projection};
 use super::surface::{Placed, Surface};
 use super::traced::{find_points, trace_edges};
 use super::volume::add_volume;
-use crate::base::{Error, Result, above_zero};
+use crate::base::{Error, Result, above_zero, ensure};
 
 /// From where bodies are looked at.
 ///
@@ -151,23 +151,21 @@ impl ImageSpace {
     pub fn new(definition: &ImageSpaceDefinition, surfaces: &[&Surface]) -> Result<Self> {
         let pixel = definition.pixel;
         above_zero("pixel", pixel)?;
-        if definition.pixels == 0 || u64::from(definition.pixels) > LARGEST_IMAGE {
-            return Err(Error::invalid(format!(
-                "pixels is {}: must be 1 to {LARGEST_IMAGE}",
-                definition.pixels
-            )));
-        }
+        ensure!(
+            definition.pixels != 0 && u64::from(definition.pixels) <= LARGEST_IMAGE,
+            "pixels is {}: must be 1 to {LARGEST_IMAGE}",
+            definition.pixels
+        );
         if definition.crossings == 0 {
             return Err(Error::invalid("crossings is 0: must be at least 1"));
         }
         let (views, view_count) = match definition.views {
             Views::Axes => (Frame::AXES, 3),
             Views::Along(direction) => {
-                if !(direction.is_finite() && direction != Vec3::ZERO) {
-                    return Err(Error::invalid(format!(
-                        "the view is along {direction}: must be finite and not zero"
-                    )));
-                }
+                ensure!(
+                    direction.is_finite() && direction != Vec3::ZERO,
+                    "the view is along {direction}: must be finite and not zero"
+                );
                 ([Frame::along(direction); 3], 1)
             }
         };
@@ -198,9 +196,10 @@ impl ImageSpace {
         bodies[0].check()?;
         bodies[1].check()?;
         let surfaces = [bodies[0].surface, bodies[1].surface];
-        if !surfaces.iter().any(|surface| surface.is_closed()) {
-            return Err(Error::invalid("both surfaces are open: one at least must be closed"));
-        }
+        ensure!(
+            surfaces.iter().any(|surface| surface.is_closed()),
+            "both surfaces are open: one at least must be closed"
+        );
         if !self.overlap.takes(surfaces) {
             return Err(Error::Capacity(format!(
                 "surfaces of {} and {} nodes, {} and {} edges: larger than what the detector was made for",

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 use crate::mesh;
 
 /// What is said of an occluder that is none.
@@ -120,12 +120,11 @@ impl Placed<'_> {
     /// Refuses what does not belong together or is not finite.
     pub(super) fn check(&self) -> Result<()> {
         let node_count = self.surface.node_count;
-        if self.positions.len() != node_count {
-            return Err(Error::invalid(format!(
-                "{} positions of a surface of {node_count} nodes",
-                self.positions.len()
-            )));
-        }
+        ensure!(
+            self.positions.len() == node_count,
+            "{} positions of a surface of {node_count} nodes",
+            self.positions.len()
+        );
         if !(self.thickness >= 0.0 && self.thickness.is_finite()) {
             return Err(Error::invalid(format!(
                 "thickness is {} m: must be finite and at least 0",
@@ -148,9 +147,7 @@ pub(super) fn check_positions(positions: &[Vec3]) -> Result<()> {
 
 /// Refuses what cannot be drawn.
 pub(super) fn check(node_count: usize, triangles: &[[u32; 3]]) -> Result<()> {
-    if triangles.is_empty() {
-        return Err(Error::invalid("triangles: the surface has none"));
-    }
+    ensure!(!triangles.is_empty(), "triangles: the surface has none");
     if triangles.len() >= 1 << 31 {
         return Err(Error::Unsupported(format!(
             "{} triangles: image space takes fewer than 2^31",

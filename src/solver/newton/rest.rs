@@ -300,13 +300,12 @@ impl Parts {
                 continue;
             }
             let load = DVec3::select(held, DVec3::ZERO, load);
-            if load.length() > CANCELS * size {
-                return Err(Error::invalid(format!(
-                    "there is no state of rest: nothing holds node {} and what it is joined to against {:e} N",
-                    body.callers(part as usize),
-                    load.length()
-                )));
-            }
+            ensure!(
+                load.length() <= CANCELS * size,
+                "there is no state of rest: nothing holds node {} and what it is joined to against {:e} N",
+                body.callers(part as usize),
+                load.length()
+            );
             equation.loads[node] -= load * (equation.masses[node] / mass);
         }
         Ok(())
