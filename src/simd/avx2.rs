@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::Lanes;
 use super::Record;
-use super::lanes::instructions;
+use super::lanes::{common_instructions, instructions, twice};
 use super::link_batches::{EightLinks, Sight};
 
 #[derive(Clone, Copy)]
@@ -73,20 +73,13 @@ pub(super) use pulls_by_newton;
 impl Lanes for Avx2Lanes {
     const COUNT: usize = 8;
 
-    #[inline(always)]
-    unsafe fn splat(value: f32) -> Self {
-        Self(unsafe { _mm256_set1_ps(value) })
-    }
-
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
-        Self(unsafe { _mm256_loadu_ps(from) })
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
-        unsafe { _mm256_storeu_ps(to, self.0) }
-    }
+    common_instructions!(
+        _mm256_set1_ps,
+        _mm256_loadu_ps,
+        _mm256_storeu_ps,
+        _mm256_min_ps,
+        _mm256_max_ps
+    );
 
     #[inline(always)]
     unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
@@ -99,16 +92,22 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
-        let [x, y, z, _] = unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) };
-        [x, y, z]
-    }
-
-    #[inline(always)]
-    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
-        let [x, y, z, _] =
-            unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) };
-        [x, y, z]
+    unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
+        // Four of them at a time in each half.
+        unsafe {
+            let a = eight(record(at(0)), record(at(4)));
+            let b = eight(record(at(1)), record(at(5)));
+            let c = eight(record(at(2)), record(at(6)));
+            let d = eight(record(at(3)), record(at(7)));
+            let (low_ab, high_ab) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+            let (low_cd, high_cd) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+            [
+                Self(_mm256_shuffle_ps::<0b0100_0100>(low_ab, low_cd)),
+                Self(_mm256_shuffle_ps::<0b1110_1110>(low_ab, low_cd)),
+                Self(_mm256_shuffle_ps::<0b0100_0100>(high_ab, high_cd)),
+                Self(_mm256_shuffle_ps::<0b1110_1110>(high_ab, high_cd)),
+            ]
+        }
     }
 
     #[inline(always)]
@@ -129,11 +128,6 @@ impl Lanes for Avx2Lanes {
                 add_record(sums, indices.add(lane + 4), _mm256_extractf128_ps::<1>(pair));
             }
         }
-    }
-
-    #[inline(always)]
-    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
-        unsafe { transposed(|lane: usize| twice(base, indices.add(lane)).cast_const()) }
     }
 
     instructions! {
@@ -194,16 +188,6 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    unsafe fn lesser(self, other: Self) -> Self {
-        Self(unsafe { _mm256_min_ps(other.0, self.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn greater(self, other: Self) -> Self {
-        Self(unsafe { _mm256_max_ps(other.0, self.0) })
-    }
-
-    #[inline(always)]
     unsafe fn any_nan(self) -> bool {
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_UNORD_Q>(self.0, self.0)) != 0 }
     }
@@ -216,41 +200,13 @@ pub(super) unsafe fn record(place: *const Record) -> __m128 {
     unsafe { _mm_load_ps(place.cast()) }
 }
 
-/// The record of half an even index: half a record is as much as an address can be scaled by.
-#[inline(always)]
-pub(super) unsafe fn twice(base: *const Record, index: *const u16) -> *mut Record {
-    // SAFETY: the caller promises a readable index.
-    let halves = unsafe { usize::from(index.read()) };
-    base.cast::<[f32; 2]>().wrapping_add(halves).cast::<Record>().cast_mut()
-}
-
 /// Adds to the record of half an even index.
 #[inline(always)]
 pub(super) unsafe fn add_record(sums: *mut Record, index: *const u16, record: __m128) {
     // SAFETY: the caller promises the instructions, a readable index and a writable record.
     unsafe {
-        let place: *mut f32 = twice(sums, index).cast();
+        let place: *mut f32 = twice(sums, index).cast_mut().cast();
         _mm_store_ps(place, _mm_add_ps(_mm_load_ps(place), record));
-    }
-}
-
-/// The numbers of eight records: four of them at a time in each half.
-#[inline(always)]
-unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Avx2Lanes; 4] {
-    // SAFETY: the caller promises the instructions and the records.
-    unsafe {
-        let a = eight(record(at(0)), record(at(4)));
-        let b = eight(record(at(1)), record(at(5)));
-        let c = eight(record(at(2)), record(at(6)));
-        let d = eight(record(at(3)), record(at(7)));
-        let (low_ab, high_ab) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
-        let (low_cd, high_cd) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
-        [
-            Avx2Lanes(_mm256_shuffle_ps::<0b0100_0100>(low_ab, low_cd)),
-            Avx2Lanes(_mm256_shuffle_ps::<0b1110_1110>(low_ab, low_cd)),
-            Avx2Lanes(_mm256_shuffle_ps::<0b0100_0100>(high_ab, high_cd)),
-            Avx2Lanes(_mm256_shuffle_ps::<0b1110_1110>(high_ab, high_cd)),
-        ]
     }
 }
 

@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use super::Lanes;
 use super::Record;
-use super::avx2::{Avx2Lanes, add_record, four_at, four_near, pulls_by_newton, record, twice};
-use super::lanes::instructions;
+use super::avx2::{Avx2Lanes, add_record, four_at, four_near, pulls_by_newton, record};
+use super::lanes::{common_instructions, instructions};
 use super::link_batches::{EightLinks, Sight};
 
 #[derive(Clone, Copy)]
@@ -19,20 +19,13 @@ pub(super) struct Avx512Lanes(__m512);
 impl Lanes for Avx512Lanes {
     const COUNT: usize = 16;
 
-    #[inline(always)]
-    unsafe fn splat(value: f32) -> Self {
-        Self(unsafe { _mm512_set1_ps(value) })
-    }
-
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
-        Self(unsafe { _mm512_loadu_ps(from) })
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
-        unsafe { _mm512_storeu_ps(to, self.0) }
-    }
+    common_instructions!(
+        _mm512_set1_ps,
+        _mm512_loadu_ps,
+        _mm512_storeu_ps,
+        _mm512_min_ps,
+        _mm512_max_ps
+    );
 
     #[inline(always)]
     unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
@@ -59,16 +52,22 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
-    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
-        let [x, y, z, _] = unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) };
-        [x, y, z]
-    }
-
-    #[inline(always)]
-    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
-        let [x, y, z, _] =
-            unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) };
-        [x, y, z]
+    unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
+        // Four of them at a time in each quarter.
+        unsafe {
+            let a = sixteen(record(at(0)), record(at(4)), record(at(8)), record(at(12)));
+            let b = sixteen(record(at(1)), record(at(5)), record(at(9)), record(at(13)));
+            let c = sixteen(record(at(2)), record(at(6)), record(at(10)), record(at(14)));
+            let d = sixteen(record(at(3)), record(at(7)), record(at(11)), record(at(15)));
+            let (low_ab, high_ab) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+            let (low_cd, high_cd) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+            [
+                Self(_mm512_shuffle_ps::<0b0100_0100>(low_ab, low_cd)),
+                Self(_mm512_shuffle_ps::<0b1110_1110>(low_ab, low_cd)),
+                Self(_mm512_shuffle_ps::<0b0100_0100>(high_ab, high_cd)),
+                Self(_mm512_shuffle_ps::<0b1110_1110>(high_ab, high_cd)),
+            ]
+        }
     }
 
     #[inline(always)]
@@ -91,11 +90,6 @@ impl Lanes for Avx512Lanes {
                 add_record(sums, indices.add(lane + 12), _mm512_extractf32x4_ps::<3>(quarter));
             }
         }
-    }
-
-    #[inline(always)]
-    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
-        unsafe { transposed(|lane: usize| twice(base, indices.add(lane)).cast_const()) }
     }
 
     instructions! {
@@ -122,38 +116,8 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
-    unsafe fn lesser(self, other: Self) -> Self {
-        Self(unsafe { _mm512_min_ps(other.0, self.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn greater(self, other: Self) -> Self {
-        Self(unsafe { _mm512_max_ps(other.0, self.0) })
-    }
-
-    #[inline(always)]
     unsafe fn any_nan(self) -> bool {
         unsafe { _mm512_cmp_ps_mask::<_CMP_UNORD_Q>(self.0, self.0) != 0 }
-    }
-}
-
-/// The numbers of sixteen records: four of them at a time in each quarter.
-#[inline(always)]
-unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Avx512Lanes; 4] {
-    // SAFETY: the caller promises the instructions and the records.
-    unsafe {
-        let a = sixteen(record(at(0)), record(at(4)), record(at(8)), record(at(12)));
-        let b = sixteen(record(at(1)), record(at(5)), record(at(9)), record(at(13)));
-        let c = sixteen(record(at(2)), record(at(6)), record(at(10)), record(at(14)));
-        let d = sixteen(record(at(3)), record(at(7)), record(at(11)), record(at(15)));
-        let (low_ab, high_ab) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
-        let (low_cd, high_cd) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
-        [
-            Avx512Lanes(_mm512_shuffle_ps::<0b0100_0100>(low_ab, low_cd)),
-            Avx512Lanes(_mm512_shuffle_ps::<0b1110_1110>(low_ab, low_cd)),
-            Avx512Lanes(_mm512_shuffle_ps::<0b0100_0100>(high_ab, high_cd)),
-            Avx512Lanes(_mm512_shuffle_ps::<0b1110_1110>(high_ab, high_cd)),
-        ]
     }
 }
 

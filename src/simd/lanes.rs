@@ -30,11 +30,31 @@ pub(crate) trait Lanes: Copy {
     /// The same with small indices.
     unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self;
 
+    /// The four numbers of the readable record at `at(lane)`, for each of `COUNT` lanes.
+    unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4];
+
     /// The three numbers of `base[indices[lane]]` for `COUNT` readable indices that lead to readable records.
-    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3];
+    #[inline(always)]
+    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
+        // SAFETY: the caller's promise.
+        let [x, y, z, _] = unsafe { Self::transposed(|lane| base.wrapping_add(indices.add(lane).read() as usize)) };
+        [x, y, z]
+    }
 
     /// The same with small indices.
-    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3];
+    #[inline(always)]
+    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
+        // SAFETY: the caller's promise.
+        let [x, y, z, _] = unsafe { Self::transposed(|lane| base.wrapping_add(indices.add(lane).read().into())) };
+        [x, y, z]
+    }
+
+    /// The four numbers of `base[indices[lane] / 2]` for `COUNT` readable even indices that lead to readable records.
+    #[inline(always)]
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
+        // SAFETY: the caller's promise.
+        unsafe { Self::transposed(|lane| twice(base, indices.add(lane))) }
+    }
 
     /// Adds a vector of each lane to the three numbers of `sums[indices[lane] / 2]`, lane by lane, for `COUNT` readable even indices
     /// that lead to writable records; indices may be equal.
@@ -47,7 +67,7 @@ pub(crate) trait Lanes: Copy {
         }
         for lane in 0..Self::COUNT {
             // SAFETY: the caller's promise.
-            let Record(sum) = unsafe { &mut *sums.wrapping_add(usize::from(*indices.add(lane) / 2)) };
+            let Record(sum) = unsafe { &mut *twice(sums, indices.add(lane)).cast_mut() };
             for (sum, axis) in sum.iter_mut().zip(&axes) {
                 *sum += axis[lane];
             }
@@ -55,9 +75,6 @@ pub(crate) trait Lanes: Copy {
     }
 
     unsafe fn add(self, other: Self) -> Self;
-
-    /// The four numbers of `base[indices[lane] / 2]` for `COUNT` readable even indices that lead to readable records.
-    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4];
 
     /// `self * factor - subtrahend`
     unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self;
@@ -112,3 +129,43 @@ macro_rules! instructions {
 }
 
 pub(super) use instructions;
+
+/// Functions of lanes for which every processor has an instruction, alike but for its name.
+macro_rules! common_instructions {
+    ($splat:ident, $load:ident, $store:ident, $lesser:ident, $greater:ident) => {
+        #[inline(always)]
+        unsafe fn splat(value: f32) -> Self {
+            Self(unsafe { $splat(value) })
+        }
+
+        #[inline(always)]
+        unsafe fn load(from: *const f32) -> Self {
+            Self(unsafe { $load(from) })
+        }
+
+        #[inline(always)]
+        unsafe fn store(self, to: *mut f32) {
+            unsafe { $store(to, self.0) }
+        }
+
+        #[inline(always)]
+        unsafe fn lesser(self, other: Self) -> Self {
+            Self(unsafe { $lesser(other.0, self.0) })
+        }
+
+        #[inline(always)]
+        unsafe fn greater(self, other: Self) -> Self {
+            Self(unsafe { $greater(other.0, self.0) })
+        }
+    };
+}
+
+pub(super) use common_instructions;
+
+/// The record of half an even index: half a record is as much as an address can be scaled by.
+#[inline(always)]
+pub(super) unsafe fn twice(base: *const Record, index: *const u16) -> *const Record {
+    // SAFETY: the caller promises a readable index.
+    let halves = unsafe { usize::from(index.read()) };
+    base.cast::<[f32; 2]>().wrapping_add(halves).cast()
+}

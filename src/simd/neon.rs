@@ -4,7 +4,7 @@ use std::arch::aarch64::*;
 
 use super::Lanes;
 use super::Record;
-use super::lanes::instructions;
+use super::lanes::{common_instructions, instructions};
 
 #[derive(Clone, Copy)]
 pub(super) struct NeonLanes(float32x4_t);
@@ -17,43 +17,13 @@ unsafe fn spread(mask: u32) -> uint32x4_t {
     unsafe { vtstq_u32(vdupq_n_u32(mask), vld1q_u32(BITS.as_ptr())) }
 }
 
-/// The numbers of four records.
-#[inline(always)]
-unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [NeonLanes; 4] {
-    // SAFETY: every processor of this kind has the instructions; the caller promises the records.
-    unsafe {
-        let [a, b, c, d] = [0, 1, 2, 3].map(|lane| vld1q_f32(at(lane).cast()));
-        let (low_ac, high_ac) = (vzip1q_f32(a, c), vzip2q_f32(a, c));
-        let (low_bd, high_bd) = (vzip1q_f32(b, d), vzip2q_f32(b, d));
-        [
-            NeonLanes(vzip1q_f32(low_ac, low_bd)),
-            NeonLanes(vzip2q_f32(low_ac, low_bd)),
-            NeonLanes(vzip1q_f32(high_ac, high_bd)),
-            NeonLanes(vzip2q_f32(high_ac, high_bd)),
-        ]
-    }
-}
-
 // SAFETY of every block: every processor of this kind has the instructions, and the caller promises that what pointers lead
 // to is there; no load or store here asks for more than the alignment of a number.
 #[allow(clippy::undocumented_unsafe_blocks)]
 impl Lanes for NeonLanes {
     const COUNT: usize = 4;
 
-    #[inline(always)]
-    unsafe fn splat(value: f32) -> Self {
-        Self(unsafe { vdupq_n_f32(value) })
-    }
-
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
-        Self(unsafe { vld1q_f32(from) })
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
-        unsafe { vst1q_f32(to, self.0) }
-    }
+    common_instructions!(vdupq_n_f32, vld1q_f32, vst1q_f32, vminnmq_f32, vmaxnmq_f32);
 
     #[inline(always)]
     unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
@@ -69,21 +39,18 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
-    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
-        let [x, y, z, _] = unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) };
-        [x, y, z]
-    }
-
-    #[inline(always)]
-    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
-        let [x, y, z, _] =
-            unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) };
-        [x, y, z]
-    }
-
-    #[inline(always)]
-    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
-        unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read() / 2))) }
+    unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
+        unsafe {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|lane| vld1q_f32(at(lane).cast()));
+            let (low_ac, high_ac) = (vzip1q_f32(a, c), vzip2q_f32(a, c));
+            let (low_bd, high_bd) = (vzip1q_f32(b, d), vzip2q_f32(b, d));
+            [
+                Self(vzip1q_f32(low_ac, low_bd)),
+                Self(vzip2q_f32(low_ac, low_bd)),
+                Self(vzip1q_f32(high_ac, high_bd)),
+                Self(vzip2q_f32(high_ac, high_bd)),
+            ]
+        }
     }
 
     #[inline(always)]
@@ -123,16 +90,6 @@ impl Lanes for NeonLanes {
     #[inline(always)]
     unsafe fn where_set(self, mask: u32) -> Self {
         Self(unsafe { vreinterpretq_f32_u32(vandq_u32(vreinterpretq_u32_f32(self.0), spread(mask))) })
-    }
-
-    #[inline(always)]
-    unsafe fn lesser(self, other: Self) -> Self {
-        Self(unsafe { vminnmq_f32(other.0, self.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn greater(self, other: Self) -> Self {
-        Self(unsafe { vmaxnmq_f32(other.0, self.0) })
     }
 
     #[inline(always)]

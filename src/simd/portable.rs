@@ -45,24 +45,9 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
+    unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
         // SAFETY: the caller's promise.
-        let record = |lane: usize| unsafe { *base.wrapping_add(*indices.add(lane) as usize) };
-        from_fn(|axis| Self(from_fn(|lane| record(lane).0[axis])))
-    }
-
-    #[inline(always)]
-    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
-        // SAFETY: the caller's promise.
-        let record = |lane: usize| unsafe { *base.wrapping_add(usize::from(*indices.add(lane))) };
-        from_fn(|axis| Self(from_fn(|lane| record(lane).0[axis])))
-    }
-
-    #[inline(always)]
-    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
-        // SAFETY: the caller's promise.
-        let record = |lane: usize| unsafe { *base.wrapping_add(usize::from(*indices.add(lane) / 2)) };
-        from_fn(|axis| Self(from_fn(|lane| record(lane).0[axis])))
+        from_fn(|axis| Self(from_fn(|lane| unsafe { (*at(lane)).0[axis] })))
     }
 
     #[inline(always)]
