@@ -278,17 +278,15 @@ impl Body {
 
     /// Parts the rings of nodes that fell apart.
     fn part_rings(&mut self, material: &CutMaterial, changes: &Changes) {
-        let System {
-            forces, order, state, ..
-        } = &mut self.system;
-        let Some(elements) = forces.elements_mut() else {
+        let system = &mut self.system;
+        let Some(elements) = system.forces.elements_mut() else {
             return;
         };
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
-            let copies = pieces.iter().map(|piece| order.own(piece.node));
-            let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
-            let source = order.own(pieces[0].source);
-            elements.part_ring(source, copies, cells_at, state.positions());
+            let copies = pieces.iter().map(|piece| system.order.own(piece.node));
+            let cells_at = |node: u32| material.tetrahedra_at(system.order.caller(node));
+            let source = system.order.own(pieces[0].source);
+            elements.part_ring(source, copies, cells_at, system.state.positions());
         }
     }
 

@@ -8,7 +8,7 @@ use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial};
 use crate::def::SMALLEST_MASS;
 use crate::soa::Masses;
-use crate::solver::{Candidate, Changed, System, make_up_for};
+use crate::solver::{Candidate, Changed, make_up_for};
 use crate::springs::Rewiring;
 
 /// A node whose springs or mass a cut changes.
@@ -135,11 +135,9 @@ impl Body {
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
             let force_on = |body: &Self, node: u32| {
                 let cells = material.tetrahedra_at(node);
-                let System {
-                    forces, order, state, ..
-                } = &body.system;
-                forces.elements().map_or(DVec3::ZERO, |elements| {
-                    elements.force_at(order.own(node), cells, state.positions())
+                let system = &body.system;
+                system.forces.elements().map_or(DVec3::ZERO, |elements| {
+                    elements.force_at(system.order.own(node), cells, system.state.positions())
                 })
             };
             let whole: DVec3 = pieces.iter().map(|piece| force_on(self, piece.node)).sum();

@@ -7,7 +7,6 @@ use super::{Body, CutReport};
 use crate::base::{Error, Result, memory};
 use crate::cutting::{CutSurface, VertexLoad};
 use crate::def::{TearReport, Values, Withheld, check_values};
-use crate::solver::System;
 use crate::springs::{Link, pull};
 use crate::threads::Team;
 use crate::tissue::Skin;
@@ -102,10 +101,14 @@ impl Body {
         let version = self.topology_version();
         if let Some(mut tears) = self.tears.take() {
             let link = |nodes| self.link(nodes);
-            let System {
-                state, order, kernel, ..
-            } = &self.system;
-            tears.begin(state.positions(), version, order, link, (*kernel, team));
+            let system = &self.system;
+            tears.begin(
+                system.state.positions(),
+                version,
+                &system.order,
+                link,
+                (system.kernel, team),
+            );
             self.tears = Some(tears);
         }
     }

@@ -394,19 +394,13 @@ impl Contacts {
     /// Makes what tools received in a long substep of so many seconds the mean over it: an equation knows the forces at its end, and those at
     /// its start are those of the last.
     pub fn average_loads(&mut self, tools: &[ToolPath], substep: f64) {
-        let Self {
-            holds,
-            constraints,
-            loads,
-            ..
-        } = self;
-        holds.show_last(|slot, force, arm| {
+        self.holds.show_last(|slot, force, arm| {
             if let Some(place) = tools.iter().position(|tool| tool.slot == slot) {
-                loads[place].add(force * (0.5 * substep), arm);
+                self.loads[place].add(force * (0.5 * substep), arm);
             }
         });
-        for (index, constraint) in constraints.iter().enumerate().take(holds.len()) {
-            loads[constraint.tool].add(holds.force(index) * (0.5 * substep), constraint.arm);
+        for (index, constraint) in self.constraints.iter().enumerate().take(self.holds.len()) {
+            self.loads[constraint.tool].add(self.holds.force(index) * (0.5 * substep), constraint.arm);
         }
     }
 

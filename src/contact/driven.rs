@@ -294,21 +294,16 @@ impl Copied {
 
     fn fly_to(&mut self, part: f64, step: f64) {
         if part > self.gone {
-            let DynamicTool {
-                mass, motion, drive, ..
-            } = &mut self.tool;
             let duration = (part - self.gone) * step;
-            motion.fly(mass, *drive, duration);
+            self.tool.motion.fly(&self.tool.mass, self.tool.drive, duration);
             self.driven_for += duration;
             self.gone = part;
         }
     }
 
     fn take(&mut self, loads: &[ToolLoad]) {
-        let DynamicTool {
-            index, mass, motion, ..
-        } = &mut self.tool;
-        let load = loads[*index];
+        let load = loads[self.tool.index];
+        let DynamicTool { mass, motion, .. } = &mut self.tool;
         let new = load.since(&self.taken);
         if new.impulse == DVec3::ZERO && new.angular_impulse == DVec3::ZERO {
             return;

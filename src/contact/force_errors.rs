@@ -16,17 +16,11 @@ impl Contacts {
         push_of: impl Fn(usize) -> DVec3,
         stiffness_held: impl Fn(usize) -> f64,
     ) {
-        let Self {
-            holds,
-            constraints,
-            loads,
-            ..
-        } = self;
-        for (place, (tool, load)) in tools.iter().zip(loads).enumerate() {
-            let of_tool = |&(index, _): &(usize, _)| constraints[index].tool == place;
+        for (place, (tool, load)) in tools.iter().zip(&mut self.loads).enumerate() {
+            let of_tool = |&(index, _): &(usize, _)| self.constraints[index].tool == place;
             let (mut stiffness, mut missing) = (stiffness_held(tool.slot), 0.0);
-            for (index, hold) in holds.pressing().filter(of_tool) {
-                stiffness += hold.resistance(constraints[index].firmness);
+            for (index, hold) in self.holds.pressing().filter(of_tool) {
+                stiffness += hold.resistance(self.constraints[index].firmness);
                 missing += hold.missing(&push_of).abs();
             }
             load.force_error = load.force_error.max((stiffness * square).sqrt() + missing);

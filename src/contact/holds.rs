@@ -458,11 +458,8 @@ impl Holds {
     /// Adds what acts on these nodes with the nodes where they were last.
     pub fn add_forces(&self, nodes: &Range<usize>, to: &mut [&mut [f32]; 3]) {
         for share in self.shares_of(nodes) {
-            let hold = &self.holds[share.hold as usize];
-            let Answer {
-                meets, force, shares, ..
-            } = &hold.answer;
-            let force = meets.normal * (force * shares[share.place]);
+            let answer = &self.holds[share.hold as usize].answer;
+            let force = answer.meets.normal * (answer.force * answer.shares[share.place]);
             add(to, share.node as usize - nodes.start, force.as_vec3());
         }
         self.grips.add_forces(nodes, to);

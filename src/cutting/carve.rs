@@ -133,11 +133,9 @@ impl Cut<'_> {
     }
 
     fn edge(&self, triangle: u32, side: usize) -> Edge {
-        let SurfaceTriangle {
-            corners, neighbours, ..
-        } = self.surface.triangles[triangle];
-        let (from, to) = (corners[side], corners[(side + 1) % 3]);
-        if neighbours[side] == NONE {
+        let it = &self.surface.triangles[triangle];
+        let (from, to) = (it.corners[side], it.corners[(side + 1) % 3]);
+        if it.neighbours[side] == NONE {
             (from, to)
         } else {
             (from.min(to), from.max(to))
@@ -153,8 +151,7 @@ impl Cut<'_> {
 
     /// The vertex there is for a point: of one that both swept triangles have what the first has made of it.
     fn vertex_known(&mut self, pierced: &Pierced) -> Result<Option<u32>> {
-        let SurfaceTriangle { cell, .. } = self.surface.triangles[pierced.triangle];
-        let snap = self.surface.cells[cell].snap;
+        let snap = self.surface.cells[self.surface.triangles[pierced.triangle].cell].snap;
         let is_same = |&&(place, _): &&(DVec3, u32)| place.distance(pierced.place) < 0.1 * snap;
         if let Some(&(_, vertex)) = self.joints.iter().find(is_same).filter(|_| pierced.side == JOINT) {
             return Ok(Some(vertex));

@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use super::cut::Cut;
 use super::divided::NONE;
-use super::surface::SurfaceTriangle;
 use crate::base::Result;
 
 /// A way that is longer was led astray by a surface that is folded in its rest shape; the cut ends there.
@@ -44,30 +43,23 @@ impl Cut<'_> {
     /// Marks the edge between two vertices as cut; answers whether there is one.
     fn mark(&mut self, from: u32, to: u32) -> Result<bool> {
         for (triangle, corner) in self.ring(from)? {
-            let SurfaceTriangle {
-                corners, neighbours, ..
-            } = self.surface.triangles[triangle];
-            let Some(side) = [corner, (corner + 2) % 3]
-                .into_iter()
-                .find(|&side| corners[side] == to || corners[(side + 1) % 3] == to)
-            else {
-                continue;
-            };
-            if neighbours[side] != NONE {
-                self.set_cut(triangle, side, true)?;
+            let it = &self.surface.triangles[triangle];
+            let ends_there = |side: &usize| it.corners[*side] == to || it.corners[(side + 1) % 3] == to;
+            if let Some(side) = [corner, (corner + 2) % 3].into_iter().find(ends_there) {
+                if it.neighbours[side] != NONE {
+                    self.set_cut(triangle, side, true)?;
+                }
+                return Ok(true);
             }
-            return Ok(true);
         }
         Ok(false)
     }
 
     /// Sets whether a side of a triangle, which has a triangle across, is to be cut.
     pub(crate) fn set_cut(&mut self, triangle: u32, side: usize, is_cut: bool) -> Result<()> {
-        let SurfaceTriangle {
-            corners, neighbours, ..
-        } = self.surface.triangles[triangle];
-        let across = neighbours[side];
-        let back = self.side_from(across, corners[(side + 1) % 3]);
+        let it = &self.surface.triangles[triangle];
+        let across = it.neighbours[side];
+        let back = self.side_from(across, it.corners[(side + 1) % 3]);
         self.surface
             .triangles
             .edit(triangle, |triangle| triangle.rim[side] = is_cut)?;

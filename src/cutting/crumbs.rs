@@ -2,7 +2,6 @@
 
 use super::cut::Cut;
 use super::divided::NONE;
-use super::surface::SurfaceTriangle;
 use crate::base::{Result, memory};
 
 /// A piece with less area than this many squares of the snapping distance stays with what it was cut from: the blade goes round it on one side.
@@ -68,14 +67,12 @@ impl Cut<'_> {
     fn take_back(&mut self, piece: &[u32]) -> Result<bool> {
         let mut longest = (0.0, NONE, 0);
         for &triangle in piece {
-            let SurfaceTriangle {
-                corners, neighbours, ..
-            } = self.surface.triangles[triangle];
+            let it = &self.surface.triangles[triangle];
             for side in (0..3).filter(|&side| self.is_newly_cut(triangle, side)) {
-                if piece.contains(&neighbours[side]) {
+                if piece.contains(&it.neighbours[side]) {
                     continue;
                 }
-                let [from, to] = [side, (side + 1) % 3].map(|k| self.surface.rest_place(corners[k]));
+                let [from, to] = [side, (side + 1) % 3].map(|k| self.surface.rest_place(it.corners[k]));
                 let length = from.distance(to);
                 if length > longest.0 {
                     longest = (length, triangle, side);

@@ -101,16 +101,14 @@ impl Cut<'_> {
         let (mut at, mut vertices) = (0, Vec::new());
         while let Some(&triangle) = seen.get(at) {
             at += 1;
-            let SurfaceTriangle {
-                corners, neighbours, ..
-            } = self.surface.triangles[triangle];
-            let places = corners.map(|corner| self.surface.rest_place(corner));
+            let it = &self.surface.triangles[triangle];
+            let places = it.corners.map(|corner| self.surface.rest_place(corner));
             for k in 0..3 {
                 let distance = places[k].distance(place);
-                if distance <= reach && !vertices.contains(&(corners[k], distance)) {
-                    memory::push(&mut vertices, (corners[k], distance))?;
+                if distance <= reach && !vertices.contains(&(it.corners[k], distance)) {
+                    memory::push(&mut vertices, (it.corners[k], distance))?;
                 }
-                let across = neighbours[k];
+                let across = it.neighbours[k];
                 if across != NONE
                     && !seen.contains(&across)
                     && segment_distance(place, places[k], places[(k + 1) % 3]) <= reach
@@ -134,17 +132,12 @@ impl Cut<'_> {
     fn is_end(&self, vertex: u32) -> Result<bool> {
         let (mut far, mut count) = ([vertex; 2], 0);
         for (triangle, corner) in self.ring(vertex)? {
-            let SurfaceTriangle {
-                corners,
-                neighbours,
-                rim,
-                ..
-            } = self.surface.triangles[triangle];
+            let it = &self.surface.triangles[triangle];
             for (side, other) in [(corner, (corner + 1) % 3), ((corner + 2) % 3, (corner + 2) % 3)] {
-                if rim[side] {
-                    far[count.min(1)] = corners[other];
+                if it.rim[side] {
+                    far[count.min(1)] = it.corners[other];
                     count += 1;
-                } else if neighbours[side] == NONE {
+                } else if it.neighbours[side] == NONE {
                     return Ok(false);
                 }
             }
@@ -158,15 +151,13 @@ impl Cut<'_> {
         let cell = self.surface.triangles[triangle].cell;
         let mut steps = 0;
         loop {
-            let SurfaceTriangle {
-                corners, neighbours, ..
-            } = self.surface.triangles[triangle];
-            let of = corners.map(|corner| self.surface.weights_in(corner, cell));
+            let it = &self.surface.triangles[triangle];
+            let of = it.corners.map(|corner| self.surface.weights_in(corner, cell));
             let whole = turn(of);
             let inside = [0, 1, 2].map(|k| turn([of[(k + 1) % 3], of[(k + 2) % 3], point]) / whole);
             let out = (0..3)
                 .filter(|&k| inside[k] < 0.0)
-                .map(|k| (k, neighbours[(k + 1) % 3]))
+                .map(|k| (k, it.neighbours[(k + 1) % 3]))
                 .filter(|&(_, across)| across != NONE && self.surface.triangles[across].cell == cell)
                 .min_by(|a, b| inside[a.0].total_cmp(&inside[b.0]));
             steps += 1;

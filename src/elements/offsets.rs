@@ -251,13 +251,11 @@ impl Elements {
             }
             self.offsets.of_nodes[node as usize] = left as f32;
         }
-        let Offsets {
-            of_nodes, nodes, taken, ..
-        } = &mut self.offsets;
-        *taken = taken.max(0.0);
-        nodes.retain(|&node| of_nodes[node as usize] != 0.0);
-        if nodes.is_empty() {
-            self.offsets.done();
+        let offsets = &mut self.offsets;
+        offsets.taken = offsets.taken.max(0.0);
+        offsets.nodes.retain(|&node| offsets.of_nodes[node as usize] != 0.0);
+        if offsets.nodes.is_empty() {
+            offsets.done();
         }
     }
 

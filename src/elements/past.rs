@@ -309,10 +309,7 @@ impl Memory {
 
     /// The elastic pressure of a ring has become so much higher where it is, Pa, of which nothing was deformed.
     pub fn shift_ring(&mut self, node: u32, more: f32) {
-        let Past {
-            elastic, kept_elastic, ..
-        } = &mut self.rings;
-        for values in [elastic, kept_elastic] {
+        for values in [&mut self.rings.elastic, &mut self.rings.kept_elastic] {
             if let Some(value) = values.get_mut(node as usize) {
                 *value += more;
             }

@@ -435,14 +435,20 @@ impl System {
     /// For how long tiles that are awake have been at rest.
     fn see_rest(&self, sleeper: &mut Sleeper, dt: f32) {
         let velocities = self.state.velocities();
-        let Sleeper {
-            sleep, tiles, asleep, ..
-        } = sleeper;
-        for (tile, it) in tiles.iter_mut().enumerate().filter(|&(tile, _)| !asleep[tile]) {
+        let awake = sleeper
+            .tiles
+            .iter_mut()
+            .enumerate()
+            .filter(|&(tile, _)| !sleeper.asleep[tile]);
+        for (tile, it) in awake {
             let nodes = tile_nodes(tile, velocities.len());
             let bounds = Bounds::from(self.kernel.ranges(velocities.slices(nodes)));
             let fastest = bounds.magnitudes().length();
-            it.quiet = if fastest < sleep.speed { it.quiet + dt } else { 0.0 };
+            it.quiet = if fastest < sleeper.sleep.speed {
+                it.quiet + dt
+            } else {
+                0.0
+            };
         }
     }
 

@@ -123,16 +123,13 @@ impl World {
 
     /// Leads what holds tissue to blades along their ways in the next step.
     pub(super) fn lead_blades(&mut self) {
-        let Self {
-            blades, tissue, bodies, ..
-        } = self;
-        let Some(bonds) = tissue.as_mut().map(|tissue| &mut tissue.bonds) else {
+        let Some(bonds) = self.tissue.as_mut().map(|tissue| &mut tissue.bonds) else {
             return;
         };
-        for (_, blade) in blades.iter_mut() {
+        for (_, blade) in self.blades.iter_mut() {
             let edges = blade.edges();
             for hold in blade.proxies.iter_mut().flat_map(|proxy| &mut proxy.holds) {
-                let Some(place) = bonds.place_of(bodies, hold.id) else {
+                let Some(place) = bonds.place_of(&self.bodies, hold.id) else {
                     continue;
                 };
                 let point = place - hold.offset;

@@ -4,7 +4,7 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::World;
 use crate::base::{Error, Result, ToolId, ensure, memory};
-use crate::contact::{DynamicTool, MassProperties, Pose, Rigid, Tool};
+use crate::contact::{DynamicTool, MassProperties, Pose, Rigid};
 use crate::def::finite_vector;
 use crate::solver::Outcome;
 
@@ -217,12 +217,10 @@ impl World {
 
     /// Puts together where bodies moved each dynamic tool.
     pub(super) fn end_flights(&mut self, dt: f32) {
-        let mut rigid = self.tools.iter_mut().filter_map(|(_, tool)| {
-            let Tool {
-                rigid, pose, led_to, ..
-            } = tool;
-            Some((rigid.as_deref_mut()?, pose, led_to))
-        });
+        let mut rigid = self
+            .tools
+            .iter_mut()
+            .filter_map(|(_, tool)| Some((tool.rigid.as_deref_mut()?, &mut tool.pose, &mut tool.led_to)));
         for tool in &self.dynamic {
             let Some((rigid, pose, led_to)) = rigid.next() else {
                 break;

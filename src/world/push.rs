@@ -65,17 +65,11 @@ impl World {
     /// Where the edge of a blade, which was here in the world as the step began, was then beside the tissue as that is now: tissue may have
     /// come onto it. Where it stood in the tissue, that tells by itself.
     fn start_in(&self, blade: &mut Blade, at: usize, start: [Vec3; 2], dt: f32) -> Result<[Vec3; 2]> {
-        let Proxy {
-            body,
-            stroke,
-            holds,
-            was_outside,
-            ..
-        } = &blade.proxies[at];
-        if !holds.is_empty() || !stroke.ends().is_empty() || *was_outside != Some(true) {
+        let proxy = &blade.proxies[at];
+        if !proxy.holds.is_empty() || !proxy.stroke.ends().is_empty() || proxy.was_outside != Some(true) {
             return Ok(start);
         }
-        let body = self.bodies.get(body.0)?;
+        let body = self.bodies.get(proxy.body.0)?;
         let Some(velocity) = body.velocity_about(start, &mut blade.near)? else {
             return Ok(start);
         };

@@ -271,10 +271,8 @@ impl SolidCut<'_> {
             let mut at = start;
             while bare[at].round == usize::MAX {
                 bare[at].round = start;
-                let Bare {
-                    tetrahedron, face, to, ..
-                } = bare[at];
-                let next = self.solid.beside(tetrahedron, face, [vertex, to]);
+                let it = &bare[at];
+                let next = self.solid.beside(it.tetrahedron, it.face, [vertex, it.to]);
                 at = bare
                     .iter()
                     .position(|of| (of.tetrahedron, of.face) == next)

@@ -111,14 +111,12 @@ impl SolidCut<'_> {
 
     /// Lists the sides of a triangle of the inside beyond which there is skin.
     fn list_rim(&mut self, inner: u32) -> Result<()> {
-        let SolidTriangle {
-            corners, tetrahedron, ..
-        } = self.solid.triangles[inner];
-        let drawn = self.solid.tetrahedra[tetrahedron].drawn;
+        let it = self.solid.triangles[inner];
+        let drawn = self.solid.tetrahedra[it.tetrahedron].drawn;
         let face = (0..3).find(|&face| drawn[face] == inner).unwrap_or(3);
         for k in 0..3 {
-            let vertices = [corners[k], corners[(k + 1) % 3]];
-            let (across, face) = self.solid.beside(tetrahedron, face, vertices);
+            let vertices = [it.corners[k], it.corners[(k + 1) % 3]];
+            let (across, face) = self.solid.beside(it.tetrahedron, face, vertices);
             let skin = self.solid.tetrahedra[across].drawn[face];
             if !self.solid.triangles[skin].is_inner {
                 let [from, to] = vertices.map(|vertex| self.solid.rest_place(vertex));

@@ -310,13 +310,8 @@ impl Implicit {
 
     /// Has a new node go on as another does.
     pub fn copy_motion(&mut self, source: usize, node: usize) {
-        let History {
-            ways,
-            gains,
-            remainders,
-            ..
-        } = &mut self.histories[self.settled];
-        for vectors in [ways, gains, remainders] {
+        let history = &mut self.histories[self.settled];
+        for vectors in [&mut history.ways, &mut history.gains, &mut history.remainders] {
             if node < vectors.len() {
                 vectors.set(node, vectors.get(source));
             }

@@ -7,7 +7,6 @@ use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit};
 use crate::base::{Stage, Stopwatch};
 use crate::codec::saved;
-use crate::def::SolverReport;
 use crate::soa::{Records, Vectors, WriteRecords, tile_count, tile_nodes};
 use crate::solver::System;
 use crate::solver::kick::{Survey, look};
@@ -75,12 +74,10 @@ impl Substep<'_> {
     pub(super) fn take_safely(self, body: &mut System, implicit: &mut Implicit, is_last_resort: bool) -> End {
         let watch = Stopwatch::start(self.request.profile);
         let before = self.energy_before(body, implicit);
-        let SolverReport {
-            error, has_converged, ..
-        } = implicit.report;
+        let report = implicit.report;
         let mut end = self.take(body, implicit, before);
         if matches!(end, End::Gained | End::NotFinite) && self.may_be_of_order_1(implicit) {
-            (implicit.report.error, implicit.report.has_converged) = (error, has_converged);
+            (implicit.report.error, implicit.report.has_converged) = (report.error, report.has_converged);
             end = self.of_order_1().take(body, implicit, before);
         }
         if end == End::Gained && (is_last_resort || implicit.left == 0) {
