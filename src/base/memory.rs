@@ -23,6 +23,29 @@ pub(crate) fn collected<T>(values: impl ExactSizeIterator<Item = T>) -> Result<V
     Ok(all)
 }
 
+/// The same of values that may be refused, as the first of them that is.
+pub(crate) fn try_collected<T>(values: impl ExactSizeIterator<Item = Result<T>>) -> Result<Vec<T>> {
+    let mut all = reserved(values.len())?;
+    for value in values {
+        all.push(value?);
+    }
+    Ok(all)
+}
+
+/// The values, of which there are `most` at most, in a vector with room for those.
+pub(crate) fn collected_within<T>(most: usize, values: impl Iterator<Item = T>) -> Result<Vec<T>> {
+    let mut all = reserved(most)?;
+    all.extend(values);
+    Ok(all)
+}
+
+/// The values, however many they turn out to be.
+pub(crate) fn gathered<T>(values: impl IntoIterator<Item = T>) -> Result<Vec<T>> {
+    let mut all = Vec::new();
+    extend(&mut all, values)?;
+    Ok(all)
+}
+
 /// A copy of `values`.
 pub(crate) fn copied<T: Copy>(values: &[T]) -> Result<Vec<T>> {
     let mut copy = reserved(values.len())?;
@@ -88,4 +111,9 @@ pub(crate) fn push<T>(values: &mut Vec<T>, value: T) -> Result<()> {
     values.try_reserve(1)?;
     values.push(value);
     Ok(())
+}
+
+/// Appends all of these, growing the vector fallibly.
+pub(crate) fn extend<T>(values: &mut Vec<T>, more: impl IntoIterator<Item = T>) -> Result<()> {
+    more.into_iter().try_for_each(|value| push(values, value))
 }

@@ -22,9 +22,9 @@ impl Body {
                 Some(piece) => memory::push(&mut rewiring.changed, part_of(source[0], link, piece.part))?,
                 None => memory::push(&mut rewiring.removed, spring_of(source, &link, 1.0))?,
             }
-            for piece in pieces.iter().filter(|piece| !is_source(piece)) {
-                memory::push(&mut rewiring.added, spring_of(own(piece.nodes), &link, piece.part))?;
-            }
+            let others = pieces.iter().filter(|piece| !is_source(piece));
+            let others = others.map(|piece| spring_of(own(piece.nodes), &link, piece.part));
+            memory::extend(&mut rewiring.added, others)?;
         }
         Ok(rewiring)
     }
@@ -47,8 +47,8 @@ impl Body {
         let known = self.node_count() as u32;
         nodes.retain(|&node| node < known);
         let parted = changes.nodes.iter().filter(|piece| piece.node == piece.source);
-        let mut parts = memory::reserved(changes.nodes.len())?;
-        parts.extend(parted.map(|piece| (self.system.order.own(piece.node), piece.part)));
+        let parts = parted.map(|piece| (self.system.order.own(piece.node), piece.part));
+        let mut parts = memory::collected_within(changes.nodes.len(), parts)?;
         parts.sort_unstable_by_key(|&(node, _)| node);
         nodes.try_reserve(parts.len())?;
         nodes.extend(parts.iter().map(|&(node, _)| node));

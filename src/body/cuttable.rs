@@ -222,12 +222,11 @@ impl TileSearch {
             if !tiles.and(&later).overlaps(swept) {
                 continue;
             }
-            for &item in &home.items {
+            let is_near = |&item: &u32| {
                 let places = material.corners_of(item).map(|corner| positions[corner as usize]);
-                if Bounds::of(places.into_iter()).overlaps(swept) {
-                    memory::push(near, item)?;
-                }
-            }
+                Bounds::of(places.into_iter()).overlaps(swept)
+            };
+            memory::extend(near, home.items.iter().copied().filter(is_near))?;
         }
         Ok(())
     }

@@ -22,11 +22,10 @@ impl Body {
     pub fn scale_region(&mut self, nodes: &[u32], stiffness: f32, length: f32) -> Result<()> {
         not_negative("stiffness_factor", stiffness)?;
         above_zero("length_factor", length)?;
-        let mut own = memory::reserved(nodes.len())?;
-        for (index, &node) in nodes.iter().enumerate() {
+        let own = memory::try_collected(nodes.iter().enumerate().map(|(index, &node)| {
             self.check_node(&format_args!("nodes[{index}]"), node)?;
-            own.push(self.system.order.own(node));
-        }
+            Ok(self.system.order.own(node))
+        }))?;
         if stiffness == 1.0 && length == 1.0 {
             return Ok(());
         }

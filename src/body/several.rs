@@ -91,12 +91,9 @@ impl Body {
             min.cmple(max).all(),
             "min is {min}: must be at most max, which is {max}, along each axis"
         );
-        let mut nodes = Vec::new();
-        for (node, position) in (0..).zip(self.positions()) {
-            if min.cmple(*position).all() && position.cmple(max).all() && !self.is_bound(node) {
-                memory::push(&mut nodes, node)?;
-            }
-        }
-        Ok(nodes)
+        let is_within = |position: &Vec3| min.cmple(*position).all() && position.cmple(max).all();
+        let nodes = (0..).zip(self.positions());
+        let within = nodes.filter(|&(node, position)| is_within(position) && !self.is_bound(node));
+        memory::gathered(within.map(|(node, _)| node))
     }
 }

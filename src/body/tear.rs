@@ -58,17 +58,12 @@ impl Body {
     pub fn tear_limits(&self, pairs: &[[u32; 2]]) -> Result<Vec<[f32; 2]>> {
         let springs = self.borne_by_pairs(pairs)?;
         let tears = self.tears.as_ref().ok_or_else(not_made_to_tear)?;
-        let mut limits = memory::reserved(pairs.len())?;
-        limits.extend(springs.iter().map(|(node, link)| tears.limits([*node, link.neighbour])));
+        let limits = memory::collected(springs.iter().map(|(node, link)| tears.limits([*node, link.neighbour])))?;
         Ok(limits)
     }
 
     fn borne_by_pairs(&self, pairs: &[[u32; 2]]) -> Result<Vec<(u32, Link)>> {
-        let mut springs = memory::reserved(pairs.len())?;
-        for index in 0..pairs.len() {
-            springs.push(self.borne_by_pair(pairs, index)?);
-        }
-        Ok(springs)
+        memory::try_collected((0..pairs.len()).map(|index| self.borne_by_pair(pairs, index)))
     }
 
     /// What the first of two nodes sees of their spring, or of an edge of elements, which bears a strain alone.

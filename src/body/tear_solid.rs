@@ -61,12 +61,9 @@ impl Body {
         let Some(vertex) = solid.vertex_of(node) else {
             return Ok(Torn::Not(Withheld::NoWay));
         };
-        let mut near = Vec::new();
-        for cell in solid.cells_at(node) {
-            memory::push(&mut near, cell)?;
-        }
-        let mut nodes = memory::reserved(4 * near.len())?;
-        nodes.extend(near.iter().flat_map(|&cell| solid.cells()[cell as usize].nodes));
+        let near = memory::gathered(solid.cells_at(node))?;
+        let nodes_near = near.iter().flat_map(|&cell| solid.cells()[cell as usize].nodes);
+        let mut nodes = memory::collected_within(4 * near.len(), nodes_near)?;
         memory::sort_once(&mut nodes);
         let positions = self.positions();
         let way = solid.way_of(vertex, load, positions)?;

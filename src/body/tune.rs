@@ -87,10 +87,9 @@ impl Body {
 
     /// Changes springs, each once. Changes nothing where it fails.
     pub(super) fn change_springs(&mut self, changes: &[SpringChange]) -> Result<()> {
-        let mut nodes = memory::reserved(2 * changes.len())?;
-        nodes.extend(changes.iter().flat_map(SpringChange::ends).map(|(node, _)| node));
-        nodes.sort_unstable();
-        nodes.dedup();
+        let nodes = changes.iter().flat_map(SpringChange::ends).map(|(node, _)| node);
+        let mut nodes = memory::collected_within(2 * changes.len(), nodes)?;
+        memory::sort_once(&mut nodes);
         if let Some(scaling) = &mut self.system.scaling {
             scaling.reserve(nodes.len())?;
         }

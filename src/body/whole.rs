@@ -59,8 +59,7 @@ impl Body {
         let [low, high] = self.bounds().map(|corner| corner.as_dvec3());
         let pivot = pivot.map_or((low + high) * 0.5, |pivot| pivot.as_dvec3());
         let place = |position: &Vec3| rotation * (position.as_dvec3() - pivot) + pivot + translation.as_dvec3();
-        let mut positions = memory::reserved(self.node_count())?;
-        positions.extend(self.positions().iter().map(|position| place(position).as_vec3()));
+        let positions = memory::collected(self.positions().iter().map(|position| place(position).as_vec3()))?;
         if let Some(node) = positions.iter().position(|position: &Vec3| !position.is_finite()) {
             return Err(Error::invalid(format!(
                 "translation is {translation}: node {node} would be at infinity"

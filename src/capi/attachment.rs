@@ -6,7 +6,7 @@ use super::id::converts;
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{sinew_tool_id, write_wrench};
-use crate::base::memory::reserved;
+use crate::base::memory::collected;
 use crate::base::{AttachmentId, BodyId, Result, ToolId, ensure};
 use crate::def::{Anchor, SurfacePoint};
 use crate::world::World;
@@ -101,16 +101,10 @@ impl sinew_attachment_def {
 impl AttachedEnds<'_> {
     fn anchors(&self) -> Result<Vec<Anchor>> {
         match self {
-            Self::Nodes(nodes) => anchored(nodes, Anchor::Node),
-            Self::Points(points) => anchored(points, Anchor::Point),
+            Self::Nodes(nodes) => collected(nodes.iter().copied().map(Anchor::Node)),
+            Self::Points(points) => collected(points.iter().copied().map(Anchor::Point)),
         }
     }
-}
-
-fn anchored<T: Copy>(ends: &[T], anchor: fn(T) -> Anchor) -> Result<Vec<Anchor>> {
-    let mut anchors = reserved(ends.len())?;
-    anchors.extend(ends.iter().map(|&end| anchor(end)));
-    Ok(anchors)
 }
 
 /// The nodes of an array, or the points of two, by these names.
@@ -129,9 +123,8 @@ unsafe fn ends<'a>(
     ensure!(nodes.is_null(), "{of_nodes} is given beside points");
     let triangles = memory::array(of_triangles, triangles, count)?;
     let weights = memory::array(of_weights, weights.cast::<[f32; 3]>(), count)?;
-    let mut points = reserved(count)?;
     let pairs = triangles.iter().zip(weights);
-    points.extend(pairs.map(|(&triangle, &weights)| SurfacePoint { triangle, weights }));
+    let points = collected(pairs.map(|(&triangle, &weights)| SurfacePoint { triangle, weights }))?;
     Ok(AttachedEnds::Points(points))
 }
 
@@ -221,8 +214,7 @@ pub unsafe extern "C" fn sinew_world_get_total_wrench(
     with_world(world, |world| {
         let given = memory::array("tools", tools, count)?;
         let point = memory::vector("point", point)?;
-        let mut tools = reserved(count)?;
-        tools.extend(given.iter().map(|tool| tool.id()));
+        let tools = collected(given.iter().map(|tool| tool.id()))?;
         write_wrench(world.wrench_about(&tools, point)?, out_force, out_torque)
     })
 }

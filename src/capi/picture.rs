@@ -147,10 +147,7 @@ pub unsafe extern "C" fn sinew_world_save_picture_of_values(
 ) -> sinew_status {
     with_world(world, |world| {
         let coloured = memory::array("coloured", coloured, count)?;
-        let mut values = crate::base::memory::reserved(count)?;
-        for of in coloured {
-            values.push(of.values()?);
-        }
+        let values = crate::base::memory::try_collected(coloured.iter().map(|of| of.values()))?;
         let picture = world.picture_of_values(&definition(def)?, &values)?;
         picture.write_png(memory::text("path", path)?)
     })

@@ -40,12 +40,8 @@ impl sinew_body_def {
         }
         let turn = pose.orientation.as_dquat().normalize();
         let moved = |vectors: &[Vec3], by: Vec3| -> Result<Vec<Vec3>> {
-            let mut moved = memory::reserved(vectors.len())?;
-            moved.extend(
-                vectors
-                    .iter()
-                    .map(|at| (turn * at.as_dvec3() + by.as_dvec3()).as_vec3()),
-            );
+            let place = |at: &Vec3| (turn * at.as_dvec3() + by.as_dvec3()).as_vec3();
+            let moved = memory::collected(vectors.iter().map(place))?;
             Ok(moved)
         };
         let positions = moved(definition.positions, pose.position)?;

@@ -52,8 +52,7 @@ pub unsafe extern "C" fn sinew_body_get_spring_strains(
         if let Some(lengths) = memory::optional_array("rest_lengths", rest_lengths, count)? {
             return strain::of_springs(body.positions(), pairs, lengths, out_strains);
         }
-        let mut lengths = crate::base::memory::reserved(count)?;
-        lengths.extend(body.springs(pairs)?.iter().map(|spring| spring.rest_length));
+        let lengths = crate::base::memory::collected(body.springs(pairs)?.iter().map(|spring| spring.rest_length))?;
         strain::of_springs(body.positions(), pairs, &lengths, out_strains)
     })
 }

@@ -86,10 +86,9 @@ impl Features {
                 position(a as usize).distance(position(b as usize))
             }
         };
-        let mut edge_lengths = memory::reserved(edges.len())?;
-        edge_lengths.extend(edges.iter().map(|&[a, b]| length(a, b)));
-        let mut face_lengths = memory::reserved(surface.len())?;
-        face_lengths.extend((surface.iter()).map(|&[a, b, c]| length(a, b).max(length(b, c)).max(length(c, a))));
+        let edge_lengths = memory::collected(edges.iter().map(|&[a, b]| length(a, b)))?;
+        let longest_edge = |&[a, b, c]: &[u32; 3]| length(a, b).max(length(b, c)).max(length(c, a));
+        let face_lengths = memory::collected(surface.iter().map(longest_edge))?;
         Ok(Self {
             node_count: node_count as u32,
             edges,

@@ -28,9 +28,7 @@ impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
     /// The cells' corners at a node, in ascending order.
     fn list_corners(&self, node: u32, corners: &mut Vec<u32>) -> Result<()> {
         corners.clear();
-        for corner in self.body.corners_at(node) {
-            memory::push(corners, corner)?;
-        }
+        memory::extend(corners, self.body.corners_at(node))?;
         corners.sort_unstable();
         Ok(())
     }
@@ -151,9 +149,7 @@ impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
         let (mut cells, mut corners) = (Vec::new(), Vec::new());
         for at in 0..self.changes.nodes.len() {
             self.list_corners(self.changes.nodes[at].node, &mut corners)?;
-            for &corner in &corners {
-                memory::push(&mut cells, corner / N as u32)?;
-            }
+            memory::extend(&mut cells, corners.iter().map(|corner| corner / N as u32))?;
         }
         memory::sort_once(&mut cells);
         let mut shares = memory::reserved(D::EDGES.len() * cells.len())?;

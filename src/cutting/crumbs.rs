@@ -15,9 +15,8 @@ impl Cut<'_> {
     pub(crate) fn keep_crumbs(&mut self) -> Result<()> {
         let mut sides = Vec::new();
         for triangle in self.surface.triangles.touched()? {
-            for side in (0..3).filter(|&side| self.is_newly_cut(triangle, side)) {
-                memory::push(&mut sides, (triangle, side))?;
-            }
+            let cut = (0..3).filter(|&side| self.is_newly_cut(triangle, side));
+            memory::extend(&mut sides, cut.map(|side| (triangle, side)))?;
         }
         let mut piece = memory::reserved(MOST_TRIANGLES + 3)?;
         let mut is_done = false;

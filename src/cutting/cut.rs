@@ -41,14 +41,12 @@ impl Sweep {
     /// The numbers of the items whose box meets its own, of the corners of each.
     pub(crate) fn near<const N: usize>(&self, items: impl Iterator<Item = [Vec3; N]>) -> Result<Vec<u32>> {
         let (low, high) = bounds(&[self.start[0], self.start[1], self.end[0], self.end[1]]);
-        let mut near = Vec::new();
-        for (number, corners) in items.enumerate() {
-            let (from, to) = bounds(&corners);
-            if from.cmple(high).all() && low.cmple(to).all() {
-                memory::push(&mut near, number as u32)?;
-            }
-        }
-        Ok(near)
+        let meets = |corners: &[Vec3; N]| {
+            let (from, to) = bounds(corners);
+            from.cmple(high).all() && low.cmple(to).all()
+        };
+        let near = (0..).zip(items).filter(|(_, corners)| meets(corners));
+        memory::gathered(near.map(|(number, _)| number))
     }
 
     /// Refuses what no cut is made of: with items of a name and a count, of which `nodes_of` tells the nodes.

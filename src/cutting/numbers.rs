@@ -8,10 +8,7 @@ pub(crate) struct FreeNodes(Vec<(u32, bool)>);
 impl FreeNodes {
     /// `left` in any order, and the new ones.
     pub fn new(left: impl Iterator<Item = u32>, new: std::ops::Range<u32>) -> Result<Self> {
-        let mut free = Vec::new();
-        for node in left.chain(new) {
-            memory::push(&mut free, (node, true))?;
-        }
+        let mut free = memory::gathered(left.chain(new).map(|node| (node, true)))?;
         memory::sort_once(&mut free);
         Ok(Self(free))
     }

@@ -23,10 +23,7 @@ impl Cut<'_> {
         memory::sort_once(&mut ends);
         memory::sort_once(&mut cells);
         // What lies about each end, while it still hangs together.
-        let mut rings = memory::reserved(ends.len())?;
-        for &vertex in &ends {
-            rings.push(self.ring(vertex)?);
-        }
+        let rings = memory::try_collected(ends.iter().map(|&vertex| self.ring(vertex)))?;
         for &(triangle, side, _) in &sides {
             self.surface
                 .triangles
@@ -59,15 +56,8 @@ impl Cut<'_> {
         // What hangs on to the first triangle from behind belongs to its fan.
         let closing = ring.iter().rev().take_while(|&of| hangs_on(of)).count();
         let count = ring.len() - closing;
-        let ends_of_fans: Vec<usize> = {
-            let mut ends = Vec::new();
-            for (at, of) in ring[..count].iter().enumerate() {
-                if !hangs_on(of) {
-                    memory::push(&mut ends, at + 1)?;
-                }
-            }
-            ends
-        };
+        let ends_of_fans = (1..).zip(&ring[..count]).filter(|(_, of)| !hangs_on(of));
+        let ends_of_fans: Vec<usize> = memory::gathered(ends_of_fans.map(|(end, _)| end))?;
         self.surface.vertices.edit(vertex, |vertex| vertex.around = ring[0].0)?;
         for fan in ends_of_fans.windows(2) {
             let fan = &ring[fan[0]..fan[1]];

@@ -20,13 +20,9 @@ impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
         let mut union = DisjointSets::default();
         let mut inside = Vec::new();
         for &cell in cells {
-            for node in self.body.cell(cell).nodes {
-                memory::push(&mut nodes, node)?;
-            }
+            memory::extend(&mut nodes, self.body.cell(cell).nodes)?;
             inside.clear();
-            for simplex in self.body.simplices_in(cell) {
-                memory::push(&mut inside, simplex)?;
-            }
+            memory::extend(&mut inside, self.body.simplices_in(cell))?;
             inside.sort_unstable();
             union.reset(inside.len())?;
             for (at, &simplex) in inside.iter().enumerate() {

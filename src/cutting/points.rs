@@ -34,9 +34,8 @@ impl Cut<'_> {
             };
             if point != it.point {
                 self.surface.vertices.edit(vertex, |vertex| vertex.point = point)?;
-                for (triangle, _) in self.ring(vertex)? {
-                    memory::push(&mut self.changes.triangles, triangle)?;
-                }
+                let ring = self.ring(vertex)?;
+                memory::extend(&mut self.changes.triangles, ring.iter().map(|&(triangle, _)| triangle))?;
             }
             if is_at_node && point == it.nodes[0] {
                 drawn.push(point);

@@ -157,13 +157,12 @@ impl CutSurface {
             "more than 2^32 / 3 nodes or cells"
         );
         let mut nodes = memory::collected(rest.iter().map(|&rest| Node { rest, first: NONE }))?;
-        let mut vertices = memory::reserved(rest.len())?;
-        vertices.extend((0..rest.len() as u32).map(|node| SurfaceVertex {
+        let mut vertices = memory::collected((0..rest.len() as u32).map(|node| SurfaceVertex {
             nodes: [node; 3],
             weights: [1.0, 0.0, 0.0],
             point: node,
             around: NONE,
-        }));
+        }))?;
         let mut made = memory::reserved(cells.len())?;
         let mut triangles = memory::reserved(cells.len())?;
         for (number, &corners) in cells.iter().enumerate() {

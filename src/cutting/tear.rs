@@ -103,8 +103,8 @@ impl CutSurface {
     pub(crate) fn nodes_about(&self, vertex: u32) -> Result<Vec<u32>> {
         let mut ring = memory::reserved(8)?;
         self.ring(vertex, &mut ring)?;
-        let mut nodes = memory::reserved(3 * ring.len())?;
-        nodes.extend(ring.iter().flat_map(|&(triangle, _)| self.nodes_under(triangle)));
+        let nodes = ring.iter().flat_map(|&(triangle, _)| self.nodes_under(triangle));
+        let mut nodes = memory::collected_within(3 * ring.len(), nodes)?;
         memory::sort_once(&mut nodes);
         Ok(nodes)
     }
@@ -116,12 +116,9 @@ impl CutSurface {
 
     /// A triangle of each cell that shares a node with those of some triangles.
     pub(crate) fn beside(&self, triangles: &[u32]) -> Result<Vec<u32>> {
-        let mut beside = Vec::new();
-        for node in triangles.iter().flat_map(|&triangle| self.nodes_under(triangle)) {
-            for cell in self.cells_at(node) {
-                memory::push(&mut beside, self.cells[cell].first)?;
-            }
-        }
+        let nodes = triangles.iter().flat_map(|&triangle| self.nodes_under(triangle));
+        let cells = nodes.flat_map(|node| self.cells_at(node));
+        let mut beside = memory::gathered(cells.map(|cell| self.cells[cell].first))?;
         memory::sort_once(&mut beside);
         Ok(beside)
     }

@@ -31,11 +31,11 @@ pub(super) type SeeNodes<'a> = dyn FnMut([u32; 4], &Rest, [usize; 2]) + 'a;
 /// Cuts tetrahedra into parts.
 pub(super) fn split(tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3) -> Result<Vec<FemPart>> {
     let order = in_order(tetrahedra)?;
-    let mut parts = memory::reserved(order.len().div_ceil(PART))?;
-    for of_part in order.chunks(PART) {
-        parts.push(FemPart::new(tetrahedra, of_part, &rest)?);
-    }
-    Ok(parts)
+    memory::try_collected(
+        order
+            .chunks(PART)
+            .map(|of_part| FemPart::new(tetrahedra, of_part, &rest)),
+    )
 }
 
 /// Where each tetrahedron is in the parts.
@@ -71,10 +71,9 @@ pub(super) fn in_group(place: usize, group_count: usize) -> [usize; 2] {
 
 impl FemPart {
     fn new(tetrahedra: &[[u32; 4]], of_part: &[u32], rest: impl Fn(u32) -> DVec3) -> Result<Self> {
-        let mut nodes: Vec<u32> = memory::reserved(4 * of_part.len())?;
-        nodes.extend(of_part.iter().flat_map(|&index| tetrahedra[index as usize]));
-        nodes.sort_unstable();
-        nodes.dedup();
+        let nodes = of_part.iter().flat_map(|&index| tetrahedra[index as usize]);
+        let mut nodes = memory::collected_within(4 * of_part.len(), nodes)?;
+        memory::sort_once(&mut nodes);
         let group_count = of_part.len().div_ceil(GROUP);
         let mut groups = memory::filled(Group::EMPTY, group_count)?;
         for (place, &index) in of_part.iter().enumerate() {
@@ -265,13 +264,8 @@ impl Copies {
         let more = tiles.saturating_sub(self.later.len());
         self.later.try_reserve(more)?;
         self.later.resize_with(self.later.len() + more, Vec::new);
-        let mut tiles = memory::reserved(4 * pieces.len())?;
-        tiles.extend(
-            pieces
-                .iter()
-                .flat_map(|piece| piece.nodes)
-                .map(|node| node as usize / TILE),
-        );
+        let nodes = pieces.iter().flat_map(|piece| piece.nodes);
+        let mut tiles = memory::collected_within(4 * pieces.len(), nodes.map(|node| node as usize / TILE))?;
         tiles.sort_unstable();
         for at_tile in tiles.chunk_by(|a, b| a == b) {
             self.later[at_tile[0]].try_reserve(at_tile.len())?;

@@ -228,15 +228,14 @@ impl Memory {
         if viscosity.is_none() && !yields {
             return Ok(None);
         }
-        let mut of_parts = memory::reserved(parts.len())?;
-        for part in parts {
+        let of_parts = memory::try_collected(parts.iter().map(|part| {
             let count = part.groups.as_slice().len();
-            of_parts.push(OfPart {
+            Ok(OfPart {
                 past: Past::new(if viscosity.is_none() { 0 } else { count })?,
                 set: if yields { Some(PlasticSet::new(count)?) } else { None },
                 newest: memory::filled(Stresses::ZERO, count)?,
-            });
-        }
+            })
+        }))?;
         Ok(Some(memory::boxed(Self {
             viscosity,
             gain: 0.0,

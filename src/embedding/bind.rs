@@ -93,16 +93,15 @@ impl Binding {
         let pieces: Vec<[u32; 4]> =
             memory::collected(solid.tetrahedra().iter().map(|tetrahedron| tetrahedron.corners))?;
         let (_, mut homes) = Self::to_tetrahedra(vertices, &places, &pieces)?;
-        let mut bound = memory::reserved(vertices.len())?;
-        for (vertex, home) in vertices.iter().zip(&mut homes) {
+        let bound = memory::collected(vertices.iter().zip(&mut homes).map(|(vertex, home)| {
             *home = solid.tetrahedra()[*home as usize].cell;
             let nodes = solid.cells()[*home as usize].nodes;
             let cell = PlacedTetrahedron::of(nodes.map(|node| positions[node as usize].as_dvec3()));
-            bound.push(InTetrahedron {
+            InTetrahedron {
                 nodes,
                 weights: cell.weights(vertex.as_dvec3()).as_vec3().to_array(),
-            });
-        }
+            }
+        }))?;
         Ok((Self::Tetrahedra(bound), homes))
     }
 
@@ -112,16 +111,11 @@ impl Binding {
         let places: Vec<Vec3> = memory::collected((0..count).map(|vertex| surface.place(vertex, positions)))?;
         let pieces: Vec<[u32; 3]> = memory::collected(surface.triangles().iter().map(|triangle| triangle.corners))?;
         let mut homes = nearest_triangles(vertices, &places, &pieces)?;
-        let mut bound = memory::reserved(vertices.len())?;
-        for (vertex, home) in vertices.iter().zip(&mut homes) {
+        let bound = memory::collected(vertices.iter().zip(&mut homes).map(|(vertex, home)| {
             *home = surface.triangles()[*home as usize].cell;
             let nodes = surface.cells()[*home as usize].nodes;
-            bound.push(over(
-                vertex.as_dvec3(),
-                nodes,
-                nodes.map(|node| positions[node as usize]),
-            ));
-        }
+            over(vertex.as_dvec3(), nodes, nodes.map(|node| positions[node as usize]))
+        }))?;
         Ok((Self::Triangles(bound), homes))
     }
 
@@ -132,11 +126,10 @@ impl Binding {
             "tetrahedra are 0, and nothing is drawn of the body: there is nothing to bind to"
         );
         let homes = nearest_triangles(vertices, positions, triangles)?;
-        let mut bound = memory::reserved(vertices.len())?;
-        bound.extend(vertices.iter().zip(homes).map(|(vertex, home)| {
+        let bound = memory::collected(vertices.iter().zip(homes).map(|(vertex, home)| {
             let nodes = triangles[home as usize];
             over(vertex.as_dvec3(), nodes, nodes.map(|node| positions[node as usize]))
-        }));
+        }))?;
         Ok(Self::Triangles(bound))
     }
 }

@@ -64,9 +64,10 @@ impl Mesh {
             } else {
                 &ODD_CELL
             };
-            for tetrahedron in pattern {
-                memory::push(&mut mesh.tetrahedra, tetrahedron.map(|corner| corners[corner]))?;
-            }
+            let tetrahedra = pattern
+                .iter()
+                .map(|tetrahedron| tetrahedron.map(|corner| corners[corner]));
+            memory::extend(&mut mesh.tetrahedra, tetrahedra)?;
         }
         mesh.triangles = boundary(&mesh.tetrahedra)?;
         Ok(mesh)
@@ -141,11 +142,8 @@ fn axis(name: &str, size: f64, cells: u32) -> Result<Vec<f32>> {
     if cells > 1 << 25 {
         return Err(coincide());
     }
-    let mut places = memory::reserved(cells as usize + 1)?;
-    places.extend((0..=cells).map(|i| {
-        let share = f64::from(i) / f64::from(cells) - 0.5;
-        (share * size) as f32
-    }));
+    let places = (0..=cells).map(|i| ((f64::from(i) / f64::from(cells) - 0.5) * size) as f32);
+    let places = memory::collected_within(cells as usize + 1, places)?;
     if places.windows(2).any(|pair| pair[0] >= pair[1]) {
         return Err(coincide());
     }

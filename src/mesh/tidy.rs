@@ -142,9 +142,8 @@ impl RawMesh {
     /// Adds a polygon as triangles, a fan about its first corner.
     pub fn add_polygon(&mut self, corners: &[u32]) -> Result<()> {
         if let [first, rest @ ..] = corners {
-            for pair in rest.windows(2) {
-                memory::push(&mut self.triangles, [*first, pair[0], pair[1]])?;
-            }
+            let fan = rest.windows(2).map(|pair| [*first, pair[0], pair[1]]);
+            memory::extend(&mut self.triangles, fan)?;
         }
         Ok(())
     }

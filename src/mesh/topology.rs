@@ -77,9 +77,8 @@ pub(crate) fn element_edges(
     packed.sort_unstable();
     packed.dedup();
 
-    let mut edges = memory::reserved(packed.len())?;
-    edges.extend(packed.iter().map(|&edge| unpack(edge)).filter(|[a, b]| a != b));
-    Ok(edges)
+    let edges = packed.iter().map(|&edge| unpack(edge)).filter(|[a, b]| a != b);
+    memory::collected_within(packed.len(), edges)
 }
 
 /// The surface of the tetrahedra: the faces that exactly one of them has, in the order of the tetrahedra; outward where
@@ -123,9 +122,8 @@ pub(super) fn smallest_first(mut nodes: [u32; 3]) -> [u32; 3] {
 /// that joins corners with an even number of bits.
 pub(crate) fn cell_boundary(cells: &[[u32; 8]]) -> Result<Vec<[u32; 3]>> {
     let faces = faces_of_one(cells, &CELL_FACES, |_| false)?;
-    let mut surface = memory::reserved(faces.len() * 2)?;
-    surface.extend(faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]));
-    Ok(surface)
+    let halves = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    memory::collected_within(faces.len() * 2, halves)
 }
 
 /// Each face of each element, as its nodes in ascending order and its number, in ascending order: equal faces beside each other.
@@ -150,24 +148,18 @@ fn faces_of_one<const CORNERS: usize, const SIDES: usize, const FACES: usize>(
     is_inverted: impl Fn(&[u32; CORNERS]) -> bool,
 ) -> Result<Vec<[u32; SIDES]>> {
     let faces = sorted_faces(elements, sides)?;
-    let mut once = Vec::new();
-    for same in faces.chunk_by(|a, b| a.0 == b.0) {
-        if let [(_, face)] = same {
-            memory::push(&mut once, *face)?;
-        }
-    }
+    let single = faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1);
+    let mut once = memory::gathered(single.map(|same| same[0].1))?;
     once.sort_unstable();
 
-    let mut surface = memory::reserved(once.len())?;
-    surface.extend(once.iter().map(|face| {
+    memory::collected(once.iter().map(|face| {
         let element = &elements[face / FACES];
         let mut nodes = sides[face % FACES].map(|corner| element[corner]);
         if is_inverted(element) {
             nodes.reverse();
         }
         nodes
-    }));
-    Ok(surface)
+    }))
 }
 
 /// Whether the triangles enclose a volume without a gap: every edge is used equally often in both directions. No

@@ -23,11 +23,10 @@ pub(super) fn along_curve(positions: &[Vec3]) -> Result<Vec<u32>> {
         0.0
     };
 
-    let mut keyed = memory::reserved(positions.len())?;
-    keyed.extend((0..).zip(positions).map(|(node, p): (u32, _)| {
+    let mut keyed = memory::collected(positions.iter().enumerate().map(|(node, p)| {
         let place = (p.as_dvec3() - low) * scale;
-        (key(place.to_array().map(|c| c as u32)), node)
-    }));
+        (key(place.to_array().map(|c| c as u32)), node as u32)
+    }))?;
     keyed.sort_unstable();
     memory::collected(keyed.iter().map(|&(_, node)| node))
 }

@@ -60,8 +60,7 @@ pub(crate) fn best_order(positions: &[Vec3], springs: &[[u32; 2]], costs: Costs)
     if best.cost <= least_cost(&links) {
         return Ok(None);
     }
-    let mut named_positions = memory::reserved(positions.len())?;
-    named_positions.extend(curve.iter().map(|&node| positions[node as usize]));
+    let named_positions = memory::collected(curve.iter().map(|&node| positions[node as usize]))?;
     if let Some(rows) = along_rows(&named_positions, &links)? {
         best.offer(rows)?;
     }

@@ -41,16 +41,10 @@ pub(super) fn along_rows(positions: &[Vec3], links: &Links) -> Result<Option<Vec
     axes.sort_by_key(|&axis| Reverse(extents[axis]));
     let [along, across, up] = axes;
 
-    let mut keyed = memory::reserved(cells.len())?;
-    keyed.extend(
-        (0..)
-            .zip(&cells)
-            .map(|(node, LatticeCell { part, at }): (u32, _)| (*part, at[up], at[across], at[along], node)),
-    );
+    let key = |(node, &LatticeCell { part, at }): (usize, _)| (part, at[up], at[across], at[along], node as u32);
+    let mut keyed = memory::collected(cells.iter().enumerate().map(key))?;
     keyed.sort_unstable();
-    let mut order = memory::reserved(cells.len())?;
-    order.extend(keyed.iter().map(|&(.., node)| node));
-    Ok(Some(order))
+    memory::collected(keyed.iter().map(|&(.., node)| node)).map(Some)
 }
 
 /// The place of a node in the lattice of its part.

@@ -215,8 +215,7 @@ impl Terms {
             nonlinear::new(definition, springs, order)?,
             fibres::new(definition, order)?,
         ];
-        let mut laws: Vec<Box<dyn Term>> = memory::reserved(made.len())?;
-        laws.extend(made.into_iter().flatten());
+        let laws = memory::collected_within(made.len(), made.into_iter().flatten())?;
         if laws.is_empty() {
             return Ok(None);
         }

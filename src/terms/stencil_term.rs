@@ -201,12 +201,9 @@ impl<L: StencilLaw<N>, const N: usize> Term for Stencils<L, N> {
         tiles.dedup();
         let mut near: Vec<u32> = Vec::new();
         for &tile in &tiles {
-            for index in self.of_tile(tile as usize) {
-                let stencil = &self.all[index];
-                if stencil.stiffness >= 0.0 && parting.touches(&stencil.nodes) {
-                    memory::push(&mut near, index as u32)?;
-                }
-            }
+            let touched = |stencil: &Stencil<_, N>| stencil.stiffness >= 0.0 && parting.touches(&stencil.nodes);
+            let of_tile = self.of_tile(tile as usize).filter(|&index| touched(&self.all[index]));
+            memory::extend(&mut near, of_tile.map(|index| index as u32))?;
         }
         memory::sort_once(&mut near);
         let Self {

@@ -211,9 +211,8 @@ impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
         for (index, stencil) in (0..).zip(&all) {
             let tiles = tiles(stencil);
             starts[tiles[0] + 1] += 1;
-            for pair in tiles.windows(2).filter(|pair| pair[0] != pair[1]) {
-                memory::push(&mut visits, (pair[1] as u32, index))?;
-            }
+            let further = tiles.windows(2).filter(|pair| pair[0] != pair[1]);
+            memory::extend(&mut visits, further.map(|pair| (pair[1] as u32, index)))?;
         }
         visits.sort_unstable();
         let mut visitor_starts = memory::filled(0, count + 1)?;

@@ -182,15 +182,14 @@ impl LayeredImage {
             low = low.min(positions[node as usize]);
             high = high.max(positions[node as usize]);
         }
-        let mut drawn = memory::reserved(triangles.len())?;
-        drawn.extend(triangles.iter().map(|triangle| {
+        let drawn = memory::collected(triangles.iter().map(|triangle| {
             let corners = triangle.map(|node| positions[node as usize]);
             let [a, b, c] = corners.map(|corner| corner.as_dvec3());
             SearchTriangle {
                 corners,
                 normal: (b - a).cross(c - a).normalize_or_zero().as_vec3(),
             }
-        }));
+        }))?;
         let image = |axis: usize| AxisImage::new(Frame::AXES[axis], positions, triangles, [low, high], pixel);
         let images = [image(0)?, image(1)?, image(2)?];
         let tree = Tree::new(triangles.len(), |triangle| drawn[triangle as usize].corners)?;

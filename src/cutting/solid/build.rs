@@ -24,15 +24,14 @@ impl CutSolid {
             "more than 2^30 nodes or cells"
         );
         let mut nodes = memory::collected(rest.iter().map(|&rest| Node { rest, first: NONE }))?;
-        let mut vertices = memory::reserved(rest.len())?;
-        vertices.extend((0..rest.len() as u32).map(|node| SolidVertex {
+        let mut vertices = memory::collected((0..rest.len() as u32).map(|node| SolidVertex {
             nodes: [node; 4],
             weights: [1.0, 0.0, 0.0, 0.0],
             point: node,
             around: NONE,
             mark: Mark::NONE,
             other_mark: Mark::NONE,
-        }));
+        }))?;
         let mut made = memory::reserved(cells.len())?;
         let mut tetrahedra = memory::reserved(cells.len())?;
         for (number, &corners) in cells.iter().enumerate() {

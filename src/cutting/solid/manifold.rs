@@ -77,9 +77,7 @@ impl SolidCut<'_> {
             for (tetrahedron, face) in closed.drain(..) {
                 if self.solid.tetrahedra[tetrahedron].faces[face] == Face::Opening {
                     self.set_face(tetrahedron, face, Face::Severed)?;
-                    for corner in self.solid.face(tetrahedron, face) {
-                        memory::push(&mut vertices, corner)?;
-                    }
+                    memory::extend(&mut vertices, self.solid.face(tetrahedron, face))?;
                 }
             }
         }
@@ -105,12 +103,12 @@ impl SolidCut<'_> {
         let Some(part) = parts.of(self.solid.tetrahedra[beside].neighbours[face]) else {
             return Ok(false);
         };
-        let mut tip = Vec::new();
-        for at in 0..parts.star.len() {
-            if parts.union.lowest(at) == part {
-                memory::push(&mut tip, parts.star[at].0)?;
-            }
-        }
+        let of_part = parts.star.iter().enumerate();
+        let mut tip = memory::gathered(
+            of_part
+                .filter(|&(at, _)| parts.union.lowest(at) == part)
+                .map(|(_, of)| of.0),
+        )?;
         let may_turn = |&of: &u32| self.tip(of).is_none() && self.solid.tetrahedra[of].turned != stroke;
         if parts.of(beside) == Some(part) || !tip.iter().all(may_turn) {
             tip.clear();
@@ -141,9 +139,7 @@ impl SolidCut<'_> {
                 self.set_face(tetrahedron, face, to)?;
                 let back = self.solid.back(tetrahedron, face);
                 memory::push(faces, (tetrahedron, face).min((across, back)))?;
-                for corner in self.solid.face(tetrahedron, face) {
-                    memory::push(vertices, corner)?;
-                }
+                memory::extend(vertices, self.solid.face(tetrahedron, face))?;
             }
         }
         Ok(true)
@@ -163,10 +159,8 @@ impl SolidCut<'_> {
                         if it.faces[face] == Face::Severed && it.neighbours[face] > tetrahedron {
                             self.set_face(tetrahedron, face, Face::Opening)?;
                             memory::push(&mut faces, (tetrahedron, face))?;
-                            for corner in self.solid.face(tetrahedron, face) {
-                                memory::push(&mut vertices, corner)?;
-                                memory::push(&mut corners, corner)?;
-                            }
+                            memory::extend(&mut vertices, self.solid.face(tetrahedron, face))?;
+                            memory::extend(&mut corners, self.solid.face(tetrahedron, face))?;
                         }
                     }
                 }

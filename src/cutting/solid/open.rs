@@ -13,22 +13,20 @@ impl SolidCut<'_> {
         let (mut corners, mut cells) = (Vec::new(), Vec::new());
         for &(tetrahedron, face) in faces {
             let across = self.solid.tetrahedra[tetrahedron].neighbours[face];
-            for corner in self.solid.face(tetrahedron, face) {
-                memory::push(&mut corners, corner)?;
-            }
-            for side in [tetrahedron, across] {
-                memory::push(&mut cells, self.solid.tetrahedra[side].cell)?;
-            }
+            memory::extend(&mut corners, self.solid.face(tetrahedron, face))?;
+            memory::extend(
+                &mut cells,
+                [tetrahedron, across].map(|side| self.solid.tetrahedra[side].cell),
+            )?;
         }
         memory::sort_once(&mut corners);
         memory::sort_once(&mut cells);
         // What lies about each corner, while it still hangs together.
-        let mut stars = memory::reserved(corners.len())?;
-        for &vertex in &corners {
+        let stars = memory::try_collected(corners.iter().map(|&vertex| {
             let mut star = Vec::new();
             self.solid.star(vertex, &mut star)?;
-            stars.push(star);
-        }
+            Ok(star)
+        }))?;
         for &(tetrahedron, face) in faces {
             self.bare_face(tetrahedron, face)?;
         }

@@ -301,8 +301,8 @@ impl SolidCut<'_> {
             about.extend(star.iter().map(|&(tetrahedron, _)| tetrahedron));
         }
         memory::sort_once(&mut about);
-        let mut tips = memory::reserved(about.len())?;
-        tips.extend(about.iter().filter_map(|&tetrahedron| self.tip(tetrahedron)));
+        let tips = about.iter().filter_map(|&tetrahedron| self.tip(tetrahedron));
+        let mut tips = memory::collected_within(about.len(), tips)?;
         memory::sort_once(&mut tips);
         for tip in tips {
             self.solid.star(tip, &mut star)?;
@@ -318,9 +318,7 @@ impl SolidCut<'_> {
                 if it.neighbours[face] != NONE && it.faces[face] == Face::Whole && self.is_on_the_way(tetrahedron, face)
                 {
                     self.set_face(tetrahedron, face, Face::Severed)?;
-                    for corner in self.solid.face(tetrahedron, face) {
-                        memory::push(&mut marked, corner)?;
-                    }
+                    memory::extend(&mut marked, self.solid.face(tetrahedron, face))?;
                 }
             }
         }

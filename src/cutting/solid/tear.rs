@@ -31,14 +31,9 @@ impl CutSolid {
 
     /// Other nodes of the cells at two, in order.
     pub(crate) fn nodes_beside(&self, nodes: [u32; 2]) -> Result<Vec<u32>> {
-        let mut beside = Vec::new();
-        for cell in self.cells_at(nodes[0]).map(|cell| self.cells[cell].nodes) {
-            if cell.contains(&nodes[1]) {
-                for node in cell.into_iter().filter(|node| !nodes.contains(node)) {
-                    memory::push(&mut beside, node)?;
-                }
-            }
-        }
+        let cells = self.cells_at(nodes[0]).map(|cell| self.cells[cell].nodes);
+        let others = cells.filter(|cell| cell.contains(&nodes[1])).flatten();
+        let mut beside = memory::gathered(others.filter(|node| !nodes.contains(node)))?;
         memory::sort_once(&mut beside);
         Ok(beside)
     }
@@ -156,9 +151,7 @@ impl SolidCut<'_> {
                 self.set_face(tetrahedron, face, Face::Severed)?;
                 memory::push(&mut torn, (tetrahedron, face))?;
             }
-            for corner in self.solid.face(tetrahedron, face) {
-                memory::push(&mut self.marked, corner)?;
-            }
+            memory::extend(&mut self.marked, self.solid.face(tetrahedron, face))?;
         }
         memory::sort_once(&mut self.marked);
         let opening = self.ready()?;

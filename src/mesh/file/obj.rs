@@ -72,11 +72,8 @@ fn next_statement<'a>(scanner: &mut Scanner<'a>, words: &mut Vec<&'a [u8]>) -> R
         let text = line.split(|&byte| byte == b'#').next().unwrap_or(line);
         let continued = text.trim_ascii_end().strip_suffix(b"\\");
         let text = continued.unwrap_or(text);
-        for word in text.split(u8::is_ascii_whitespace) {
-            if !word.is_empty() {
-                memory::push(words, word)?;
-            }
-        }
+        let all = text.split(u8::is_ascii_whitespace);
+        memory::extend(words, all.filter(|word| !word.is_empty()))?;
         if continued.is_none() || scanner.remaining() == 0 {
             return Ok(place);
         }

@@ -222,25 +222,14 @@ fn read_points(scanner: &mut Scanner) -> Result<Vec<DVec3>> {
     check_vertex_count(scanner, count)?;
     let data_type = DataType::read(scanner)?;
     begin_data(scanner)?;
-    let mut points = memory::reserved(count)?;
-    for _ in 0..count {
-        let mut point = [0.0; 3];
-        for coordinate in &mut point {
-            *coordinate = number(scanner, data_type)?;
-        }
-        points.push(DVec3::from(point));
-    }
-    Ok(points)
+    let mut coordinate = || number(scanner, data_type);
+    memory::try_collected((0..count).map(|_| Ok(DVec3::new(coordinate()?, coordinate()?, coordinate()?))))
 }
 
 fn read_kinds(scanner: &mut Scanner) -> Result<Vec<u64>> {
     let count = scanner.count("cell types", 2)?;
     begin_data(scanner)?;
-    let mut kinds = memory::reserved(count)?;
-    for _ in 0..count {
-        kinds.push(integer(scanner, DataType::I32)?);
-    }
-    Ok(kinds)
+    memory::try_collected((0..count).map(|_| integer(scanner, DataType::I32)))
 }
 
 /// Moves over the text that describes an array: it ends with an empty line.

@@ -60,12 +60,11 @@ impl Coarse {
         let node_count = positions.len();
         let blocks = node_count.div_ceil(BLOCK);
         let count = (node_count / NODES).clamp(1, CLUSTERS);
-        let mut centres = memory::reserved(blocks)?;
-        for block in 0..blocks {
+        let centres = memory::collected((0..blocks).map(|block| {
             let nodes = block * BLOCK..node_count.min((block + 1) * BLOCK);
             let size = nodes.len() as f32;
-            centres.push(nodes.map(|node| positions.get(node)).sum::<Vec3>() / size);
-        }
+            nodes.map(|node| positions.get(node)).sum::<Vec3>() / size
+        }))?;
         let mut order: Vec<u32> = memory::collected(0..blocks as u32)?;
         let mut clusters = memory::filled(0, blocks)?;
         let mut next = 0;

@@ -350,8 +350,7 @@ impl Springs for Packed {
     }
 
     fn set(&mut self, changes: &[SpringChange]) -> Result<()> {
-        let mut ends = memory::reserved(2 * changes.len())?;
-        ends.extend(changes.iter().flat_map(SpringChange::ends));
+        let mut ends = memory::collected_within(2 * changes.len(), changes.iter().flat_map(SpringChange::ends))?;
         ends.sort_unstable_by_key(|(node, link)| (*node, link.neighbour));
         let same_node = |(a, _): &(u32, Link), (b, _): &(u32, Link)| a == b;
         let same_tile = |(a, _): &(u32, Link), (b, _): &(u32, Link)| *a as usize / TILE == *b as usize / TILE;
