@@ -9,7 +9,7 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::base::{Error, Result, memory};
+use crate::base::{Result, all_finite, memory};
 use crate::def::{Values, check_values, expect_count, finite_vectors, node_indices};
 
 /// How a triangle or tetrahedron is strained. What has no area or volume at rest has no strain: 0.
@@ -104,12 +104,7 @@ pub fn of_tetrahedra(
 pub fn mean_at_nodes<const N: usize>(elements: &[[u32; N]], values: &[f32], means: &mut [f32]) -> Result<()> {
     node_indices("elements", elements, means.len())?;
     expect_count("values", values.len(), elements.len())?;
-    if let Some(index) = values.iter().position(|value| !value.is_finite()) {
-        return Err(Error::invalid(format!(
-            "values[{index}] is {}: must be finite",
-            values[index]
-        )));
-    }
+    all_finite("values", values)?;
     let mut sums = memory::filled((0.0_f64, 0_u32), means.len())?;
     for (nodes, &value) in elements.iter().zip(values) {
         for &node in nodes {

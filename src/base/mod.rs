@@ -17,5 +17,5 @@ pub(crate) use hash::StateHasher;
 pub use ids::{AttachmentId, BladeId, BodyId, ToolId};
 pub(crate) use ids::{SlotId, WorldTag};
 pub(crate) use profile::{Count, Profile, Stage, Stopwatch, check_clock};
-pub(crate) use ranges::{above_zero, finite, not_negative};
+pub(crate) use ranges::{above_zero, all_finite, finite, not_negative};
 pub use step_report::{LimitKind, StepLimit, StepReport, SubstepLimit};

@@ -19,6 +19,14 @@ pub(crate) fn finite(name: &str, value: f32) -> Result<()> {
     in_range(name, value, |_| true, "finite")
 }
 
+/// Refuses values of which one is not finite.
+pub(crate) fn all_finite(name: &str, values: &[f32]) -> Result<()> {
+    for (index, value) in values.iter().enumerate() {
+        ensure!(value.is_finite(), "{name}[{index}] is {value}: must be finite");
+    }
+    Ok(())
+}
+
 fn in_range<N: Display + Copy + Into<f64>>(name: &str, value: N, holds: fn(f64) -> bool, range: &str) -> Result<()> {
     ensure!(
         holds(value.into()) && value.into().is_finite(),

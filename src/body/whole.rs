@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::Body;
-use crate::base::{Error, Result, ensure, finite, memory};
+use crate::base::{Result, ensure, finite, memory};
 use crate::def::{CollisionFilter, expect_count, finite_vector};
 use crate::geometry::{Bounds, vertex_normals};
 use crate::solver::close;
@@ -60,14 +60,14 @@ impl Body {
         let pivot = pivot.map_or((low + high) * 0.5, |pivot| pivot.as_dvec3());
         let place = |position: &Vec3| rotation * (position.as_dvec3() - pivot) + pivot + translation.as_dvec3();
         let positions = memory::collected(self.positions().iter().map(|position| place(position).as_vec3()))?;
-        if let Some(node) = positions.iter().position(|position: &Vec3| !position.is_finite()) {
-            return Err(Error::invalid(format!(
+        for (node, position) in positions.iter().enumerate() {
+            ensure!(
+                position.is_finite(),
                 "translation is {translation}: node {node} would be at infinity"
-            )));
+            );
         }
-        let mut velocities = memory::reserved(self.node_count())?;
         let turned = |velocity: &Vec3| (rotation * velocity.as_dvec3()).as_vec3();
-        velocities.extend(self.velocities().iter().map(turned));
+        let velocities = memory::collected(self.velocities().iter().map(turned))?;
         self.set_positions(&positions)?;
         if rotation.xyz() == DVec3::ZERO {
             return Ok(());

@@ -263,7 +263,7 @@ impl sinew_detector {
         let bodies = [sides[0].body(0, world)?, sides[1].body(1, world)?];
         let closed = [0, 1].map(|side| sides[side].was_closed && !bodies[side].system().is_cut_open);
         for (side, closed) in sides.iter_mut().zip(closed) {
-            side.surface.set_closed(closed);
+            side.surface.closed = closed;
         }
         let surfaces = [&sides[0].surface, &sides[1].surface];
         let positions = bodies.map(Body::positions);

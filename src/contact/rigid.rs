@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 
 use super::contacts::ToolLoad;
 use super::tool::{Form, Pose};
-use crate::base::{Error, Result, StateHasher, above_zero, ensure};
+use crate::base::{Error, Result, StateHasher, above_zero, all_finite, ensure};
 use crate::codec::saved;
 use crate::def::finite_vector;
 use crate::geometry::rotation::turned;
@@ -132,12 +132,7 @@ impl MassProperties {
             self.center_of_mass,
             FURTHEST
         );
-        if let Some(bad) = self.inertia.iter().position(|moment| !moment.is_finite()) {
-            return Err(Error::invalid(format!(
-                "inertia[{bad}] is {}: must be finite",
-                self.inertia[bad]
-            )));
-        }
+        all_finite("inertia", &self.inertia)?;
         let inertia = self.tensor();
         let mass = RigidMass {
             mass: f64::from(self.mass),

@@ -63,8 +63,8 @@ impl Sweep {
             "{} positions for {node_count} nodes",
             positions.len()
         );
-        if let Some(end) = self.start.iter().chain(&self.end).find(|end| !end.is_finite()) {
-            return Err(Error::invalid(format!("an end of the blade is at {end}")));
+        for end in self.start.iter().chain(&self.end) {
+            ensure!(end.is_finite(), "an end of the blade is at {end}");
         }
         for &item in candidates {
             ensure!(item < count, "candidate {item} of {count} {items}");

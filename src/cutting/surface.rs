@@ -149,8 +149,8 @@ impl CutSurface {
     /// Refused unless positions are finite, nodes are known, each cell has an area, and the surface is manifold and turned one way all over:
     /// at most two cells at an edge, which run along it in opposite directions, and one fan of cells at a node.
     pub fn new(rest: &[Vec3], cells: &[[u32; 3]]) -> Result<Self> {
-        if let Some(at) = rest.iter().position(|place| !place.is_finite()) {
-            return Err(Error::invalid(format!("rest position {at} is {}", rest[at])));
+        for (at, place) in rest.iter().enumerate() {
+            ensure!(place.is_finite(), "rest position {at} is {place}");
         }
         ensure!(
             rest.len().max(cells.len()) < (NONE / 3) as usize,
@@ -166,11 +166,12 @@ impl CutSurface {
         let mut made = memory::reserved(cells.len())?;
         let mut triangles = memory::reserved(cells.len())?;
         for (number, &corners) in cells.iter().enumerate() {
-            if let Some(&node) = corners.iter().find(|&&node| node as usize >= rest.len()) {
-                return Err(Error::invalid(format!(
+            for node in corners {
+                ensure!(
+                    (node as usize) < rest.len(),
                     "cell {number} has node {node} of {}",
                     rest.len()
-                )));
+                );
             }
             let places = corners.map(|node| rest[node as usize].as_dvec3());
             let area = area_of(places);

@@ -61,12 +61,13 @@ impl ElementLaw {
             is_of_elements,
             "element_law is {name}, and material is not SINEW_MATERIAL_TETRAHEDRA: there are no elements"
         );
-        match refused.into_iter().find(|(_, value)| *value != 0.0) {
-            None => Ok(()),
-            Some((other, value)) => Err(Error::invalid(format!(
+        for (other, value) in refused {
+            ensure!(
+                value == 0.0,
                 "{other} is {value} while element_law is {name}: must be 0, only elements of {} have it",
                 Self::default().name()
-            ))),
+            );
         }
+        Ok(())
     }
 }

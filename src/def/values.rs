@@ -66,13 +66,10 @@ pub(crate) fn finite_vector(name: &str, vector: Vec3) -> Result<()> {
 }
 
 pub(crate) fn finite_vectors(name: &str, vectors: &[Vec3]) -> Result<()> {
-    match vectors.iter().position(|vector| !vector.is_finite()) {
-        None => Ok(()),
-        Some(node) => Err(Error::invalid(format!(
-            "{name}[{node}] is {}: must be finite",
-            vectors[node]
-        ))),
+    for (node, vector) in vectors.iter().enumerate() {
+        ensure!(vector.is_finite(), "{name}[{node}] is {vector}: must be finite");
     }
+    Ok(())
 }
 
 /// Checks `values` of which each must be finite and at least 0; `name` in the singular.

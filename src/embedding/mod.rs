@@ -292,12 +292,13 @@ fn check_is_to_come(definition: &BodyDefinition) -> Result<()> {
         ("fibre_directions", !definition.fibre_directions.is_empty()),
         ("fibre_stiffnesses", is_list(definition.fibre_stiffnesses)),
     ];
-    match given.iter().find(|(_, is_given)| *is_given) {
-        None => Ok(()),
-        Some((name, _)) => Err(Error::invalid(format!(
+    for (name, is_given) in given {
+        ensure!(
+            !is_given,
             "{name} are given: a body made from a surface has nodes and springs of its own"
-        ))),
+        );
     }
+    Ok(())
 }
 
 fn check(definition: &EmbeddingDefinition, node_count: usize) -> Result<()> {
@@ -313,12 +314,11 @@ fn check(definition: &EmbeddingDefinition, node_count: usize) -> Result<()> {
         "{} vertices: too many to count",
         vertices.len()
     );
-    let is_near = |vertex: &Vec3| vertex.is_finite() && vertex.abs().max_element() <= FURTHEST;
-    if let Some(vertex) = vertices.iter().position(|vertex| !is_near(vertex)) {
-        return Err(Error::invalid(format!(
-            "vertices[{vertex}] is {}: must be finite and within {FURTHEST:e} m of the origin",
-            vertices[vertex]
-        )));
+    for (vertex, place) in vertices.iter().enumerate() {
+        ensure!(
+            place.is_finite() && place.abs().max_element() <= FURTHEST,
+            "vertices[{vertex}] is {place}: must be finite and within {FURTHEST:e} m of the origin"
+        );
     }
     let within = |name: &str, place: usize, indices: &[u32], count: usize, what: &str| {
         let wrong = indices.iter().find(|&&index| index as usize >= count);

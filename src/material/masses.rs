@@ -1,7 +1,7 @@
 //! Masses of nodes from a density: each element's mass in equal parts to its nodes.
 
 use super::filled::{Filled, corners, triangle_area};
-use crate::base::{Error, Result, memory};
+use crate::base::{Result, ensure, memory};
 use crate::def::{BodyDefinition, SMALLEST_MASS};
 use crate::mesh::tetrahedron_volume;
 
@@ -19,22 +19,20 @@ pub(super) fn of(elements: &Filled, density: f32, definition: &BodyDefinition) -
         }),
     }
     let masses = memory::collected(volumes.iter().map(|volume| (f64::from(density) * volume) as f32))?;
-    if let Some(node) = volumes.iter().position(|&volume| volume == 0.0) {
-        return Err(Error::invalid(format!(
+    for (node, &volume) in volumes.iter().enumerate() {
+        ensure!(
+            volume != 0.0,
             "density is {density} kg/m³: node {node} belongs to none of the {}, and would have no mass",
             elements.name()
-        )));
+        );
     }
-    match masses
-        .iter()
-        .position(|&mass| !(mass >= SMALLEST_MASS && mass.is_finite()))
-    {
-        None => Ok(masses),
-        Some(node) => Err(Error::invalid(format!(
-            "density is {density} kg/m³: node {node} would have a mass of {} kg",
-            masses[node]
-        ))),
+    for (node, &mass) in masses.iter().enumerate() {
+        ensure!(
+            mass >= SMALLEST_MASS && mass.is_finite(),
+            "density is {density} kg/m³: node {node} would have a mass of {mass} kg"
+        );
     }
+    Ok(masses)
 }
 
 /// Gives each node of each element an equal part of what it has.

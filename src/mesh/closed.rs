@@ -66,12 +66,11 @@ impl ClosedSurface {
             triangles.len(),
             u32::MAX / 4
         );
-        let near = |position: &Vec3| position.abs().max_element() <= FURTHEST && position.is_finite();
-        if let Some(node) = positions.iter().position(|position| !near(position)) {
-            return Err(Error::invalid(format!(
-                "the position of node {node} is {}: must be finite and within {FURTHEST:e} m of the origin",
-                positions[node]
-            )));
+        for (node, position) in positions.iter().enumerate() {
+            ensure!(
+                position.abs().max_element() <= FURTHEST && position.is_finite(),
+                "the position of node {node} is {position}: must be finite and within {FURTHEST:e} m of the origin"
+            );
         }
         let mut surface = Self {
             positions: memory::copied(positions)?,

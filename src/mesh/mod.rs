@@ -124,12 +124,14 @@ pub(crate) fn cell_volume(corners: [DVec3; 8]) -> f64 {
     volumes.iter().sum()
 }
 
-fn check_indices<const N: usize>(what: &str, elements: &[[u32; N]], node_count: usize) -> Result<()> {
+/// Refuses elements that name nodes which are not there.
+pub(crate) fn check_indices<const N: usize>(what: &str, elements: &[[u32; N]], node_count: usize) -> Result<()> {
     for (i, element) in elements.iter().enumerate() {
-        if let Some(node) = element.iter().find(|&&node| node as usize >= node_count) {
-            return Err(Error::invalid(format!(
+        for &node in element {
+            ensure!(
+                (node as usize) < node_count,
                 "{what} {i} names node {node}; there are {node_count}"
-            )));
+            );
         }
     }
     Ok(())

@@ -5,7 +5,7 @@
 
 use glam::{Mat3, Vec3};
 
-use crate::base::{Error, Result, ensure};
+use crate::base::{Result, all_finite, ensure};
 
 /// Which colours numbers have.
 ///
@@ -109,17 +109,9 @@ impl Coloured<'_> {
             low < high && low.is_finite() && high.is_finite(),
             "low is {low} and high {high}: low must be below high, and both finite"
         );
-        if self.values.len() != count {
-            let given = self.values.len();
-            return Err(Error::invalid(format!("values has {given} entries: must have {count}")));
-        }
-        match self.values.iter().position(|value| !value.is_finite()) {
-            None => Ok(()),
-            Some(node) => Err(Error::invalid(format!(
-                "values[{node}] is {}: must be finite",
-                self.values[node]
-            ))),
-        }
+        let given = self.values.len();
+        ensure!(given == count, "values has {given} entries: must have {count}");
+        all_finite("values", self.values)
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::ExactSolid;
-use crate::base::{Error, Result, ensure};
+use crate::base::{Result, ensure};
 use crate::mesh::ClosedSurface;
 
 /// A solid, rigid or changing its shape, that finds what lies within it.
@@ -148,15 +148,12 @@ impl Exact {
     /// [`Error::InvalidArgument`] where a point is not finite or an edge names no point; [`Error::OutOfMemory`].
     pub fn find(&self, points: &[Vec3], edges: &[[u32; 2]], overlap: &mut Overlap) -> Result<()> {
         check_positions(points)?;
-        if let Some(edge) = edges
-            .iter()
-            .position(|edge| edge.iter().any(|&end| end as usize >= points.len()))
-        {
-            return Err(Error::invalid(format!(
-                "edge {edge} joins points {:?}; there are {}",
-                edges[edge],
+        for (edge, ends) in edges.iter().enumerate() {
+            ensure!(
+                ends.iter().all(|&end| (end as usize) < points.len()),
+                "edge {edge} joins points {ends:?}; there are {}",
                 points.len()
-            )));
+            );
         }
         overlap.points.clear();
         overlap.edges.clear();
@@ -242,11 +239,11 @@ impl Overlap {
 }
 
 fn check_positions(positions: &[Vec3]) -> Result<()> {
-    match positions.iter().position(|position| !position.is_finite()) {
-        Some(point) => Err(Error::invalid(format!(
-            "the position of point {point} is {}: must be finite",
-            positions[point]
-        ))),
-        None => Ok(()),
+    for (point, position) in positions.iter().enumerate() {
+        ensure!(
+            position.is_finite(),
+            "the position of point {point} is {position}: must be finite"
+        );
     }
+    Ok(())
 }

@@ -26,7 +26,8 @@ pub struct Surface {
     node_count: usize,
     triangles: Vec<[u32; 3]>,
     edges: Vec<[u32; 2]>,
-    closed: bool,
+    /// Whether others can be inside of it: not of one that was closed and is cut.
+    pub(crate) closed: bool,
 }
 
 /// A surface where its nodes are now.
@@ -90,11 +91,6 @@ impl Surface {
         self.closed
     }
 
-    /// Whether others can be inside of it from now on: of one that was closed and is cut.
-    pub(crate) fn set_closed(&mut self, closed: bool) {
-        self.closed = closed;
-    }
-
     /// How many positions it has.
     pub fn node_count(&self) -> usize {
         self.node_count
@@ -136,13 +132,10 @@ impl Placed<'_> {
 }
 
 pub(super) fn check_positions(positions: &[Vec3]) -> Result<()> {
-    match positions.iter().position(|position| !position.is_finite()) {
-        Some(node) => Err(Error::invalid(format!(
-            "the position of node {node} is {}",
-            positions[node]
-        ))),
-        None => Ok(()),
+    for (node, position) in positions.iter().enumerate() {
+        ensure!(position.is_finite(), "the position of node {node} is {position}");
     }
+    Ok(())
 }
 
 /// Refuses what cannot be drawn.
@@ -154,12 +147,5 @@ pub(super) fn check(node_count: usize, triangles: &[[u32; 3]]) -> Result<()> {
             triangles.len()
         )));
     }
-    for (index, triangle) in triangles.iter().enumerate() {
-        if let Some(node) = triangle.iter().find(|&&node| node as usize >= node_count) {
-            return Err(Error::invalid(format!(
-                "triangle {index} names node {node}; there are {node_count}"
-            )));
-        }
-    }
-    Ok(())
+    mesh::check_indices("triangle", triangles, node_count)
 }

@@ -16,8 +16,8 @@ impl CutSolid {
     /// Refused unless positions are finite, nodes are known, each cell has a volume, at a face there are two cells at most, on either side of it,
     /// the cells about a node hang together by faces at it, and triangles are as they are asked for.
     pub fn new(rest: &[Vec3], cells: &[[u32; 4]], drawn: &[[u32; 3]]) -> Result<Self> {
-        if let Some(at) = rest.iter().position(|place| !place.is_finite()) {
-            return Err(Error::invalid(format!("rest position {at} is {}", rest[at])));
+        for (at, place) in rest.iter().enumerate() {
+            ensure!(place.is_finite(), "rest position {at} is {place}");
         }
         ensure!(
             rest.len().max(cells.len()) < (NONE / 4) as usize,
@@ -35,11 +35,12 @@ impl CutSolid {
         let mut made = memory::reserved(cells.len())?;
         let mut tetrahedra = memory::reserved(cells.len())?;
         for (number, &corners) in cells.iter().enumerate() {
-            if let Some(&node) = corners.iter().find(|&&node| node as usize >= rest.len()) {
-                return Err(Error::invalid(format!(
+            for node in corners {
+                ensure!(
+                    (node as usize) < rest.len(),
                     "cell {number} has node {node} of {}",
                     rest.len()
-                )));
+                );
             }
             let places = corners.map(|node| rest[node as usize].as_dvec3());
             let volume = volume_of(places);
