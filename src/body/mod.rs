@@ -53,6 +53,7 @@ use crate::contact::{Contact, Contacts, ToolPath, ToolPlaces};
 use crate::cutting::CutMaterial;
 use crate::forces::Forces;
 use crate::material::Made;
+use crate::nodes::vector;
 use crate::readers::Shown;
 use crate::slots::Slots;
 use crate::solver::{
@@ -352,11 +353,8 @@ impl Body {
     pub(crate) fn velocity_at(&self, contact: &Contact) -> Vec3 {
         let velocities = self.system.state.velocities();
         let of = |node: u32| {
-            let own = self.system.order.own(node);
-            self.system.bindings.as_ref().map_or_else(
-                || velocities.get(own as usize),
-                |bindings| bindings.vector(velocities, own as usize),
-            )
+            let own = self.system.order.own(node) as usize;
+            vector(self.system.bindings.as_ref(), velocities, own)
         };
         (0..3)
             .map(|corner| of(contact.nodes[corner]) * contact.weights[corner])

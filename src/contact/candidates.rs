@@ -13,7 +13,7 @@ use crate::base::{Result, memory};
 use crate::codec::{saved, saved_enum};
 use crate::def::CollisionFilter;
 use crate::geometry::Bounds;
-use crate::nodes::Bindings;
+use crate::nodes::{Bindings, vector};
 use crate::soa::Vectors;
 
 /// A list that is good for so many substeps more is kept.
@@ -384,10 +384,7 @@ impl Candidates {
             return false;
         }
         for (node, sides) in self.marks.iter_mut().enumerate() {
-            let place = match bindings {
-                None => positions.get(node),
-                Some(bindings) => bindings.vector(positions, node),
-            };
+            let place = vector(bindings, positions, node);
             *sides = sides_of(&all, place);
         }
         true
@@ -461,10 +458,7 @@ fn is_hidden(feature: Feature, bindings: Option<&Bindings>) -> bool {
 fn corners_of(feature: Feature, (positions, bindings): (&Vectors, Option<&Bindings>)) -> [Vec3; 3] {
     let mut corners = [Vec3::ZERO; 3];
     for (corner, &node) in corners.iter_mut().zip(feature.nodes()) {
-        *corner = match bindings {
-            None => positions.get(node as usize),
-            Some(bindings) => bindings.vector(positions, node as usize),
-        };
+        *corner = vector(bindings, positions, node as usize);
     }
     corners
 }
@@ -490,10 +484,7 @@ fn measure_nodes<'a>(
     let is_one = meshes.clone().nth(1).is_none();
     for (node, nearest) in surface.iter_mut().enumerate() {
         let mut last = std::mem::replace(nearest, NearestPlane::NONE);
-        let place = match bindings {
-            None => positions.get(node),
-            Some(bindings) => bindings.vector(positions, node),
-        };
+        let place = vector(bindings, positions, node);
         for (zone, solid) in meshes.clone() {
             let &Zone::Mesh {
                 slot,

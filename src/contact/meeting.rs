@@ -7,7 +7,7 @@ use super::path::ToolPath;
 use super::supports::{MOST, Supports};
 use crate::base::Profile;
 use crate::geometry::Bounds;
-use crate::nodes::{Bindings, Mobility, Pins};
+use crate::nodes::{self, Bindings, Mobility, Pins};
 use crate::simd::ChosenKernel;
 use crate::soa::Vectors;
 
@@ -132,10 +132,7 @@ impl Meeting<'_> {
     /// That of these vectors which a corner has: its own, or what its nodes make of theirs.
     #[inline]
     pub(super) fn vector(&self, vectors: &Vectors, corner: usize) -> Vec3 {
-        match self.bindings {
-            None => vectors.get(corner),
-            Some(bindings) => bindings.vector(vectors, corner),
-        }
+        nodes::vector(self.bindings, vectors, corner)
     }
 
     /// The box of all nodes, in which bound points are.

@@ -67,6 +67,15 @@ pub(crate) struct Bindings {
 
 saved! { Bindings { points, places, hidden } }
 
+/// That of these vectors which a number has: its own, or what the nodes that it is bound to make of theirs.
+#[inline]
+pub(crate) fn vector(bindings: Option<&Bindings>, vectors: &Vectors, node: usize) -> Vec3 {
+    match bindings.and_then(|bindings| bindings.get(node as u32)) {
+        Some(bound) => bound.of(|node| vectors.get(node)),
+        None => vectors.get(node),
+    }
+}
+
 /// The nodes that a number stands for, with their weights: itself where it is not bound, as where nothing is.
 #[inline]
 pub(crate) fn parts(bindings: Option<&Bindings>, node: u32) -> impl Iterator<Item = (u32, f32)> + use<> {
@@ -116,15 +125,6 @@ impl Bindings {
     #[inline]
     pub fn parts(&self, node: u32) -> impl Iterator<Item = (u32, f32)> {
         parts(Some(self), node)
-    }
-
-    /// The vector of a number, as its nodes make it.
-    #[inline]
-    pub fn vector(&self, vectors: &Vectors, node: usize) -> Vec3 {
-        match self.get(node as u32) {
-            Some(bound) => bound.of(|node| vectors.get(node)),
-            None => vectors.get(node),
-        }
     }
 
     /// Nobody draws or touches this number any more; there is room for it.

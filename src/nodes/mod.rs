@@ -5,7 +5,7 @@ mod damping;
 mod pins;
 mod state;
 
-pub(crate) use bindings::{Bindings, Bound, NewNode, parts};
+pub(crate) use bindings::{Bindings, Bound, NewNode, parts, vector};
 pub(crate) use damping::{Mobility, NodeDamping};
 pub(crate) use pins::{Pin, Pins};
 pub(crate) use state::State;

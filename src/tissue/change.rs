@@ -9,7 +9,7 @@ use crate::codec::saved;
 use crate::contact::SurfaceChange;
 use crate::geometry::forest::Later;
 use crate::mesh::ends_of;
-use crate::nodes::{Bound, NewNode};
+use crate::nodes::{self, Bound, NewNode};
 use crate::soa::Vectors;
 use crate::solver::System;
 
@@ -343,10 +343,7 @@ fn join(of_edge: &mut [u32; 2], triangle: u32) {
 /// Where a number is, of those that there are and then these, if nodes are at `places`.
 fn place_of(places: &Vectors, body: &System, new: &[NewNode], number: u32) -> Vec3 {
     let Some(new_number) = (number as usize).checked_sub(body.node_count()) else {
-        return match &body.bindings {
-            Some(bindings) => bindings.vector(places, number as usize),
-            None => places.get(number as usize),
-        };
+        return nodes::vector(body.bindings.as_ref(), places, number as usize);
     };
     match &new[new_number] {
         NewNode::Copy(source) => places.get(*source as usize),
