@@ -4,7 +4,7 @@ mod tools;
 
 use glam::{DVec3, Vec3};
 
-use crate::base::{BodyId, Error, Result, ToolId, ensure};
+use crate::base::{BodyId, Result, ToolId, ensure};
 use crate::body::Body;
 use crate::def::{CollisionFilter, finite_vector};
 use crate::geometry::Bounds;
@@ -163,12 +163,8 @@ impl World {
                     first.map_or(limit, |(distance, _)| distance) as f32
                 });
             if let Some((distance, triangle)) = first {
-                let (_, corners) = body.surface_triangle(triangle);
-                let (weights, _) = nearest_on_triangle(start + way * distance, corners);
-                found = Some((
-                    distance,
-                    SurfaceHit::new(id, triangle as u32, corners, weights, distance),
-                ));
+                let hit = SurfaceHit::new((id, body), triangle, start + way * distance, distance);
+                found = Some((distance, hit));
             }
         }
         Ok(found.map(|(_, hit)| hit))
@@ -204,10 +200,8 @@ impl World {
                 first.map_or(limit, |(distance, _)| distance) as f32
             });
             if let Some((distance, triangle)) = first {
-                let (_, corners) = body.surface_triangle(triangle);
-                let (weights, _) = nearest_on_triangle(place, corners);
                 limit = distance;
-                found = Some(SurfaceHit::new(id, triangle as u32, corners, weights, distance));
+                found = Some(SurfaceHit::new((id, body), triangle, place, distance));
             }
         }
         Ok(found)
@@ -215,11 +209,14 @@ impl World {
 }
 
 impl SurfaceHit {
-    fn new(body: BodyId, triangle: u32, corners: [DVec3; 3], weights: [f64; 3], distance: f64) -> Self {
+    /// Where a triangle of a body is nearest to a place, so far from where was asked.
+    fn new((id, body): (BodyId, &Body), triangle: usize, place: DVec3, distance: f64) -> Self {
+        let (_, corners) = body.surface_triangle(triangle);
+        let (weights, _) = nearest_on_triangle(place, corners);
         let [a, b, c] = corners;
         Self {
-            body,
-            triangle,
+            body: id,
+            triangle: triangle as u32,
             weights: weights.map(|weight| weight as f32),
             position: mixed(corners, weights).as_vec3(),
             normal: (b - a).cross(c - a).normalize_or_zero().as_vec3(),
@@ -256,12 +253,11 @@ fn mixed(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
 }
 
 fn check_distance(max_distance: f32) -> Result<()> {
-    if max_distance >= 0.0 {
-        return Ok(());
-    }
-    Err(Error::invalid(format!(
+    ensure!(
+        max_distance >= 0.0,
         "max_distance is {max_distance} m: must be at least 0"
-    )))
+    );
+    Ok(())
 }
 
 /// Whether a way from `start` on passes through a box.

@@ -202,15 +202,11 @@ impl<L: KeptLink> Springs for FastLink<L> {
 
     fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
         self.check_room(rewiring)?;
-        for spring in &rewiring.removed {
-            let [a, b] = spring.nodes;
-            self.remove(a, b)?;
+        for Spring { nodes: [a, b], .. } in &rewiring.removed {
+            self.remove(*a, *b)?;
         }
         self.set(&rewiring.changed)?;
-        for spring in &rewiring.added {
-            self.add(spring)?;
-        }
-        Ok(())
+        rewiring.added.iter().try_for_each(|spring| self.add(spring))
     }
 
     fn set(&mut self, changes: &[SpringChange]) -> Result<()> {

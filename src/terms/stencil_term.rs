@@ -145,10 +145,7 @@ impl<L: StencilLaw<N>, const N: usize> Term for Stencils<L, N> {
     fn remove_edge(&mut self, a: u32, b: u32) -> usize {
         let tile = tile_of(a);
         let first = self.first(tile);
-        let visitors = match self.visitor_starts.get(tile..tile + 2) {
-            Some(ends) => ends[0]..ends[1],
-            None => 0..0,
-        };
+        let visitors = self.visitors(tile);
         let Self {
             law,
             all,

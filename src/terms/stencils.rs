@@ -239,18 +239,12 @@ impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
 
     /// Those of the first that begin in a tile.
     pub(super) fn first(&self, tile: usize) -> Range<usize> {
-        match self.starts.get(tile..tile + 2) {
-            Some(ends) => ends[0]..ends[1],
-            None => 0..0,
-        }
+        stretch(&self.starts, tile)
     }
 
-    /// Those of the first that only end in it.
-    fn visitors(&self, tile: usize) -> &[u32] {
-        match self.visitor_starts.get(tile..tile + 2) {
-            Some(ends) => &self.visitors[ends[0]..ends[1]],
-            None => &[],
-        }
+    /// The places among visitors of those of the first that only end in it.
+    pub(super) fn visitors(&self, tile: usize) -> Range<usize> {
+        stretch(&self.visitor_starts, tile)
     }
 
     /// Those of cuts that have a node of it.
@@ -267,7 +261,7 @@ impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
 
     /// All that have a node of a tile.
     pub(super) fn of_tile(&self, tile: usize) -> impl Iterator<Item = usize> {
-        let others = self.visitors(tile).iter().chain(self.later(tile));
+        let others = self.visitors[self.visitors(tile)].iter().chain(self.later(tile));
         self.first(tile).chain(others.map(|&index| index as usize))
     }
 
@@ -291,7 +285,7 @@ impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
             law: &self.law,
             all: &self.all,
             beginning: self.first(tile),
-            visitors: self.visitors(tile),
+            visitors: &self.visitors[self.visitors(tile)],
             later: self.later(tile),
             nodes,
             positions,
@@ -388,4 +382,9 @@ pub(super) fn directed(direction: DVec3, along: f64, across: f64) -> DMat3 {
     let scaled = direction * (along - across);
     DMat3::from_cols(scaled * direction.x, scaled * direction.y, scaled * direction.z)
         + DMat3::from_diagonal(DVec3::splat(across))
+}
+
+/// The places from one tile's start to that of the next; none of a tile without a start.
+fn stretch(starts: &[usize], tile: usize) -> Range<usize> {
+    starts.get(tile..tile + 2).map_or(0..0, |ends| ends[0]..ends[1])
 }

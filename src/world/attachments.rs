@@ -1,5 +1,7 @@
 //! Attachments: what tools hold of bodies, and what bodies hold of each other, by their names.
 
+use std::fmt::from_fn;
+
 use glam::{DVec3, Vec3};
 
 use super::{World, make_walks};
@@ -28,15 +30,6 @@ enum Holder {
 }
 
 saved_enum!(Holder { 0 => Tool(it), 1 => Body(it) });
-
-/// A name that is made where it is needed.
-struct Lazy<F>(F);
-
-impl<F: Fn() -> String> std::fmt::Display for Lazy<F> {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
-        formatter.write_str(&(self.0)())
-    }
-}
 
 /// Which argument it is, in messages: one of an array, or the only one, with what its name begins with.
 #[derive(Clone, Copy)]
@@ -128,7 +121,7 @@ impl World {
         let body = self.bodies.get(body.0)?;
         self.check_kinematic(tool)?;
         for (index, &node) in nodes.iter().enumerate() {
-            let name = Lazy(|| name(index));
+            let name = from_fn(|to| to.write_str(&name(index)));
             body.check_node(&name, node)?;
             body.system().check_graspable(&name, node, tool.0.index())?;
         }
@@ -274,7 +267,7 @@ impl World {
         let body = self.bodies.get(id.0)?;
         let grip = match anchor {
             Anchor::Node(node) => {
-                body.check_node(&Lazy(|| which.name("node", "nodes")), *node)?;
+                body.check_node(&from_fn(|to| to.write_str(&which.name("node", "nodes"))), *node)?;
                 Grip::of_node(*node)
             }
             Anchor::Point(point) => grip_of(body.surface(), which, point)?,
