@@ -335,7 +335,7 @@ impl Body {
                 part: piece.part as f32,
             }));
         }
-        if forces.beside.has_terms() {
+        if forces.beside.terms.is_some() {
             parts.terms = parting(order, material, changes, rewiring)?;
         }
         Ok(parts)

@@ -25,7 +25,7 @@ pub(crate) struct MeshSolid {
     found: Found,
     /// Its corners, edges and sides, past which something that passed into it is led out; as it is found, where that is by these.
     exact: ExactSolid,
-    ridges: Ridges,
+    pub(super) ridges: Ridges,
     bounds: Bounds,
     reach: f32,
     hash: u64,
@@ -211,12 +211,6 @@ impl MeshSolid {
     /// Of everything that what it answers depends on.
     pub fn hash(&self) -> u64 {
         self.hash
-    }
-
-    /// Whether a ridge within `reach` of these bounds may be deeper than `depth` within an edge or face whose corners lie on the surface and of
-    /// which no edge is longer than `length`, m.
-    pub(super) fn has_ridge(&self, bounds: &Bounds, reach: f32, length: f32, depth: f32) -> bool {
-        self.ridges.are_near(bounds, reach, length, depth)
     }
 
     /// The closest that a node, edge or face with these corners comes; `None`: no closer than `within`. One that is pinned somewhere

@@ -171,7 +171,7 @@ pub(super) fn meets_mesh<'a>(
     meshes.into_iter().any(|(zone, solid)| match zone {
         Zone::Mesh { standing, .. } => {
             let own = Bounds::of(corners.iter().map(|&corner| standing.own(corner)));
-            solid.has_ridge(&own, reach.min(0.5 * spread), length, depth)
+            solid.ridges.are_near(&own, reach.min(0.5 * spread), length, depth)
         }
         _ => true,
     })

@@ -9,7 +9,7 @@ use crate::terms::{TangentBlocks, Term, Terms};
 /// What acts beside springs and elements. A solver may borrow it for as long as it solves.
 #[derive(Debug, Default)]
 pub(crate) struct Beside {
-    pub(super) terms: Option<Box<Terms>>,
+    pub terms: Option<Box<Terms>>,
     /// For bodies whose surface encloses what keeps its volume or its pressure.
     pub(super) cavities: Option<Box<Enclosed>>,
 }
@@ -20,11 +20,6 @@ impl Beside {
     /// Whether there is any.
     pub fn is_any(&self) -> bool {
         self.terms.is_some() || self.cavities.is_some()
-    }
-
-    /// Whether there are terms.
-    pub fn has_terms(&self) -> bool {
-        self.terms.is_some()
     }
 
     /// The terms of each law.
@@ -44,7 +39,7 @@ impl Beside {
 
     /// Whether they hold any.
     pub fn holds_any(&self) -> bool {
-        self.terms.as_ref().is_some_and(|terms| terms.hold_any())
+        self.terms.as_ref().is_some_and(|terms| terms.holds_any)
     }
 
     /// Shows the nodes of each term and each triangle of a cavity, and whether these are joined: terms of no stiffness join none.

@@ -107,7 +107,7 @@ impl System {
         // Nodes differ in mass now.
         self.uniform_inverse_mass = None;
         if let Some(scaling) = &mut self.scaling {
-            scaling.forget_uniform();
+            scaling.uniform_inverse_mass = None;
         }
         for (node, new) in (known..).zip(nodes) {
             match new {

@@ -130,7 +130,7 @@ pub(crate) struct MassScaling {
     /// The longest stable substep with masses as they are, s, wherever nodes are or at rest.
     unscaled: f64,
     /// The inverse mass of every node as it is, where they all have the same.
-    uniform_inverse_mass: Option<f32>,
+    pub uniform_inverse_mass: Option<f32>,
     /// In the order of their nodes.
     slivers: Vec<Sliver>,
     /// No other node needs mass for shorter substeps, s.
@@ -142,7 +142,7 @@ pub(crate) struct MassScaling {
     /// How many times as stiff as at rest the elements at each node are; of no nodes where masses are not made for that.
     growths: Vec<f32>,
     /// How many times as stiff as that they may become; 1 at rest.
-    margin: f32,
+    pub margin: f32,
     /// For how long masses have been made for that, s.
     relief: Option<f32>,
     /// The same as the last step ended.
@@ -324,11 +324,6 @@ impl MassScaling {
         self.slivers.sort_unstable_by_key(|sliver| sliver.node);
     }
 
-    /// Has masses be made for elements that become so many times as stiff as they were seen to be.
-    pub fn set_margin(&mut self, margin: f32) {
-        self.margin = margin;
-    }
-
     /// Makes masses for elements at rest again, after a while: whether that has to be done.
     pub fn end_relief(&mut self) -> bool {
         let ends = self.relief.is_some_and(|age| age > RELIEF);
@@ -467,11 +462,6 @@ impl MassScaling {
         for sliver in &mut self.slivers {
             sliver.rate = rates[sliver.node as usize];
         }
-    }
-
-    /// Nodes differ in mass from now on.
-    pub fn forget_uniform(&mut self) {
-        self.uniform_inverse_mass = None;
     }
 
     /// Whether one of these nodes may be made heavier.

@@ -47,7 +47,7 @@ impl System {
         // With as much margin as there is mass for.
         let margins = (1..=times).rev().map(|power| MARGIN.powi(power));
         let masses_for = margins.into_iter().find_map(|margin| {
-            self.scaling.as_mut()?.set_margin(margin);
+            self.scaling.as_mut()?.margin = margin;
             Some(fewer_substeps(self, request, 0.0)?.1)
         })?;
         self.scale_masses(masses_for);

@@ -180,7 +180,7 @@ impl Saved for Box<dyn Term> {
 pub(crate) struct Terms {
     laws: Vec<Box<dyn Term>>,
     /// Whether any node is held against the world.
-    holds_any: bool,
+    pub holds_any: bool,
     /// Of the springs, where they have arms.
     viscosity: Viscosity,
     kernel: ChosenKernel,
@@ -275,11 +275,6 @@ impl Terms {
         (0..tile_count(self.sums.len()))
             .map(|tile| self.energy_of_tile(tile, at))
             .sum()
-    }
-
-    /// Whether any node is held against the world.
-    pub fn hold_any(&self) -> bool {
-        self.holds_any
     }
 
     /// Makes room for so many nodes in all.

@@ -32,7 +32,7 @@ impl World {
         let watch = self.begin_profile();
         let result = self.take_step(dt);
         watch.stop(self.profile.as_deref(), Stage::Step);
-        self.record_end(&result);
+        self.record(|recorder, world| recorder.end(world, result.is_err()));
         result
     }
 
@@ -57,7 +57,7 @@ impl World {
     /// The step, with the threads that help.
     fn step_with(&mut self, dt: f32, team: &Team) -> Result<StepReport> {
         self.lead_by_hand();
-        self.record_begin(dt);
+        self.record(|recorder, world| recorder.begin(world, dt));
         let watch = Stopwatch::start(self.profile.as_deref());
         for (_, tool) in self.tools.iter_mut() {
             tool.set_out();

@@ -219,7 +219,8 @@ impl ImageSpace {
         }
         let overlap = &mut self.overlap;
         for inside in &mut overlap.inside {
-            inside.join_views();
+            // What several views found, which are all of what is there.
+            inside.join(0, f32::min);
             inside.join_points();
         }
         overlap.volume /= self.view_count as f64;
@@ -287,7 +288,7 @@ impl ImageSpace {
                     let inside = &mut overlap.inside[side];
                     let others = inside.edges.len();
                     trace_edges(projection, &layers[1 - side], thickness, body, inside);
-                    inside.join_one_view(others);
+                    inside.join(others, f32::max);
                     // An open body gives edges alone.
                     if body.surface.is_closed() {
                         find_points(projection, &layers[1 - side], thickness, body, inside);

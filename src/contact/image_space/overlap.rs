@@ -199,17 +199,8 @@ impl Inside {
         }
     }
 
-    /// Sorts the parts from `first` on, those of one view, and joins what touches.
-    pub(super) fn join_one_view(&mut self, first: usize) {
-        self.join(first, f32::max);
-    }
-
-    /// Joins what several views found.
-    pub(super) fn join_views(&mut self) {
-        self.join(0, f32::min);
-    }
-
-    fn join(&mut self, first: usize, depth: impl Fn(f32, f32) -> f32) {
+    /// Sorts the parts from `first` on and joins what touches: `depth` tells which of two depths that has.
+    pub(super) fn join(&mut self, first: usize, depth: impl Fn(f32, f32) -> f32) {
         let by_place = |a: &EdgeInside, b: &EdgeInside| a.edge.cmp(&b.edge).then(a.entry.total_cmp(&b.entry));
         self.edges[first..].sort_unstable_by(by_place);
         let mut last = first;

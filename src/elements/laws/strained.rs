@@ -65,11 +65,6 @@ pub(crate) fn inner<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: MatrixColum
     dot(a, x) + dot(b, y) + dot(c, z)
 }
 
-#[inline(always)]
-pub(crate) fn cofactors_of<R: Real>([a, b, c]: MatrixColumns<R>) -> MatrixColumns<R> {
-    [cross(b, c), cross(c, a), cross(a, b)]
-}
-
 /// A x B.
 #[inline(always)]
 pub(crate) fn product_of<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: MatrixColumns<R>) -> MatrixColumns<R> {
@@ -128,7 +123,8 @@ impl<R: Real> Strained<R> {
     /// Of a law beside `kappa/2 (J - 1)²` with the pressure that this has now.
     #[inline(always)]
     pub fn new(law: impl Hyperelastic, gradient: MatrixColumns<R>, kappa: R) -> Self {
-        let cofactors = cofactors_of(gradient);
+        let [a, b, c] = gradient;
+        let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
         let i1 = inner(gradient, gradient);
         let growth = dot(gradient[0], cofactors[0]) - R::of(1.0);
         let [w1, w2, wj] = law.slopes(i1, growth);

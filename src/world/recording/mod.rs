@@ -28,7 +28,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::World;
-use crate::base::{Error, Result, StepReport, ensure, memory};
+use crate::base::{Error, Result, ensure, memory};
 use difference::difference;
 pub use player::{ReplayDifference, ReplayReport};
 
@@ -58,7 +58,7 @@ impl Recorder {
         self.file.write_all(&self.frame).map_err(failed)
     }
 
-    fn begin(&mut self, world: &World, dt: f32) -> Result<()> {
+    pub(super) fn begin(&mut self, world: &World, dt: f32) -> Result<()> {
         world.save_again(&mut self.now)?;
         // The head of the file goes with the first.
         if self.steps > 0 {
@@ -76,7 +76,7 @@ impl Recorder {
         self.write()
     }
 
-    fn end(&mut self, world: &World, is_refused: bool) -> Result<()> {
+    pub(super) fn end(&mut self, world: &World, is_refused: bool) -> Result<()> {
         world.save_again(&mut self.before)?;
         self.frame.clear();
         put(&mut self.frame, &[END, u8::from(is_refused)])?;
@@ -139,17 +139,8 @@ impl World {
         }
     }
 
-    /// A step begins, after haptic handles have led their tools.
-    pub(super) fn record_begin(&mut self, dt: f32) {
-        self.record(|recorder, world| recorder.begin(world, dt));
-    }
-
-    /// A step is over.
-    pub(super) fn record_end(&mut self, result: &Result<StepReport>) {
-        self.record(|recorder, world| recorder.end(world, result.is_err()));
-    }
-
-    fn record(&mut self, write: impl FnOnce(&mut Recorder, &World) -> Result<()>) {
+    /// Has the recorder write, where there is one.
+    pub(super) fn record(&mut self, write: impl FnOnce(&mut Recorder, &World) -> Result<()>) {
         let Some(mut recorder) = self.recorder.take() else {
             return;
         };
