@@ -79,13 +79,11 @@ impl sinew_blade_def {
     fn defaults() -> Self {
         let BladeDefinition { stiffness, filter, .. } = BladeDefinition::new([Vec3::ZERO; 2]);
         Self {
-            struct_size: size_of::<Self>(),
-            edge: [0.0; 6],
             stiffness,
             collision_category: filter.category,
             collision_mask: filter.mask,
-            position: [0.0; 3],
             orientation: [0.0, 0.0, 0.0, 1.0],
+            ..Self::empty()
         }
     }
 

@@ -144,15 +144,12 @@ impl sinew_detector_def {
     fn defaults() -> Self {
         let image = ImageSpaceDefinition::new(0.0);
         Self {
-            struct_size: size_of::<Self>(),
-            bodies: [sinew_body_id::default(); 2],
             detection: SINEW_DETECTION_EXACT,
             form: SINEW_IMAGE_FORM_INTERVALS,
             pixel: image.pixel,
-            direction: [0.0; 3],
             pixels: image.pixels,
             crossings: image.crossings,
-            thickness: [0.0; 2],
+            ..Self::empty()
         }
     }
 

@@ -112,8 +112,6 @@ impl sinew_haptic_def {
     fn defaults() -> Self {
         let defaults = HapticDefinition::new(ToolId::default());
         Self {
-            struct_size: size_of::<Self>(),
-            tool: sinew_tool_id::default(),
             stiffness: defaults.stiffness,
             angular_stiffness: defaults.angular_stiffness,
             damping_ratio: defaults.damping_ratio,
@@ -124,6 +122,7 @@ impl sinew_haptic_def {
             torque_rate_limit: defaults.torque_rate_limit,
             stale_after: defaults.stale_after,
             ramp: defaults.ramp,
+            ..Self::empty()
         }
     }
 

@@ -42,15 +42,12 @@ impl sinew_picture_def {
     fn defaults() -> Self {
         let defaults = PictureDefinition::default();
         Self {
-            struct_size: size_of::<Self>(),
             width: defaults.width,
             height: defaults.height,
-            eye: [0.0; 3],
-            target: [0.0; 3],
             up: defaults.up.to_array(),
             direction: defaults.direction.to_array(),
             field_of_view: defaults.field_of_view,
-            show_contacts: 0,
+            ..Self::empty()
         }
     }
 

@@ -181,7 +181,6 @@ impl sinew_world_def {
 impl From<StepReport> for sinew_step_report {
     fn from(report: StepReport) -> Self {
         Self {
-            struct_size: size_of::<Self>(),
             substeps: report.substeps,
             stable_substep: report.stable_substep,
             bodies_restored: report.bodies_restored,
@@ -191,13 +190,10 @@ impl From<StepReport> for sinew_step_report {
             limit_body: report.limit.map(|limit| limit.body).unwrap_or_default().into(),
             limit_nodes: report.limit.map_or([0; 4], |limit| limit.of.nodes),
             limit_substeps: report.limit.map_or(0, |limit| limit.needed),
-            work: 0,
-            work_done: 0,
-            residual: 0.0,
-            lag: 0.0,
             substeps_body: report.substeps_body.unwrap_or_default().into(),
             restored_body: report.restored_body.unwrap_or_default().into(),
             crossing_body: report.crossing_body.unwrap_or_default().into(),
+            ..Self::empty()
         }
     }
 }
