@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::cuttable::Cuttable;
 use super::{Body, CutReport};
 use crate::base::{Error, Result, memory};
-use crate::cutting::{CutSurface, VertexLoad};
+use crate::cutting::{CutSurface, Divided, VertexLoad};
 use crate::def::{TearReport, Values, Withheld, check_values};
 use crate::springs::{Link, pull};
 use crate::threads::Team;
@@ -155,7 +155,7 @@ impl Body {
         for (own, node) in spring.into_iter().zip(callers) {
             // What holds a node would hold its copies too.
             if is_free(own)
-                && let Some(vertex) = surface.vertex_of(node)?
+                && let Some(vertex) = surface.vertex_of(node)
                 && let Some(load) = surface.load_at(vertex, self.separation(own), self.positions())?
             {
                 at_nodes.push((vertex, load));
@@ -166,7 +166,7 @@ impl Body {
         let other = if spring.into_iter().any(is_free) {
             None
         } else {
-            surface.vertex_between(callers, |node| is_free(self.system.order.own(node)))?
+            surface.vertex_between(callers, |node| is_free(self.system.order.own(node)))
         };
         for vertex in surface.tip_near(callers)?.into_iter().chain(other) {
             let mut forces = DMat3::ZERO;

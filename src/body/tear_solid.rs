@@ -28,7 +28,8 @@ impl Body {
             return Ok(Vec::new());
         };
         let callers = spring.map(|node| self.system.order.caller(node));
-        let beside = solid.nodes_beside(callers)?;
+        let mut beside = memory::gathered(solid.nodes_beside(callers))?;
+        memory::sort_once(&mut beside);
         let mut found = memory::reserved(2 + beside.len())?;
         // What holds a node would hold its copies too.
         let load_at = |&node: &u32| {

@@ -96,6 +96,26 @@ pub(crate) trait Divided<const N: usize> {
         std::iter::successors(known(self.cell(cell).first), next)
     }
 
+    /// Other nodes of the cells at two, some more than once.
+    fn nodes_beside(&self, nodes: [u32; 2]) -> impl Iterator<Item = u32> {
+        let cells = self.cells_at(nodes[0]).map(|cell| self.cell(cell).nodes);
+        let others = cells.filter(move |cell| cell.contains(&nodes[1])).flatten();
+        others.filter(move |node| !nodes.contains(node))
+    }
+
+    /// The corners of the simplices of the cells at a node, some more than once.
+    fn corners_about(&self, node: u32) -> impl Iterator<Item = u32> {
+        let simplices = self.cells_at(node).flat_map(|cell| self.simplices_in(cell));
+        simplices.flat_map(|simplex| self.simplex(simplex).corners)
+    }
+
+    /// The vertex at a node, the lowest of several.
+    fn vertex_of(&self, node: u32) -> Option<u32> {
+        self.corners_about(node)
+            .filter(|&vertex| self.is_at(vertex, node))
+            .min()
+    }
+
     /// Whether a vertex is at a node.
     fn is_at(&self, vertex: u32, node: u32) -> bool {
         let (nodes, weights) = self.bonds(vertex);

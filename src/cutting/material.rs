@@ -103,20 +103,14 @@ impl CutMaterial {
 
     /// Of the triangles of solids, whether a cut has bared them.
     pub fn bared(&self) -> impl Iterator<Item = bool> {
-        let solid = match self {
-            Self::Springs(_) | Self::Surface(_) => None,
-            Self::Solid(solid) => Some(solid),
-        };
-        let triangles = solid.map_or(&[][..], CutSolid::triangles);
+        let triangles = self.solid().map_or(&[][..], CutSolid::triangles);
         triangles.iter().map(|triangle| triangle.is_inner)
     }
 
     /// Whether a cut has bared a triangle of a solid.
     pub fn is_bared(&self, triangle: u32) -> bool {
-        match self {
-            Self::Springs(_) | Self::Surface(_) => false,
-            Self::Solid(solid) => solid.triangles()[triangle as usize].is_inner,
-        }
+        self.solid()
+            .is_some_and(|solid| solid.triangles()[triangle as usize].is_inner)
     }
 
     /// The corners of a triangle, by their numbers among nodes.
@@ -163,11 +157,7 @@ impl CutMaterial {
 
     /// The tetrahedra at a node, if there are any.
     pub fn tetrahedra_at(&self, node: u32) -> impl Iterator<Item = u32> {
-        let solid = match self {
-            Self::Springs(_) | Self::Surface(_) => None,
-            Self::Solid(solid) => Some(solid),
-        };
-        solid.into_iter().flat_map(move |solid| solid.cells_at(node))
+        self.solid().into_iter().flat_map(move |solid| solid.cells_at(node))
     }
 
     /// The cell that an item lies in.
@@ -192,10 +182,7 @@ impl CutMaterial {
         let cell = self.cell_of(item) as usize;
         match self {
             Self::Springs(springs) => with_first(springs[cell]),
-            Self::Surface(surface) => {
-                let [a, b, c] = surface.cells()[cell].nodes;
-                [a, b, c, a]
-            }
+            Self::Surface(surface) => three_and_first(surface.cells()[cell].nodes),
             Self::Solid(solid) => solid.cells()[cell].nodes,
         }
     }
@@ -204,10 +191,7 @@ impl CutMaterial {
     pub fn corners_of(&self, item: u32) -> [u32; 4] {
         match self {
             Self::Springs(springs) => with_first(springs[item as usize]),
-            Self::Surface(surface) => {
-                let [a, b, c] = surface.corner_points(item);
-                [a, b, c, a]
-            }
+            Self::Surface(surface) => three_and_first(surface.corner_points(item)),
             Self::Solid(solid) => solid.cells()[item as usize].nodes,
         }
     }
@@ -253,10 +237,10 @@ impl CutMaterial {
             Self::Surface(surface) => {
                 for &vertex in &changes.ends {
                     let of = &surface.vertices()[vertex as usize];
-                    let ([a, b, c], [u, v, w]) = (of.nodes, of.weights);
+                    let [u, v, w] = of.weights;
                     see(CutEnd {
                         vertex: Some(vertex),
-                        nodes: [a, b, c, a],
+                        nodes: three_and_first(of.nodes),
                         weights: [u, v, w, 0.0],
                         slack: 0.0,
                         size: surface.size_at(vertex),
@@ -316,6 +300,10 @@ impl CutMaterial {
 
 fn with_first([a, b]: [u32; 2]) -> [u32; 4] {
     [a, b, a, a]
+}
+
+fn three_and_first([a, b, c]: [u32; 3]) -> [u32; 4] {
+    [a, b, c, a]
 }
 
 /// A point of the material.

@@ -66,37 +66,16 @@ impl CutSurface {
     }
 
     /// The vertex at the third node of a cell of two, of those that will do; that next to the middle between them in the rest shape.
-    pub(crate) fn vertex_between(&self, nodes: [u32; 2], will_do: impl Fn(u32) -> bool) -> Result<Option<u32>> {
+    pub(crate) fn vertex_between(&self, nodes: [u32; 2], will_do: impl Fn(u32) -> bool) -> Option<u32> {
+        let others = self.nodes_beside(nodes).filter(|&node| will_do(node));
         let mut nearest: Option<(f64, u32)> = None;
-        let cells = self.cells_at(nodes[0]).map(|cell| self.cells[cell].nodes);
-        for cell in cells.filter(|cell| cell.contains(&nodes[1])) {
-            for node in cell.into_iter().filter(|node| !nodes.contains(node) && will_do(*node)) {
-                let Some(vertex) = self.vertex_of(node)? else {
-                    continue;
-                };
-                let off = self.off_middle(vertex, nodes);
-                if nearest.is_none_or(|least| (off, vertex) < least) {
-                    nearest = Some((off, vertex));
-                }
+        for vertex in others.filter_map(|node| self.vertex_of(node)) {
+            let off = self.off_middle(vertex, nodes);
+            if nearest.is_none_or(|least| (off, vertex) < least) {
+                nearest = Some((off, vertex));
             }
         }
-        Ok(nearest.map(|(_, vertex)| vertex))
-    }
-
-    /// The vertex that is drawn at a node.
-    pub(crate) fn vertex_of(&self, node: u32) -> Result<Option<u32>> {
-        let mut seen = Vec::new();
-        for cell in self.cells_at(node) {
-            self.list_vertices(self.cells[cell].first, &mut seen)?;
-        }
-        let is_there = |&vertex: &u32| self.node_of(vertex) == Some(node);
-        Ok(seen.into_iter().filter(is_there).min())
-    }
-
-    /// The node that a vertex is at; `None`: it lies between nodes.
-    pub(crate) fn node_of(&self, vertex: u32) -> Option<u32> {
-        let vertex = &self.vertices[vertex];
-        (vertex.weights[0] == 1.0).then_some(vertex.nodes[0])
+        nearest.map(|(_, vertex)| vertex)
     }
 
     /// The nodes of the cells about a vertex, in order.
@@ -228,25 +207,9 @@ impl CutSurface {
 
     /// The vertices drawn in cells at two nodes, in order.
     fn vertices_about(&self, nodes: [u32; 2]) -> Result<Vec<u32>> {
-        let mut seen = Vec::new();
-        for node in nodes {
-            for cell in self.cells_at(node) {
-                self.list_vertices(self.cells[cell].first, &mut seen)?;
-            }
-        }
+        let mut seen = memory::gathered(nodes.into_iter().flat_map(|node| self.corners_about(node)))?;
         memory::sort_once(&mut seen);
         Ok(seen)
-    }
-
-    /// The corners of the triangles of a cell from one on.
-    fn list_vertices(&self, mut triangle: u32, seen: &mut Vec<u32>) -> Result<()> {
-        while triangle != NONE {
-            let it = self.triangles[triangle];
-            seen.try_reserve(3)?;
-            seen.extend(it.corners);
-            triangle = it.next;
-        }
-        Ok(())
     }
 
     /// The square of how far a vertex lies from the middle of two nodes in the rest shape.

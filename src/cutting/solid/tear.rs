@@ -16,28 +16,6 @@ use crate::strain::eigenvalues;
 const BESIDE: f64 = 1e-9;
 
 impl CutSolid {
-    /// The vertex of the material that is at a node.
-    pub(crate) fn vertex_of(&self, node: u32) -> Option<u32> {
-        let is_there = |&vertex: &u32| self.is_at(vertex, node);
-        let mut found = None;
-        for cell in self.cells_at(node) {
-            for tetrahedron in self.simplices_in(cell) {
-                let vertex = self.tetrahedra[tetrahedron].corners.into_iter().filter(is_there).min();
-                found = [found, vertex].into_iter().flatten().min();
-            }
-        }
-        found
-    }
-
-    /// Other nodes of the cells at two, in order.
-    pub(crate) fn nodes_beside(&self, nodes: [u32; 2]) -> Result<Vec<u32>> {
-        let cells = self.cells_at(nodes[0]).map(|cell| self.cells[cell].nodes);
-        let others = cells.filter(|cell| cell.contains(&nodes[1])).flatten();
-        let mut beside = memory::gathered(others.filter(|node| !nodes.contains(node)))?;
-        memory::sort_once(&mut beside);
-        Ok(beside)
-    }
-
     /// What the cells at a node are stretched by, in the mean over their material: the largest principal value of (F Fᵀ - 1) / 2 with the gradient F of
     /// the deformation (Finger 1894), without unit, and the direction of it as the normal of a tear; `None`: nothing stretches it.
     pub(crate) fn load_at(&self, node: u32, positions: &[Vec3]) -> Option<VertexLoad> {
