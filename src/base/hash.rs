@@ -1,5 +1,6 @@
 //! A hash over everything that the next step depends on, to the bit.
 
+use glam::Vec3;
 use xxhash_rust::xxh3::Xxh3Default;
 
 /// Adds up bits; equal states give equal hashes.
@@ -17,6 +18,12 @@ impl StateHasher {
     pub fn write_floats(&mut self, values: &[f32]) {
         for value in values {
             self.0.update(&value.to_bits().to_le_bytes());
+        }
+    }
+
+    pub fn write_vectors(&mut self, vectors: impl IntoIterator<Item = Vec3>) {
+        for vector in vectors {
+            self.write_floats(&vector.to_array());
         }
     }
 

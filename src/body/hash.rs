@@ -19,9 +19,7 @@ impl Body {
             vectors.extend(&system.applied);
         }
         for vectors in vectors {
-            for vector in vectors.iter() {
-                hasher.write_floats(&vector.to_array());
-            }
+            hasher.write_vectors(vectors.iter());
         }
         hasher.write_floats(&[system.gravity_scale]);
         hasher.write_floats(&system.acceleration.to_array());

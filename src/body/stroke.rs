@@ -54,7 +54,7 @@ impl Stroke {
         self.of_solid.hash(hasher);
         for (end, _) in &self.ends {
             end.nodes.iter().for_each(|&node| hasher.write_u64(u64::from(node)));
-            end.weights.iter().for_each(|weight| hasher.write_u64(weight.to_bits()));
+            hasher.write_doubles(&end.weights);
         }
     }
 

@@ -113,8 +113,7 @@ impl Grips {
         for dragged in &self.settled {
             hasher.write_u64(dragged.slot as u64);
             hasher.write_u64(dragged.node.into());
-            let force = dragged.force.to_array();
-            force.iter().for_each(|part| hasher.write_u64(part.to_bits()));
+            hasher.write_doubles(&dragged.force.to_array());
             hasher.write_u64(dragged.sticks.into());
         }
     }

@@ -160,11 +160,8 @@ impl Holds {
                 .iter()
                 .for_each(|&node| hasher.write_u64(node.into()));
             hasher.write_u64(push.tip.into());
-            hasher.write_u64(push.force.to_bits());
-            push.drag
-                .to_array()
-                .iter()
-                .for_each(|part| hasher.write_u64(part.to_bits()));
+            hasher.write_doubles(&[push.force]);
+            hasher.write_doubles(&push.drag.to_array());
             hasher.write_floats(&push.normal.to_array());
             hasher.write_floats(&push.arm.to_array());
         }

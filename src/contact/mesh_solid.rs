@@ -155,9 +155,7 @@ impl MeshSolid {
         let mut hasher = StateHasher::new();
         hasher.write_u64(detection as u64);
         hasher.write_floats(&[resolution]);
-        for position in positions {
-            hasher.write_floats(&position.to_array());
-        }
+        hasher.write_vectors(positions.iter().copied());
         for corner in triangles.as_flattened() {
             hasher.write_u64(u64::from(*corner));
         }

@@ -354,12 +354,6 @@ impl Rigid {
     }
 
     pub fn hash(&self, hasher: &mut StateHasher) {
-        let mut write = |vector: DVec3| {
-            vector
-                .to_array()
-                .iter()
-                .for_each(|part| hasher.write_u64(part.to_bits()))
-        };
         for vector in [
             self.motion.center,
             self.motion.velocity,
@@ -372,11 +366,10 @@ impl Rigid {
             self.mass.inertia.y_axis,
             self.mass.inertia.z_axis,
         ] {
-            write(vector);
+            hasher.write_doubles(&vector.to_array());
         }
         let [x, y, z, w] = self.motion.orientation.to_array();
-        write(DVec3::new(x, y, z));
-        write(DVec3::splat(w));
+        hasher.write_doubles(&[x, y, z, w, w, w]);
     }
 }
 

@@ -111,6 +111,15 @@ impl Pose {
         }
     }
 
+    /// Adds the bits of a pose and of where it is to go.
+    pub(crate) fn hash(&self, target: Option<Self>, hasher: &mut StateHasher) {
+        hasher.write_u64(u64::from(target.is_some()));
+        for pose in [Some(*self), target].into_iter().flatten() {
+            hasher.write_floats(&pose.position.to_array());
+            hasher.write_floats(&pose.orientation.to_array());
+        }
+    }
+
     /// The pose with its orientation normalised; refused where it has no direction, is not finite or too far away.
     pub(crate) fn checked(self) -> Result<Self> {
         finite_vector("position", self.position)?;
@@ -379,10 +388,6 @@ impl Tool {
             rigid.hash(hasher);
         }
         self.filter.hash(hasher);
-        hasher.write_u64(u64::from(self.target.is_some()));
-        for pose in [Some(self.pose), self.target].into_iter().flatten() {
-            hasher.write_floats(&pose.position.to_array());
-            hasher.write_floats(&pose.orientation.to_array());
-        }
+        self.pose.hash(self.target, hasher);
     }
 }

@@ -217,7 +217,7 @@ impl EnergyAccount {
 
     pub fn hash(&self, hasher: &mut StateHasher) {
         let reference = self.reference.unwrap_or(f64::NAN);
-        let numbers = [
+        hasher.write_doubles(&[
             reference,
             self.work,
             self.time,
@@ -225,10 +225,7 @@ impl EnergyAccount {
             self.recent,
             self.removed,
             self.refined_at,
-        ];
-        numbers
-            .into_iter()
-            .for_each(|number| hasher.write_u64(number.to_bits()));
+        ]);
         hasher.write_floats(&self.gravity.to_array());
         hasher.write_u64(u64::from(self.substeps) << 32 | u64::from(self.refinement));
         hasher.write_u64(u64::from(self.comparisons));

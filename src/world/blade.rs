@@ -265,22 +265,14 @@ impl Blade {
     }
 
     pub fn hash(&self, hasher: &mut StateHasher) {
-        hasher.write_u64(self.stiffness.to_bits());
+        hasher.write_doubles(&[self.stiffness]);
         self.filter.hash(hasher);
-        for end in self.edge {
-            hasher.write_floats(&end.to_array());
-        }
-        hasher.write_u64(u64::from(self.target.is_some()));
-        for pose in [Some(self.pose), self.target].into_iter().flatten() {
-            hasher.write_floats(&pose.position.to_array());
-            hasher.write_floats(&pose.orientation.to_array());
-        }
+        hasher.write_vectors(self.edge);
+        self.pose.hash(self.target, hasher);
         for proxy in &self.proxies {
             hasher.write_u64(proxy.body.0.index1.into());
             proxy.stroke.hash(hasher);
-            for end in proxy.last.iter().flatten() {
-                hasher.write_floats(&end.to_array());
-            }
+            hasher.write_vectors(proxy.last.into_iter().flatten());
             let offsets = proxy.holds.iter().map(|hold| hold.offset);
             for vector in offsets.chain([proxy.forward, proxy.behind]) {
                 hasher.write_doubles(&vector.to_array());

@@ -56,9 +56,7 @@ impl SolidStroke {
     /// Adds its bits.
     pub(crate) fn hash(&self, hasher: &mut StateHasher) {
         hasher.write_u64(u64::from(self.number) << 1 | u64::from(self.turns_up));
-        for end in self.end {
-            hasher.write_floats(&end.to_array());
-        }
+        hasher.write_vectors(self.end);
         hasher.write_doubles(&self.normal.to_array());
     }
 

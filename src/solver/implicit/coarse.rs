@@ -271,12 +271,8 @@ impl Coarse {
 
     /// All that it was made of.
     pub fn hash(&self, hasher: &mut StateHasher) {
-        self.stiffness
-            .iter()
-            .for_each(|entry| hasher.write_u64(entry.to_bits()));
-        self.places
-            .iter()
-            .for_each(|place| hasher.write_floats(&place.to_array()));
+        hasher.write_doubles(&self.stiffness);
+        hasher.write_vectors(self.places.iter());
     }
 
     /// Adds a spring between two nodes.

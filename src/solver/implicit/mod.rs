@@ -417,15 +417,13 @@ impl Implicit {
             credit,
             pressed: _,
         } = history;
-        for vector in ways.iter().chain(gains.iter()).chain(remainders.iter()) {
-            hasher.write_floats(&vector.to_array());
+        for vectors in [ways, gains, remainders] {
+            hasher.write_vectors(vectors.iter());
         }
         hasher.write_floats(&[*step, self.accuracy]);
         let [energy, size] = energy.map_or([f64::NAN; 2], |total| [total.energy, total.size]);
         hasher.write_doubles(&[energy, size, *credit]);
-        for force in history.pressing().into_iter().flat_map(Vectors::iter) {
-            hasher.write_floats(&force.to_array());
-        }
+        hasher.write_vectors(history.pressing().into_iter().flat_map(Vectors::iter));
         hasher.write_u64(u64::from(self.order) << 32 | u64::from(self.budget));
         if let Some(newton) = &self.newton {
             newton.hash(self.settled, hasher);

@@ -87,8 +87,6 @@ impl Newton {
 
     /// What the next step depends on.
     pub fn hash(&self, place: usize, hasher: &mut StateHasher) {
-        for vector in self.remainders[place].iter() {
-            hasher.write_floats(&vector.to_array());
-        }
+        hasher.write_vectors(self.remainders[place].iter());
     }
 }
