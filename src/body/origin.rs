@@ -32,18 +32,14 @@ fn power_of_two_from(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
     use glam::Vec3;
 
     #[test]
     fn local_coordinates_are_exact() {
-        // A fixed generator: offsets over many magnitudes, bodies over many extents.
-        let mut seed = 1_u64;
-        let mut random = || {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 40) as f32 / (1 << 24) as f32
-        };
+        // Offsets over many magnitudes, bodies over many extents.
+        let mut numbers = Random(1);
+        let mut random = || numbers.unit();
         for _ in 0..2000 {
             let extent = 10_f32.powf(4.0 * random() - 3.0);
             let offset = Vec3::new(random(), random(), random()) * 10_f32.powf(8.0 * random() - 3.0);

@@ -89,22 +89,12 @@ pub(super) fn closest_on_triangle(point: Vec3, a: Vec3, b: Vec3, c: Vec3) -> [f3
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A fixed generator of numbers between -1 and 1.
-    fn numbers() -> impl FnMut() -> f32 {
-        let mut seed = 7_u64;
-        move || {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 40) as f32 / (1 << 23) as f32 - 1.0
-        }
-    }
+    use crate::random::Random;
 
     #[test]
     fn nothing_sampled_is_closer() {
-        let mut random = numbers();
-        let mut point = || Vec3::new(random(), random(), random());
+        let mut random = Random(7);
+        let mut point = || random.vector();
         for _ in 0..500 {
             let [p, q, a, b, c] = [point(), point(), point(), point(), point()];
             let [wa, wb, wc] = closest_on_triangle(p, a, b, c);

@@ -85,14 +85,11 @@ fn common(a: &[u8], b: &[u8]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
-    fn bytes(count: usize, seed: u32) -> Vec<u8> {
-        let mut state = seed;
-        let mut next = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 24) as u8
-        };
-        (0..count).map(|_| next()).collect()
+    fn bytes(count: usize, seed: u64) -> Vec<u8> {
+        let mut random = Random(seed);
+        (0..count).map(|_| random.below(256) as u8).collect()
     }
 
     /// How long the difference is, which makes the one of the other.
