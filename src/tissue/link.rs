@@ -51,12 +51,14 @@ pub(super) struct Link {
     /// What it has given so far, N s.
     impulse: f32,
     friction_impulse: Vec3,
+    /// How much of it was recalled, N s.
+    recalled: f32,
     /// The same of what moves its sides apart without giving them speed, kg m.
     push: f32,
 }
 
 saved! { Link {
-    sides, normal, least_speed, depth, is_parted, is_ahead, friction, movers, counts, answers, mass, impulse, friction_impulse, push,
+    sides, normal, least_speed, depth, is_parted, is_ahead, friction, movers, counts, answers, mass, impulse, friction_impulse, recalled, push,
 } }
 
 impl ContactSide {
@@ -145,6 +147,7 @@ impl Link {
             mass: 1.0 / whole.max(leverage),
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
+            recalled: 0.0,
             push: 0.0,
         })
     }
@@ -287,9 +290,15 @@ impl Link {
         self.give(self.given() * share, skins, |skin| &mut skin.velocities);
     }
 
-    /// Takes it to have given so many times what it gave.
+    /// What it gives along its normal beyond what it recalled, as a part of all that.
+    pub fn fresh_share(&self) -> f32 {
+        ((self.impulse - self.recalled) / self.impulse).clamp(-1.0, 1.0)
+    }
+
+    /// Takes it to have recalled so many times what it did.
     pub fn scale(&mut self, share: f32) {
         self.impulse *= share;
+        self.recalled = self.impulse;
         self.friction_impulse *= share;
     }
 

@@ -1,7 +1,7 @@
 //! Bodies that touch each other, or themselves, take their substeps together: what one does to the other is part of each.
 //!
 //! All take as many as the one that needs most: one of VERLET what its stability asks for, one of the other solvers substeps of 1 ms as
-//! near a tool.
+//! near a tool, and shorter ones where stiff bodies press each other.
 
 use super::Tissue;
 use crate::solver::{
@@ -314,6 +314,16 @@ impl CoupledGroup<'_> {
                 }
                 check_beside_springs(body, substep)
             })?;
+            if request.substeps == 0 && !is_last {
+                // What meets in this step was not known as it began.
+                let wished = tissue.substeps_pressed_now(island, bodies, request.dt);
+                let wished = wished.min(request.max_substeps.saturating_sub(1));
+                if wished > substeps + substeps / 2 {
+                    return Err(TooLong {
+                        stable_substep: stable_for(request, wished),
+                    });
+                }
+            }
         }
         if compares {
             each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
