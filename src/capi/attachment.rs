@@ -3,7 +3,7 @@
 use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::id::converts;
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, versioned};
 use super::status::sinew_status;
 use super::tool::{sinew_tool_id, write_wrench};
 use crate::base::memory::collected;
@@ -55,8 +55,7 @@ pub struct sinew_attachment_def {
     pub force_limit: f32,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers and pointers alone.
-unsafe impl Versioned for sinew_attachment_def {}
+versioned! { sinew_attachment_def }
 
 /// Nodes, or points of a surface; of one end of attachments.
 enum AttachedEnds<'a> {

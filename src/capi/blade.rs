@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::id::converts;
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, versioned};
 use super::status::{SINEW_STATUS_OK, sinew_status, status_of};
 use crate::base::BladeId;
 use crate::contact::Pose;
@@ -69,11 +69,7 @@ pub struct sinew_blade_report {
     pub area: f64,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_blade_def {}
-
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_blade_report {}
+versioned! { sinew_blade_def, sinew_blade_report }
 
 impl sinew_blade_def {
     fn defaults() -> Self {
@@ -173,7 +169,7 @@ pub unsafe extern "C" fn sinew_blade_get_report(
 ) -> sinew_status {
     with_world(world, |world| {
         let told = world.blade_report(blade.id())?;
-        memory::report("out", out)?.fill(sinew_blade_report {
+        let report = sinew_blade_report {
             struct_size: size_of::<sinew_blade_report>(),
             force: told.force.to_array(),
             torque: told.torque.to_array(),
@@ -182,7 +178,7 @@ pub unsafe extern "C" fn sinew_blade_get_report(
             lag: told.lag,
             status: told.refused.as_ref().map_or(SINEW_STATUS_OK, status_of),
             area: told.area,
-        });
-        Ok(())
+        };
+        memory::write_report("out", out, report)
     })
 }

@@ -4,9 +4,9 @@ use glam::Vec3;
 
 use super::body::{sinew_body_id, with_body};
 use super::guard::{sinew_world, with_world_mut};
-use super::memory::{self, Versioned};
+use super::memory::{self, told, versioned};
 use super::status::sinew_status;
-use crate::body::{NewNodeSource, NewRimEdge};
+use crate::body::{CutReport, NewNodeSource, NewRimEdge};
 use crate::cutting::Sweep;
 use crate::def::expect_count;
 
@@ -99,11 +99,9 @@ impl sinew_triangle_view {
     }
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_cut_report {}
+versioned! { sinew_cut_report, sinew_topology_changes }
 
-// SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
-unsafe impl Versioned for sinew_topology_changes {}
+told! { CutReport => sinew_cut_report { new_nodes, new_triangles, springs_removed, pieces_parted, length, area } }
 
 // The lists are lent as they are kept.
 const _: () = assert!(size_of::<sinew_new_node>() == size_of::<NewNodeSource>());
@@ -130,15 +128,7 @@ pub unsafe extern "C" fn sinew_body_cut(
         let out = memory::optional_report("out_report", out_report)?;
         let done = world.cut(body.id(), &Sweep { start, end })?;
         if let Some(out) = out {
-            out.fill(sinew_cut_report {
-                struct_size: size_of::<sinew_cut_report>(),
-                new_nodes: done.new_nodes,
-                new_triangles: done.new_triangles,
-                springs_removed: done.springs_removed,
-                pieces_parted: done.pieces_parted,
-                length: done.length,
-                area: done.area,
-            });
+            out.fill(done.into());
         }
         Ok(())
     })
@@ -159,7 +149,7 @@ pub unsafe extern "C" fn sinew_body_get_topology_changes(
 ) -> sinew_status {
     with_body(world, body, |body| {
         let changes = body.changes_since(since_version)?;
-        memory::report("out", out)?.fill(sinew_topology_changes {
+        let filled = sinew_topology_changes {
             struct_size: size_of::<sinew_topology_changes>(),
             version: changes.version,
             nodes: changes.nodes.as_ptr().cast(),
@@ -170,8 +160,8 @@ pub unsafe extern "C" fn sinew_body_get_topology_changes(
             removed_spring_count: changes.removed_springs.len(),
             rim: changes.rim.as_ptr().cast(),
             rim_count: changes.rim.len(),
-        });
-        Ok(())
+        };
+        memory::write_report("out", out, filled)
     })
 }
 

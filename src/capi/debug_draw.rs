@@ -4,7 +4,7 @@ use glam::Vec3;
 use std::ffi::c_void;
 
 use super::guard::{guard, sinew_world, with_world};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, versioned};
 use super::status::sinew_status;
 use crate::base::{Result, ensure};
 use crate::debug_draw::{DebugCanvas, DebugDrawDefinition, Rgba};
@@ -53,8 +53,7 @@ pub struct sinew_debug_draw {
     pub draw_triangle: sinew_draw,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers and pointers alone; what is no function is the caller's breach.
-unsafe impl Versioned for sinew_debug_draw {}
+versioned! { sinew_debug_draw }
 
 impl sinew_debug_draw {
     fn defaults() -> Self {

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::body::sinew_body_id;
 use super::guard::{destroy, guard, sinew_world, with_world};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, versioned};
 use super::overlaps::{DetectorSide, Method, Overlaps, of_body};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
@@ -125,11 +125,7 @@ pub struct sinew_dvec3_view {
     pub stride: usize,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_detector_def {}
-
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_detector_report {}
+versioned! { sinew_detector_def, sinew_detector_report }
 
 /// Detector of the overlap of two bodies; it applies no forces and may outlive its world.
 ///

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::guard::{sinew_world, with_world, with_world_mut};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, told, versioned};
 use super::status::sinew_status;
 use super::tool::sinew_tool_id;
 use crate::contact::MassProperties;
@@ -24,19 +24,9 @@ pub struct sinew_mass_properties {
     pub inertia: [f32; 6],
 }
 
-// SAFETY: repr(C), begins with struct_size; numbers, which any bits are.
-unsafe impl Versioned for sinew_mass_properties {}
+versioned! { sinew_mass_properties }
 
-impl From<MassProperties> for sinew_mass_properties {
-    fn from(properties: MassProperties) -> Self {
-        Self {
-            mass: properties.mass,
-            center_of_mass: properties.center_of_mass.to_array(),
-            inertia: properties.inertia,
-            ..Self::empty()
-        }
-    }
-}
+told! { MassProperties => sinew_mass_properties { mass, center_of_mass, inertia } }
 
 /// Writes the mass properties of a tool of a density [kg/m^3], above 0; `out` sets struct_size.
 ///

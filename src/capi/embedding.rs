@@ -6,7 +6,7 @@ use super::body::{sinew_body_id, sinew_vec3_view};
 use super::cut::sinew_triangle_view;
 use super::definition::sinew_body_def;
 use super::guard::{destroy, guard, sinew_world, with_world, with_world_mut};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, versioned};
 use super::status::sinew_status;
 use crate::embedding::{Embedding, EmbeddingDefinition};
 
@@ -42,8 +42,7 @@ pub struct sinew_embedding_def {
     pub tetrahedron_count: usize,
 }
 
-// SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
-unsafe impl Versioned for sinew_embedding_def {}
+versioned! { sinew_embedding_def }
 
 impl sinew_embedding_def {
     /// # Safety

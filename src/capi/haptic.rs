@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 
 use super::body::sinew_body_id;
 use super::guard::{destroy, guard, sinew_world, with_world_mut};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, versioned};
 use super::status::sinew_status;
 use super::tool::sinew_tool_id;
 use crate::base::ToolId;
@@ -102,11 +102,7 @@ pub struct sinew_haptic_contact {
     pub force: [f32; 3],
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_haptic_def {}
-
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_haptic_report {}
+versioned! { sinew_haptic_def, sinew_haptic_report }
 
 impl sinew_haptic_def {
     fn defaults() -> Self {

@@ -3,7 +3,7 @@
 use std::ffi::c_char;
 
 use super::guard::guard;
-use super::memory::{self, Versioned};
+use super::memory::{self, versioned};
 use super::status::sinew_status;
 use crate::base::Error;
 use crate::material::presets::PRESETS;
@@ -43,8 +43,7 @@ pub struct sinew_material_preset {
     pub density: f32,
 }
 
-// SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
-unsafe impl Versioned for sinew_material_preset {}
+versioned! { sinew_material_preset }
 
 /// Writes the material values of a tissue.
 ///

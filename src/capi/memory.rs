@@ -31,6 +31,35 @@ pub(super) unsafe trait Versioned: Copy {
     }
 }
 
+/// Makes structs [`Versioned`] that have the size that they had at first.
+///
+/// Who lists a struct vouches that it is `repr(C)` and has numbers and pointers alone. A function among them is what the caller
+/// says it is.
+macro_rules! versioned {
+    ($($name:ident),+) => { $(
+        const _: () = assert!(std::mem::offset_of!($name, struct_size) == 0);
+
+        // SAFETY: as vouched for, with `struct_size` first.
+        unsafe impl $crate::capi::memory::Versioned for $name {}
+    )+ };
+}
+pub(super) use versioned;
+
+/// Makes of a value of ours what C is told of it, field by field under the same names.
+macro_rules! told {
+    ($ours:ty => $c:ident { $($field:ident),+ }) => {
+        impl From<$ours> for $c {
+            fn from(ours: $ours) -> Self {
+                Self {
+                    struct_size: size_of::<Self>(),
+                    $($field: ours.$field.into()),+
+                }
+            }
+        }
+    };
+}
+pub(super) use told;
+
 /// The value that `pointer` points to.
 ///
 /// # Safety
@@ -308,6 +337,16 @@ pub(super) unsafe fn report<T: Versioned>(name: &str, pointer: *mut T) -> Result
     let size = unsafe { pointer.cast::<usize>().read_unaligned() };
     known_size::<T>(&format_args!("{name}->struct_size"), size)?;
     Ok(Report { pointer, size })
+}
+
+/// Writes a result struct.
+///
+/// # Safety
+/// As [`report`].
+pub(super) unsafe fn write_report<T: Versioned>(name: &str, pointer: *mut T, value: T) -> Result<()> {
+    // SAFETY: the same contract.
+    unsafe { report(name, pointer)?.fill(value) };
+    Ok(())
 }
 
 /// A result struct that may be left out.

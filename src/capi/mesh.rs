@@ -234,8 +234,7 @@ pub unsafe extern "C" fn sinew_mesh_create_organ(length: f32, spacing: f32, out:
 pub unsafe extern "C" fn sinew_mesh_get_view(mesh: *const sinew_mesh, out: *mut sinew_mesh_view) -> sinew_status {
     guard(|| {
         let mesh = memory::reference("mesh", mesh)?;
-        memory::report("out", out)?.fill(sinew_mesh_view::of(mesh));
-        Ok(())
+        memory::write_report("out", out, sinew_mesh_view::of(mesh))
     })
 }
 

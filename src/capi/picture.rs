@@ -5,7 +5,7 @@ use std::ffi::c_char;
 
 use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, versioned};
 use super::status::sinew_status;
 use crate::base::{Error, Result};
 use crate::picture::{BodyValues, PictureDefinition};
@@ -35,8 +35,7 @@ pub struct sinew_picture_def {
     pub show_contacts: u32,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_picture_def {}
+versioned! { sinew_picture_def }
 
 impl sinew_picture_def {
     fn defaults() -> Self {

@@ -1,7 +1,7 @@
 //! What the stages of a step took.
 
 use super::guard::{sinew_world, with_world, with_world_mut};
-use super::memory::{self, Versioned};
+use super::memory::{self, told, versioned};
 use super::status::sinew_status;
 use crate::base::Error;
 use crate::world::StepProfile;
@@ -50,33 +50,12 @@ pub struct sinew_profile {
     pub tissue_contacts: u64,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_profile {}
+versioned! { sinew_profile }
 
-impl From<StepProfile> for sinew_profile {
-    fn from(profile: StepProfile) -> Self {
-        Self {
-            struct_size: size_of::<Self>(),
-            step: profile.step,
-            plan: profile.plan,
-            forces: profile.forces,
-            solver: profile.solver,
-            broad_phase: profile.broad_phase,
-            narrow_phase: profile.narrow_phase,
-            contact_solver: profile.contact_solver,
-            publish: profile.publish,
-            cutting: profile.cutting,
-            bodies: profile.bodies,
-            sleeping_bodies: profile.sleeping_bodies,
-            tries: profile.tries,
-            substeps: profile.substeps,
-            iterations: profile.iterations,
-            candidates: profile.candidates,
-            tool_contacts: profile.tool_contacts,
-            tissue_contacts: profile.tissue_contacts,
-        }
-    }
-}
+told! { StepProfile => sinew_profile {
+    step, plan, forces, solver, broad_phase, narrow_phase, contact_solver, publish, cutting, bodies, sleeping_bodies,
+    tries, substeps, iterations, candidates, tool_contacts, tissue_contacts
+} }
 
 /// Turns the profile of each step on (1) or off (0, the default).
 ///

@@ -2,7 +2,7 @@
 
 use super::body::sinew_body_id;
 use super::guard::{sinew_world, with_world};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, versioned};
 use super::status::sinew_status;
 use super::tool::sinew_tool_id;
 use crate::def::CollisionFilter;
@@ -28,8 +28,7 @@ pub struct sinew_surface_point {
     pub distance: f32,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_surface_point {}
+versioned! { sinew_surface_point }
 
 impl From<Option<SurfaceHit>> for sinew_surface_point {
     fn from(found: Option<SurfaceHit>) -> Self {
@@ -106,8 +105,7 @@ pub struct sinew_ray_hit {
     pub distance: f32,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_ray_hit {}
+versioned! { sinew_ray_hit }
 
 impl From<Option<RayHit>> for sinew_ray_hit {
     fn from(hit: Option<RayHit>) -> Self {

@@ -3,7 +3,7 @@
 use super::body::{sinew_body_id, sinew_vec3_view};
 use super::cut::sinew_triangle_view;
 use super::guard::{destroy, guard, sinew_world, with_world_mut};
-use super::memory::{self, Versioned};
+use super::memory::{self, versioned};
 use super::status::sinew_status;
 use crate::readers::BodyReader;
 
@@ -41,8 +41,7 @@ pub struct sinew_frame {
     pub is_over: u32,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers and pointers alone.
-unsafe impl Versioned for sinew_frame {}
+versioned! { sinew_frame }
 
 /// Creates a reader of a body; destroy it with sinew_reader_destroy.
 ///

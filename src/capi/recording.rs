@@ -5,7 +5,7 @@ use std::path::Path;
 use std::ffi::c_char;
 
 use super::guard::{guard, sinew_world, with_world_mut};
-use super::memory::{self, Versioned};
+use super::memory::{self, versioned};
 use super::status::sinew_status;
 use crate::world::{ReplayReport, World};
 
@@ -27,8 +27,7 @@ pub struct sinew_replay_report {
     pub is_cut_short: u32,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_replay_report {}
+versioned! { sinew_replay_report }
 
 impl From<ReplayReport> for sinew_replay_report {
     fn from(report: ReplayReport) -> Self {

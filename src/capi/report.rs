@@ -5,9 +5,9 @@ use std::mem::offset_of;
 use super::body::{sinew_body_id, with_body};
 use super::definition::{SINEW_SOLVER_IMPLICIT, SINEW_SOLVER_NEWTON, SINEW_SOLVER_VERLET};
 use super::guard::{sinew_world, with_world};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, told, versioned};
 use super::status::sinew_status;
-use crate::def::Solver;
+use crate::def::{EnclosedReport, Energy, Solver, StorageReport};
 
 /// Energy of a body [J] at the time of the positions.
 #[repr(C)]
@@ -81,14 +81,13 @@ pub struct sinew_enclosed_report {
     pub pressure: f64,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_energy {}
+versioned! { sinew_energy, sinew_storage_report, sinew_enclosed_report }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_storage_report {}
+told! { EnclosedReport => sinew_enclosed_report { cavity_count, volume, rest_volume, pressure } }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_enclosed_report {}
+told! { StorageReport => sinew_storage_report { node_count, spring_count, bytes_used, bytes_reserved } }
+
+told! { Energy => sinew_energy { kinetic, elastic, gravitational } }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_solver_report {
@@ -108,13 +107,7 @@ pub unsafe extern "C" fn sinew_body_get_energy(
 ) -> sinew_status {
     with_world(world, |world| {
         let energy = world.body(body.id())?.energy(world.gravity());
-        memory::report("out", out)?.fill(sinew_energy {
-            struct_size: size_of::<sinew_energy>(),
-            kinetic: energy.kinetic,
-            elastic: energy.elastic,
-            gravitational: energy.gravitational,
-        });
-        Ok(())
+        memory::write_report("out", out, energy.into())
     })
 }
 
@@ -126,15 +119,7 @@ pub unsafe extern "C" fn sinew_body_get_storage_report(
     out: *mut sinew_storage_report,
 ) -> sinew_status {
     with_body(world, body, |body| {
-        let report = body.storage_report();
-        memory::report("out", out)?.fill(sinew_storage_report {
-            struct_size: size_of::<sinew_storage_report>(),
-            node_count: report.node_count,
-            spring_count: report.spring_count,
-            bytes_used: report.bytes_used,
-            bytes_reserved: report.bytes_reserved,
-        });
-        Ok(())
+        memory::write_report("out", out, body.storage_report().into())
     })
 }
 
@@ -147,7 +132,7 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
 ) -> sinew_status {
     with_body(world, body, |body| {
         let (report, choice) = (body.solver_report(), body.solver_choice());
-        memory::report("out", out)?.fill(sinew_solver_report {
+        let filled = sinew_solver_report {
             struct_size: size_of::<sinew_solver_report>(),
             iterations: report.iterations,
             error: report.error,
@@ -161,8 +146,8 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
             },
             auto_substeps: choice.substeps,
             auto_step: choice.step,
-        });
-        Ok(())
+        };
+        memory::write_report("out", out, filled)
     })
 }
 
@@ -174,14 +159,6 @@ pub unsafe extern "C" fn sinew_body_get_enclosed_report(
     out: *mut sinew_enclosed_report,
 ) -> sinew_status {
     with_body(world, body, |body| {
-        let report = body.enclosed();
-        memory::report("out", out)?.fill(sinew_enclosed_report {
-            struct_size: size_of::<sinew_enclosed_report>(),
-            cavity_count: report.cavity_count,
-            volume: report.volume,
-            rest_volume: report.rest_volume,
-            pressure: report.pressure,
-        });
-        Ok(())
+        memory::write_report("out", out, body.enclosed().into())
     })
 }

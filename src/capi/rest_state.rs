@@ -2,9 +2,9 @@
 
 use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world_mut};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, told, versioned};
 use super::status::sinew_status;
-use crate::solver::RestStateDefinition;
+use crate::solver::{RestStateDefinition, RestStateReport};
 
 /// Settings of the search for static equilibrium, filled by sinew_equilibrium_def_init.
 #[repr(C)]
@@ -38,11 +38,9 @@ pub struct sinew_equilibrium_report {
     pub energy_after: f64,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_equilibrium_def {}
+versioned! { sinew_equilibrium_def, sinew_equilibrium_report }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_equilibrium_report {}
+told! { RestStateReport => sinew_equilibrium_report { iterations, products, residual, error, energy_before, energy_after } }
 
 /// Fills a definition with its defaults; `struct_size` is sizeof(sinew_equilibrium_def).
 #[unsafe(no_mangle)]
@@ -77,15 +75,7 @@ pub unsafe extern "C" fn sinew_body_solve_equilibrium(
             },
         )?;
         if let Some(out) = out {
-            out.fill(sinew_equilibrium_report {
-                struct_size: size_of::<sinew_equilibrium_report>(),
-                iterations: found.iterations,
-                products: found.products,
-                residual: found.residual,
-                error: found.error,
-                energy_before: found.energy_before,
-                energy_after: found.energy_after,
-            });
+            out.fill(found.into());
         }
         Ok(())
     })

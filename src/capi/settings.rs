@@ -2,7 +2,7 @@
 
 use super::body::{sinew_body_id, with_body, with_body_mut};
 use super::guard::{sinew_world, with_world, with_world_mut};
-use super::memory::{self, Versioned};
+use super::memory::{self, versioned};
 use super::status::sinew_status;
 use crate::def::{BodySettings, Sleep};
 
@@ -52,8 +52,7 @@ pub struct sinew_body_settings {
     pub sleep_time: f32,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_body_settings {}
+versioned! { sinew_body_settings }
 
 impl From<BodySettings> for sinew_body_settings {
     fn from(settings: BodySettings) -> Self {
@@ -107,8 +106,7 @@ pub unsafe extern "C" fn sinew_body_get_settings(
     out: *mut sinew_body_settings,
 ) -> sinew_status {
     with_body(world, body, |body| {
-        memory::report("out", out)?.fill(body.settings().into());
-        Ok(())
+        memory::write_report("out", out, body.settings().into())
     })
 }
 

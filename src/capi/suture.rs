@@ -2,11 +2,11 @@
 
 use super::attachment::sinew_attachment_id;
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, told, versioned};
 use super::query::sinew_surface_point;
 use super::status::sinew_status;
 use crate::def::{Anchor, SurfacePoint};
-use crate::world::SutureDefinition;
+use crate::world::{SutureDefinition, SutureReport};
 
 /// Settings of a suture, filled by sinew_suture_def_init.
 #[repr(C)]
@@ -36,11 +36,9 @@ pub struct sinew_suture_report {
     pub energy: f64,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_suture_def {}
+versioned! { sinew_suture_def, sinew_suture_report }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_suture_report {}
+told! { SutureReport => sinew_suture_report { length, distance, energy } }
 
 impl sinew_suture_def {
     fn defaults() -> Self {
@@ -125,13 +123,7 @@ pub unsafe extern "C" fn sinew_suture_get_report(
 ) -> sinew_status {
     with_world(world, |world| {
         let out = memory::report("out_report", out_report)?;
-        let found = world.suture_report(suture.id())?;
-        out.fill(sinew_suture_report {
-            struct_size: size_of::<sinew_suture_report>(),
-            length: found.length,
-            distance: found.distance,
-            energy: found.energy,
-        });
+        out.fill(world.suture_report(suture.id())?.into());
         Ok(())
     })
 }

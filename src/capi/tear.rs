@@ -2,9 +2,9 @@
 
 use super::body::{sinew_body_id, with_body, with_body_mut};
 use super::guard::sinew_world;
-use super::memory::{self, Versioned};
+use super::memory::{self, told, versioned};
 use super::status::sinew_status;
-use crate::def::Values;
+use crate::def::{TearReport, Values};
 
 /// Report of the tears in the last step; all 0 for a body that does not tear.
 ///
@@ -26,8 +26,9 @@ pub struct sinew_tear_report {
     pub no_room: u32,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_tear_report {}
+versioned! { sinew_tear_report }
+
+told! { TearReport => sinew_tear_report { tears, pieces_parted, waiting, small_pieces, no_room } }
 
 /// Writes which tears the last step of a body made or refused.
 #[unsafe(no_mangle)]
@@ -37,16 +38,7 @@ pub unsafe extern "C" fn sinew_body_get_tear_report(
     out: *mut sinew_tear_report,
 ) -> sinew_status {
     with_body(world, body, |body| {
-        let report = body.tear_report();
-        memory::report("out", out)?.fill(sinew_tear_report {
-            struct_size: size_of::<sinew_tear_report>(),
-            tears: report.tears,
-            pieces_parted: report.pieces_parted,
-            waiting: report.waiting,
-            small_pieces: report.small_pieces,
-            no_room: report.no_room,
-        });
-        Ok(())
+        memory::write_report("out", out, body.tear_report().into())
     })
 }
 

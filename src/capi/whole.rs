@@ -73,8 +73,7 @@ pub unsafe extern "C" fn sinew_body_def_set_mesh(def: *mut sinew_body_def, mesh:
             )));
         }
         changed.take_mesh(&view);
-        memory::report("def", def)?.fill(changed);
-        Ok(())
+        memory::write_report("def", def, changed)
     })
 }
 
