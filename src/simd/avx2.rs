@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::Lanes;
 use super::Record;
-use super::lanes::{common_instructions, instructions, twice};
+use super::lanes::{Index, common_instructions, instructions, twice};
 use super::link_batches::{EightLinks, Sight};
 
 #[derive(Clone, Copy)]
@@ -82,13 +82,8 @@ impl Lanes for Avx2Lanes {
     );
 
     #[inline(always)]
-    unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
+    unsafe fn gather<I: Index>(base: *const f32, indices: *const I) -> Self {
         unsafe { Self(eight(four_at(base, indices), four_at(base, indices.add(4)))) }
-    }
-
-    #[inline(always)]
-    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
-        unsafe { Self(eight(four_near(base, indices), four_near(base, indices.add(4)))) }
     }
 
     #[inline(always)]
@@ -243,30 +238,15 @@ unsafe fn four(a: *const f32, b: *const f32, c: *const f32, d: *const f32) -> __
 
 /// The numbers at four indices.
 #[inline(always)]
-pub(super) unsafe fn four_at(base: *const f32, indices: *const u32) -> __m128 {
+pub(super) unsafe fn four_at<I: Index>(base: *const f32, indices: *const I) -> __m128 {
     // SAFETY: the same contract; the indices may be read.
     unsafe {
-        let [a, b, c, d] = indices.cast::<[u32; 4]>().read();
+        let [a, b, c, d] = indices.cast::<[I; 4]>().read();
         four(
-            base.wrapping_add(a as usize),
-            base.wrapping_add(b as usize),
-            base.wrapping_add(c as usize),
-            base.wrapping_add(d as usize),
-        )
-    }
-}
-
-/// The numbers at four small indices.
-#[inline(always)]
-pub(super) unsafe fn four_near(base: *const f32, indices: *const u16) -> __m128 {
-    // SAFETY: the same contract.
-    unsafe {
-        let [a, b, c, d] = indices.cast::<[u16; 4]>().read();
-        four(
-            base.wrapping_add(usize::from(a)),
-            base.wrapping_add(usize::from(b)),
-            base.wrapping_add(usize::from(c)),
-            base.wrapping_add(usize::from(d)),
+            base.wrapping_add(a.place()),
+            base.wrapping_add(b.place()),
+            base.wrapping_add(c.place()),
+            base.wrapping_add(d.place()),
         )
     }
 }

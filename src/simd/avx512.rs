@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use super::Lanes;
 use super::Record;
-use super::avx2::{Avx2Lanes, add_record, four_at, four_near, pulls_by_newton, record};
-use super::lanes::{common_instructions, instructions};
+use super::avx2::{Avx2Lanes, add_record, four_at, pulls_by_newton, record};
+use super::lanes::{Index, common_instructions, instructions};
 use super::link_batches::{EightLinks, Sight};
 
 #[derive(Clone, Copy)]
@@ -28,25 +28,13 @@ impl Lanes for Avx512Lanes {
     );
 
     #[inline(always)]
-    unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
+    unsafe fn gather<I: Index>(base: *const f32, indices: *const I) -> Self {
         unsafe {
             Self(sixteen(
                 four_at(base, indices),
                 four_at(base, indices.add(4)),
                 four_at(base, indices.add(8)),
                 four_at(base, indices.add(12)),
-            ))
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
-        unsafe {
-            Self(sixteen(
-                four_near(base, indices),
-                four_near(base, indices.add(4)),
-                four_near(base, indices.add(8)),
-                four_near(base, indices.add(12)),
             ))
         }
     }

@@ -6,6 +6,25 @@ use super::Record;
 
 use super::link_batches::{EightLinks, Sight, pull_one_by_one};
 
+/// What an index is kept as.
+pub(crate) trait Index: Copy {
+    fn place(self) -> usize;
+}
+
+impl Index for u32 {
+    #[inline(always)]
+    fn place(self) -> usize {
+        self as usize
+    }
+}
+
+impl Index for u16 {
+    #[inline(always)]
+    fn place(self) -> usize {
+        self.into()
+    }
+}
+
 /// A few `f32` side by side, and what the spring kernel does with them.
 ///
 /// # Safety
@@ -25,27 +44,16 @@ pub(crate) trait Lanes: Copy {
     unsafe fn store(self, to: *mut f32);
 
     /// `base[indices[lane]]` for `COUNT` readable indices that are all less than 2^31 and lead to readable numbers.
-    unsafe fn gather(base: *const f32, indices: *const u32) -> Self;
-
-    /// The same with small indices.
-    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self;
+    unsafe fn gather<I: Index>(base: *const f32, indices: *const I) -> Self;
 
     /// The four numbers of the readable record at `at(lane)`, for each of `COUNT` lanes.
     unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4];
 
     /// The three numbers of `base[indices[lane]]` for `COUNT` readable indices that lead to readable records.
     #[inline(always)]
-    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
+    unsafe fn records<I: Index>(base: *const Record, indices: *const I) -> [Self; 3] {
         // SAFETY: the caller's promise.
-        let [x, y, z, _] = unsafe { Self::transposed(|lane| base.wrapping_add(indices.add(lane).read() as usize)) };
-        [x, y, z]
-    }
-
-    /// The same with small indices.
-    #[inline(always)]
-    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
-        // SAFETY: the caller's promise.
-        let [x, y, z, _] = unsafe { Self::transposed(|lane| base.wrapping_add(indices.add(lane).read().into())) };
+        let [x, y, z, _] = unsafe { Self::transposed(|lane| base.wrapping_add(indices.add(lane).read().place())) };
         [x, y, z]
     }
 

@@ -15,7 +15,7 @@ mod prefetch;
 mod range;
 mod real;
 
-pub(crate) use lanes::Lanes;
+pub(crate) use lanes::{Index, Lanes};
 pub(crate) use link_batches::{EightLinks, Eights, Sight, WithEights};
 pub(crate) use prefetch::prefetch;
 pub(crate) use range::Range;

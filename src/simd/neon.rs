@@ -4,7 +4,7 @@ use std::arch::aarch64::*;
 
 use super::Lanes;
 use super::Record;
-use super::lanes::{common_instructions, instructions};
+use super::lanes::{Index, common_instructions, instructions};
 
 #[derive(Clone, Copy)]
 pub(super) struct NeonLanes(float32x4_t);
@@ -26,15 +26,8 @@ impl Lanes for NeonLanes {
     common_instructions!(vdupq_n_f32, vld1q_f32, vst1q_f32, vminnmq_f32, vmaxnmq_f32);
 
     #[inline(always)]
-    unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
-        let values: [f32; 4] = std::array::from_fn(|lane| unsafe { *base.wrapping_add(*indices.add(lane) as usize) });
-        Self(unsafe { vld1q_f32(values.as_ptr()) })
-    }
-
-    #[inline(always)]
-    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
-        let values: [f32; 4] =
-            std::array::from_fn(|lane| unsafe { *base.wrapping_add(usize::from(*indices.add(lane))) });
+    unsafe fn gather<I: Index>(base: *const f32, indices: *const I) -> Self {
+        let values: [f32; 4] = std::array::from_fn(|lane| unsafe { *base.wrapping_add((*indices.add(lane)).place()) });
         Self(unsafe { vld1q_f32(values.as_ptr()) })
     }
 

@@ -4,6 +4,7 @@ use std::array::from_fn;
 
 use super::Lanes;
 use super::Record;
+use super::lanes::Index;
 
 #[derive(Clone, Copy)]
 pub(super) struct PortableLanes([f32; 4]);
@@ -29,18 +30,10 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
+    unsafe fn gather<I: Index>(base: *const f32, indices: *const I) -> Self {
         // SAFETY: the caller's promise.
         Self(from_fn(|lane| unsafe {
-            *base.wrapping_add(*indices.add(lane) as usize)
-        }))
-    }
-
-    #[inline(always)]
-    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
-        // SAFETY: the caller's promise.
-        Self(from_fn(|lane| unsafe {
-            *base.wrapping_add(usize::from(*indices.add(lane)))
+            *base.wrapping_add((*indices.add(lane)).place())
         }))
     }
 

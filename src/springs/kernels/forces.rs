@@ -9,10 +9,10 @@ use std::marker::PhantomData;
 use glam::Vec3;
 
 use super::columns::Columns;
-use super::layout::{ColumnEnds, RunColumn, SpringMaterial};
+use super::layout::{ColumnEnds, GatherColumn, RunColumn, SpringMaterial};
 use super::quantities::{Change, Force, HalfEnergy, LinkColumn, NodePlaces, Quantity, SpringLanes, Ways, difference};
 use crate::order::LANES;
-use crate::simd::{ChosenKernel, Lanes, WithLanes, prefetch};
+use crate::simd::{ChosenKernel, Index, Lanes, WithLanes, prefetch};
 use crate::soa::{Places, TileForces, Vectors, View};
 use crate::springs::{Course, Link, Motion, Tangent};
 
@@ -171,6 +171,13 @@ impl<Q: Quantity> WithLanes for TileLinks<'_, Q> {
     }
 }
 
+/// Columns of gathers, each with its indices, which count from the window.
+struct Gathers<'a, I> {
+    headers: &'a [GatherColumn],
+    indices: *const [I; LANES],
+    window: usize,
+}
+
 /// The forces on some nodes side by side; NaN where a spring's ends coincide.
 #[derive(Clone, Copy)]
 struct ForceLanes<L>([L; 3]);
@@ -252,57 +259,74 @@ impl KernelTile<'_> {
                 };
                 sums.add::<1, Q>(here, [links], &self.tangent);
             }
-            // The neighbours of a column are fetched before what the one before it adds up to: that is a long chain of operations,
-            // each of which waits for the last, and the processor looks no more than a column or two ahead for other work.
-            if start.near < end.near {
-                let mut links = self.near::<L, Q>(start.near as usize, &mut own, lane);
-                for near in start.near as usize + 1..end.near as usize {
-                    let next = self.near::<L, Q>(near, &mut own, lane);
-                    sums.add::<1, Q>(here, [links], &self.tangent);
-                    links = next;
-                }
-                sums.add::<1, Q>(here, [links], &self.tangent);
-            }
-            if start.far < end.far {
-                let mut links = self.far::<L, Q>(start.far as usize, &mut own, lane);
-                for far in start.far as usize + 1..end.far as usize {
-                    let next = self.far::<L, Q>(far, &mut own, lane);
-                    sums.add::<1, Q>(here, [links], &self.tangent);
-                    links = next;
-                }
-                sums.add::<1, Q>(here, [links], &self.tangent);
-            }
+            let near = Gathers {
+                headers: columns.near.get_unchecked(start.near as usize..end.near as usize),
+                indices: columns
+                    .near_indices
+                    .as_ptr()
+                    .cast::<[u16; LANES]>()
+                    .add(start.near as usize),
+                window: columns.window,
+            };
+            self.add_gathers::<L, Q, u16>(near, here, &mut own, lane, &mut sums);
+            let far = Gathers {
+                headers: columns.far.get_unchecked(start.far as usize..end.far as usize),
+                indices: columns
+                    .far_indices
+                    .as_ptr()
+                    .cast::<[u32; LANES]>()
+                    .add(start.far as usize),
+                window: 0,
+            };
+            self.add_gathers::<L, Q, u32>(far, here, &mut own, lane, &mut sums);
             sums
         }
     }
 
-    /// A gather with small indices.
+    /// Adds gathers to `sums`.
     #[inline(always)]
-    unsafe fn near<L: Lanes, Q: Quantity>(&self, near: usize, own: &mut usize, lane: usize) -> LinkColumn<L> {
-        let columns = self.columns;
+    unsafe fn add_gathers<L: Lanes, Q: Quantity, I: Index>(
+        &self,
+        gathers: Gathers<I>,
+        here: NodePlaces<L>,
+        own: &mut usize,
+        lane: usize,
+        sums: &mut ForceLanes<L>,
+    ) {
+        let count = gathers.headers.len();
+        if count == 0 {
+            return;
+        }
         // SAFETY: as in `others`.
         unsafe {
-            let header = columns.near.get_unchecked(near);
-            let indices = columns.near_indices.get_unchecked(near).0.as_ptr().add(lane);
-            LinkColumn {
-                spring: self.spring::<L, Q>(header.material(), own, lane),
-                there: self.gathered_near::<L, Q>(indices),
-                lanes: u32::from(header.lanes) >> lane,
+            // The neighbours of a column are fetched before what the one before it adds up to: that is a long chain of operations,
+            // each of which waits for the last, and the processor looks no more than a column or two ahead for other work.
+            let mut links = self.gather_column::<L, Q, I>(&gathers, 0, own, lane);
+            for column in 1..count {
+                let next = self.gather_column::<L, Q, I>(&gathers, column, own, lane);
+                sums.add::<1, Q>(here, [links], &self.tangent);
+                links = next;
             }
+            sums.add::<1, Q>(here, [links], &self.tangent);
         }
     }
 
-    /// A gather with indices of any size.
+    /// One of some gathers.
     #[inline(always)]
-    unsafe fn far<L: Lanes, Q: Quantity>(&self, far: usize, own: &mut usize, lane: usize) -> LinkColumn<L> {
-        let columns = self.columns;
+    unsafe fn gather_column<L: Lanes, Q: Quantity, I: Index>(
+        &self,
+        gathers: &Gathers<I>,
+        column: usize,
+        own: &mut usize,
+        lane: usize,
+    ) -> LinkColumn<L> {
         // SAFETY: as in `others`.
         unsafe {
-            let header = columns.far.get_unchecked(far);
-            let indices = columns.far_indices.get_unchecked(far).0.as_ptr().add(lane);
+            let header = gathers.headers.get_unchecked(column);
+            let indices = gathers.indices.add(column).cast::<I>().add(lane);
             LinkColumn {
                 spring: self.spring::<L, Q>(header.material(), own, lane),
-                there: self.gathered::<L, Q>(indices),
+                there: self.gathered::<L, Q, I>(indices, gathers.window),
                 lanes: u32::from(header.lanes) >> lane,
             }
         }
@@ -318,8 +342,8 @@ impl KernelTile<'_> {
             let lane = part * L::COUNT;
             // SAFETY: strays were checked to lead to nodes of the body.
             unsafe {
-                let here = self.gathered::<L, Q>(batch.nodes.as_ptr().add(lane));
-                let there = self.gathered::<L, Q>(batch.neighbours.as_ptr().add(lane));
+                let here = self.gathered::<L, Q, u32>(batch.nodes.as_ptr().add(lane), 0);
+                let there = self.gathered::<L, Q, u32>(batch.neighbours.as_ptr().add(lane), 0);
                 let stiffness = L::load(batch.stiffnesses.0.as_ptr().add(lane));
                 let rest_length = L::load(batch.rest_lengths.0.as_ptr().add(lane));
                 let spring = SpringLanes {
@@ -383,33 +407,16 @@ impl KernelTile<'_> {
         }
     }
 
-    /// The nodes with these numbers.
-    #[inline(always)]
-    unsafe fn gathered<L: Lanes, Q: Quantity>(&self, indices: *const u32) -> NodePlaces<L> {
-        // SAFETY: the numbers were checked to be those of nodes.
-        unsafe {
-            let position = gather(self.positions, indices);
-            match self.seconds {
-                Some(seconds) if Q::SECOND => NodePlaces {
-                    position,
-                    second: gather(seconds, indices),
-                },
-                _ => NodePlaces::still(position),
-            }
-        }
-    }
-
     /// The nodes with these numbers, counted from the window.
     #[inline(always)]
-    unsafe fn gathered_near<L: Lanes, Q: Quantity>(&self, indices: *const u16) -> NodePlaces<L> {
-        let window = self.columns.window;
-        // SAFETY: as in `gathered`.
+    unsafe fn gathered<L: Lanes, Q: Quantity, I: Index>(&self, indices: *const I, window: usize) -> NodePlaces<L> {
+        // SAFETY: the numbers were checked to be those of nodes.
         unsafe {
-            let position = gather_near(self.positions, window, indices);
+            let position = gather(self.positions, window, indices);
             match self.seconds {
                 Some(seconds) if Q::SECOND => NodePlaces {
                     position,
-                    second: gather_near(seconds, window, indices),
+                    second: gather(seconds, window, indices),
                 },
                 _ => NodePlaces::still(position),
             }
@@ -511,34 +518,19 @@ impl<L: Lanes> ForceLanes<L> {
     }
 }
 
-/// The vectors of the nodes with these numbers.
+/// The vectors of the nodes with these numbers, counted from the window.
 #[inline(always)]
-unsafe fn gather<L: Lanes>(places: Places, indices: *const u32) -> [L; 3] {
+unsafe fn gather<L: Lanes, I: Index>(places: Places, window: usize, indices: *const I) -> [L; 3] {
     // SAFETY: the numbers were checked to be those of nodes.
     unsafe {
         match places.records {
-            Some(records) => L::records(records, indices),
-            None => {
-                let [x, y, z] = places.axes;
-                [L::gather(x, indices), L::gather(y, indices), L::gather(z, indices)]
-            }
-        }
-    }
-}
-
-/// The vectors of the nodes with these numbers, counted from the window.
-#[inline(always)]
-unsafe fn gather_near<L: Lanes>(places: Places, window: usize, indices: *const u16) -> [L; 3] {
-    // SAFETY: the same.
-    unsafe {
-        match places.records {
-            Some(records) => L::records_near(records.wrapping_add(window), indices),
+            Some(records) => L::records(records.wrapping_add(window), indices),
             None => {
                 let [x, y, z] = places.axes;
                 [
-                    L::gather_near(x.wrapping_add(window), indices),
-                    L::gather_near(y.wrapping_add(window), indices),
-                    L::gather_near(z.wrapping_add(window), indices),
+                    L::gather(x.wrapping_add(window), indices),
+                    L::gather(y.wrapping_add(window), indices),
+                    L::gather(z.wrapping_add(window), indices),
                 ]
             }
         }
