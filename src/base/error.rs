@@ -51,11 +51,14 @@ pub enum Error {
 /// ```
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Refuses an argument unless this holds, with a message as of `format!`.
+/// Refuses an argument unless this holds, with a message as of `format!`, or fails with an error.
 macro_rules! ensure {
-    ($holds:expr, $($message:tt)+) => {
+    ($holds:expr, $format:literal $($arguments:tt)*) => {
+        $crate::base::ensure!($holds, $crate::base::Error::invalid(format!($format $($arguments)*)))
+    };
+    ($holds:expr, $error:expr $(,)?) => {
         if !$holds {
-            return Err($crate::base::Error::invalid(format!($($message)+)));
+            return Err($error);
         }
     };
 }

@@ -1,6 +1,6 @@
 //! What cuts have changed, in order, for renderers that follow.
 
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, ensure};
 use crate::codec::saved;
 use crate::cutting::Changes;
 
@@ -193,9 +193,7 @@ impl ChangeLog {
     /// What came after a version.
     pub fn since(&self, version: u64) -> Result<TopologyChanges<'_>> {
         let now = self.version();
-        if version > now {
-            return Err(to_come(version, now));
-        }
+        ensure!(version <= now, to_come(version, now));
         let from = usize::try_from(version)
             .ok()
             .and_then(|version| self.versions.get(version));
@@ -212,9 +210,7 @@ impl ChangeLog {
 
 /// What there is of a body that cannot be cut.
 pub(super) fn unchanged(version: u64) -> Result<TopologyChanges<'static>> {
-    if version > 0 {
-        return Err(to_come(version, 0));
-    }
+    ensure!(version == 0, to_come(version, 0));
     Ok(TopologyChanges {
         version,
         nodes: &[],

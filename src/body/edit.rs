@@ -297,9 +297,7 @@ impl Body {
             // Rings of fewer tetrahedra have other pressures, of which nothing was deformed.
             self.system.forces.measure_anew(self.system.state.positions());
         }
-        if link.is_none() && removed == 0 {
-            return Err(not_joined(a, b));
-        }
+        ensure!(link.is_some() || removed > 0, not_joined(a, b));
         self.system.is_cut_open = self.system.is_cut_open || self.has_on_surface(a, b);
         Ok(())
     }

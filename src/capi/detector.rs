@@ -171,11 +171,12 @@ impl sinew_detector_def {
 
     fn detector(&self, world: &World) -> Result<sinew_detector> {
         let method = detection("detection", self.detection)?;
-        if method == Detection::DistanceField {
-            return Err(Error::Unsupported(
+        ensure!(
+            method != Detection::DistanceField,
+            Error::Unsupported(
                 "detection is SINEW_DETECTION_DISTANCE_FIELD: that is for rigid tools, not for bodies".into(),
-            ));
-        }
+            )
+        );
         let image = self.image()?;
         let [a, b] = self.bodies.map(sinew_body_id::id);
         ensure!(

@@ -262,9 +262,7 @@ pub(super) unsafe fn optional_orientation(name: &str, pointer: *const f32) -> Re
 /// # Safety
 /// `pointer` is NULL or points to bytes that end with NUL.
 pub(super) unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a str> {
-    if pointer.is_null() {
-        return Err(null(name));
-    }
+    ensure!(!pointer.is_null(), null(name));
     // SAFETY: not NULL; the caller vouches for the NUL at its end.
     let text = unsafe { CStr::from_ptr(pointer) };
     text.to_str()
@@ -277,9 +275,7 @@ pub(super) unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a 
 /// # Safety
 /// `pointer` is NULL or points to a T of the size that its `struct_size` states.
 pub(super) unsafe fn definition<T: Versioned>(name: &str, pointer: *const T, defaults: T) -> Result<T> {
-    if pointer.is_null() {
-        return Err(null(name));
-    }
+    ensure!(!pointer.is_null(), null(name));
     // SAFETY: `struct_size` is the first field of every `Versioned`.
     let size = unsafe { pointer.cast::<usize>().read_unaligned() };
     known_size::<T>(&format_args!("{name}->struct_size"), size)?;
@@ -308,9 +304,7 @@ pub(super) unsafe fn optional_definition<T: Versioned>(name: &str, pointer: *con
 /// # Safety
 /// `pointer` is NULL or points to `size` writable bytes.
 pub(super) unsafe fn initialise<T: Versioned>(pointer: *mut T, size: usize, mut defaults: T) -> Result<()> {
-    if pointer.is_null() {
-        return Err(null("def"));
-    }
+    ensure!(!pointer.is_null(), null("def"));
     known_size::<T>(&"struct_size", size)?;
     // SAFETY: `struct_size` is the first field of every `Versioned`.
     unsafe { (&raw mut defaults).cast::<usize>().write(size) };
@@ -330,9 +324,7 @@ pub(super) struct Report<T> {
 /// # Safety
 /// `pointer` is NULL or points to as many writable bytes as its `struct_size` states.
 pub(super) unsafe fn report<T: Versioned>(name: &str, pointer: *mut T) -> Result<Report<T>> {
-    if pointer.is_null() {
-        return Err(null(name));
-    }
+    ensure!(!pointer.is_null(), null(name));
     // SAFETY: `struct_size` is the first field of every `Versioned`.
     let size = unsafe { pointer.cast::<usize>().read_unaligned() };
     known_size::<T>(&format_args!("{name}->struct_size"), size)?;

@@ -11,8 +11,8 @@ use super::guard::{guard, sinew_world};
 use super::memory;
 use super::mesh::{create, sinew_mesh, sinew_mesh_view};
 use super::status::sinew_status;
-use crate::base::Error;
 use crate::base::memory::copied;
+use crate::base::{Error, ensure};
 use crate::mesh::{LoadedMesh, Mesh, tidy};
 
 /// Creates a mesh from arrays and cleans it like sinew_mesh_load.
@@ -67,11 +67,12 @@ pub unsafe extern "C" fn sinew_body_def_set_mesh(def: *mut sinew_body_def, mesh:
         let mut changed = memory::definition("def", def, sinew_body_def::defaults())?;
         let view = sinew_mesh_view::of(memory::reference("mesh", mesh)?);
         let (size, cell_count) = (changed.struct_size, view.cell_count);
-        if cell_count > 0 && size <= offset_of!(sinew_body_def, cells) {
-            return Err(Error::Unsupported(format!(
+        ensure!(
+            cell_count == 0 || size > offset_of!(sinew_body_def, cells),
+            Error::Unsupported(format!(
                 "mesh has {cell_count} cells: def->struct_size is {size}, of an older header that has no field for them"
-            )));
-        }
+            ))
+        );
         changed.take_mesh(&view);
         memory::write_report("def", def, changed)
     })

@@ -112,9 +112,7 @@ pub(crate) fn section<'a>(bytes: &mut &'a [u8], tag: [u8; 4], kernel: ChosenKern
         Error::invalid(format!("bytes are no world: section {name} {why}"))
     };
     let (found, rest) = bytes.split_first_chunk().ok_or_else(|| refusal("is missing"))?;
-    if *found != tag {
-        return Err(refusal("is missing"));
-    }
+    ensure!(*found == tag, refusal("is missing"));
     let (size, rest) = rest.split_first_chunk().ok_or_else(|| refusal("ends early"))?;
     let size = usize::try_from(u64::from_le_bytes(*size)).map_err(|_| refusal("ends early"))?;
     let (content, rest) = rest.split_at_checked(size).ok_or_else(|| refusal("ends early"))?;

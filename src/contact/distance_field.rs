@@ -8,7 +8,7 @@ use glam::{UVec3, Vec3};
 
 use super::closest::Closest;
 use super::exact::ExactSolid;
-use crate::base::{Error, Result, memory};
+use crate::base::{Result, ensure, memory};
 use crate::geometry::Bounds;
 
 /// Cells along the longest side of a solid where nothing else is asked for.
@@ -61,22 +61,22 @@ impl DistanceField {
     /// [`Error::InvalidArgument`] where the cell is negative, not finite, or so small that there would be more than 16.8 million samples;
     /// [`Error::OutOfMemory`].
     pub(crate) fn of(solid: &ExactSolid, cell: f32) -> Result<Self> {
-        if !(cell >= 0.0 && cell.is_finite()) {
-            return Err(Error::invalid(format!(
-                "cell is {cell} m: must be finite and at least 0"
-            )));
-        }
+        ensure!(
+            cell >= 0.0 && cell.is_finite(),
+            "cell is {cell} m: must be finite and at least 0"
+        );
         let bounds = solid.bounds();
         let sides = bounds.max - bounds.min;
         let cell = if cell > 0.0 { cell } else { sides.max_element() / CELLS };
         let along = (sides / cell).ceil() + 2.0 * MARGIN + 1.0;
         let samples = along.as_dvec3().element_product();
-        if !(samples <= SAMPLES as f64) {
-            return Err(Error::invalid(format!(
-                "cell is {cell} m: a solid of {} x {} x {} m would take {samples:.0} samples, at most {SAMPLES} are possible",
-                sides.x, sides.y, sides.z
-            )));
-        }
+        ensure!(
+            samples <= SAMPLES as f64,
+            "cell is {cell} m: a solid of {} x {} x {} m would take {samples:.0} samples, at most {SAMPLES} are possible",
+            sides.x,
+            sides.y,
+            sides.z
+        );
         let counts = along.as_uvec3();
         let mut field = Self {
             low: bounds.min - MARGIN * cell,

@@ -271,11 +271,12 @@ impl Tool {
             Shape::Plane => detection != Detection::Exact,
             Shape::Sphere { .. } | Shape::Capsule { .. } => detection == Detection::DistanceField,
         };
-        if is_refused {
-            return Err(Error::Unsupported(format!(
+        ensure!(
+            !is_refused,
+            Error::Unsupported(format!(
                 "detection is {detection:?}: distance fields are for meshes, and images for what has an end"
-            )));
-        }
+            ))
+        );
         let rounded = |radius, half_length| match detection {
             Detection::ImageSpace => {
                 let (positions, triangles) = rounded::surface(radius, half_length)?;

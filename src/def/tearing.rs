@@ -111,11 +111,10 @@ impl Tearing {
             definition.spare_nodes != 0,
             "most_tears is {most}, and spare_nodes is 0: a tear needs nodes to come"
         );
-        if !definition.cells.is_empty() {
-            return Err(Error::Unsupported(format!(
-                "most_tears is {most}: bodies with cells do not tear"
-            )));
-        }
+        ensure!(
+            definition.cells.is_empty(),
+            Error::Unsupported(format!("most_tears is {most}: bodies with cells do not tear"))
+        );
         let has_elements = definition
             .material
             .is_some_and(|material| material.model == Model::Tetrahedra);

@@ -139,9 +139,7 @@ fn axis(name: &str, size: f64, cells: u32) -> Result<Vec<f32>> {
         ))
     };
     // f32 has no more evenly spaced values than that; no need to try.
-    if cells > 1 << 25 {
-        return Err(coincide());
-    }
+    ensure!(cells <= 1 << 25, coincide());
     let places = (0..=cells).map(|i| ((f64::from(i) / f64::from(cells) - 0.5) * size) as f32);
     let places = memory::collected_within(cells as usize + 1, places)?;
     if places.windows(2).any(|pair| pair[0] >= pair[1]) {

@@ -10,7 +10,7 @@ use super::ends::Ends;
 use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
 use super::{Link, Motion, SpringChange, Springs, already_joined, not_joined};
-use crate::base::{Result, memory};
+use crate::base::{Result, ensure, memory};
 use crate::codec::{Saved, Writer, saved};
 use crate::def::Spring;
 use crate::simd::{ChosenKernel, Eights, prefetch};
@@ -261,9 +261,7 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
 
     fn add(&mut self, spring: &Spring) -> Result<()> {
         let [a, b] = spring.nodes;
-        if self.nodes[a as usize].has(b) {
-            return Err(already_joined(a, b));
-        }
+        ensure!(!self.nodes[a as usize].has(b), already_joined(a, b));
         let room_a = self.nodes[a as usize].room(self.springs_per_node)?;
         let room_b = self.nodes[b as usize].room(self.springs_per_node)?;
         let [link_a, link_b] = Link::ends(spring);
@@ -276,9 +274,7 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
     fn remove(&mut self, a: u32, b: u32) -> Result<()> {
         for (node, neighbour) in [(a, b), (b, a)] {
             // Both ends have it, or none.
-            if !self.nodes[node as usize].remove(neighbour) {
-                return Err(not_joined(a, b));
-            }
+            ensure!(self.nodes[node as usize].remove(neighbour), not_joined(a, b));
         }
         self.spring_count -= 1;
         Ok(())

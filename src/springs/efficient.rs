@@ -9,7 +9,7 @@ use super::ends::Ends;
 use super::gather::Gather;
 use super::kept::{DampedLink, KeptLink};
 use super::{Link, Motion, SpringChange, Springs, already_joined, not_joined};
-use crate::base::{Result, memory};
+use crate::base::{Result, ensure, memory};
 use crate::codec::{Saved, Writer, saved};
 use crate::def::Spring;
 use crate::simd::prefetch;
@@ -138,9 +138,7 @@ impl Springs for Efficient {
 
     fn add(&mut self, spring: &Spring) -> Result<()> {
         let [a, b] = spring.nodes;
-        if self.has(a, b) {
-            return Err(already_joined(a, b));
-        }
+        ensure!(!self.has(a, b), already_joined(a, b));
         let [mut link_a, mut link_b] = Link::ends(spring);
         if !self.damped {
             (link_a.damping, link_b.damping) = (0.0, 0.0);

@@ -7,7 +7,7 @@ use super::ends::Ends;
 use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
 use super::{Link, Motion, Rewiring, SpringChange, Springs, already_joined, not_joined};
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ensure, memory};
 use crate::codec::{Saved, Writer, saved};
 use crate::def::Spring;
 use crate::simd::{ChosenKernel, Eights};
@@ -47,11 +47,12 @@ impl<L: KeptLink> FastLink<L> {
         } else {
             springs_per_node
         };
-        if longest > springs_per_node {
-            return Err(Error::Capacity(format!(
+        ensure!(
+            longest <= springs_per_node,
+            Error::Capacity(format!(
                 "springs_per_node is {springs_per_node}: node {node} has {longest} springs"
-            )));
-        }
+            ))
+        );
         let count = node_count.checked_mul(springs_per_node).ok_or(Error::OutOfMemory)?;
         let mut places = memory::filled(L::EMPTY, count)?;
         for (node, row) in places.chunks_exact_mut(springs_per_node).enumerate() {
@@ -90,11 +91,12 @@ impl<L: KeptLink> FastLink<L> {
             let more: isize = of_node.iter().map(|&(_, more)| more).sum();
             let count = links(self.row(node)).len().saturating_add_signed(more);
             let width = self.springs_per_node;
-            if count > width {
-                return Err(Error::Capacity(format!(
+            ensure!(
+                count <= width,
+                Error::Capacity(format!(
                     "node {node} needs {count} springs: springs_per_node is {width}"
-                )));
-            }
+                ))
+            );
         }
         Ok(())
     }
@@ -179,9 +181,7 @@ impl<L: KeptLink> Springs for FastLink<L> {
 
     fn add(&mut self, spring: &Spring) -> Result<()> {
         let [a, b] = spring.nodes;
-        if place_of(self.row(a), b).is_some() {
-            return Err(already_joined(a, b));
-        }
+        ensure!(place_of(self.row(a), b).is_none(), already_joined(a, b));
         let places = [self.empty_place(a)?, self.empty_place(b)?];
         for ((node, place), link) in spring.nodes.into_iter().zip(places).zip(Link::ends(spring)) {
             self.row_mut(node)[place] = L::of(&link);

@@ -80,11 +80,12 @@ impl World {
             return Ok(());
         }
         // A surface that is taken anew would not know which sides were parted.
-        if (with_bodies || with_itself) && it.topology_version() > 0 {
-            return Err(Error::Unsupported(
+        ensure!(
+            !(with_bodies || with_itself) || it.topology_version() == 0,
+            Error::Unsupported(
                 "meets_bodies and meets_itself of a body that was cut or torn can only both become 0".into(),
-            ));
-        }
+            )
+        );
         it.system_mut().contact = BodyContact {
             with_bodies,
             with_itself,

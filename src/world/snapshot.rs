@@ -59,12 +59,13 @@ impl World {
         }
         let mut count = Writer::new(None);
         self.write(&mut count);
-        if count.is_too_large() {
-            return Err(Error::Unsupported(format!(
+        ensure!(
+            !count.is_too_large(),
+            Error::Unsupported(format!(
                 "a world of {} bytes keeps more room for what may come than bytes can ask for",
                 count.size()
-            )));
-        }
+            ))
+        );
         Ok(count.size())
     }
 
@@ -88,11 +89,10 @@ impl World {
     pub(super) fn save_again(&self, bytes: &mut Vec<u8>) -> Result<()> {
         let mut count = Writer::new(None);
         self.write(&mut count);
-        if count.is_too_large() {
-            return Err(Error::Unsupported(
-                "the world keeps more room than bytes can ask for".into(),
-            ));
-        }
+        ensure!(
+            !count.is_too_large(),
+            Error::Unsupported("the world keeps more room than bytes can ask for".into(),)
+        );
         bytes.clear();
         memory::reserve(bytes, count.size())?;
         bytes.resize(count.size(), 0);

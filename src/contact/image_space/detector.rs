@@ -156,9 +156,7 @@ impl ImageSpace {
             "pixels is {}: must be 1 to {LARGEST_IMAGE}",
             definition.pixels
         );
-        if definition.crossings == 0 {
-            return Err(Error::invalid("crossings is 0: must be at least 1"));
-        }
+        ensure!(definition.crossings > 0, "crossings is 0: must be at least 1");
         let (views, view_count) = match definition.views {
             Views::Axes => (Frame::AXES, 3),
             Views::Along(direction) => {
@@ -200,22 +198,22 @@ impl ImageSpace {
             surfaces.iter().any(|surface| surface.is_closed()),
             "both surfaces are open: one at least must be closed"
         );
-        if !self.overlap.takes(surfaces) {
-            return Err(Error::Capacity(format!(
+        ensure!(
+            self.overlap.takes(surfaces),
+            Error::Capacity(format!(
                 "surfaces of {} and {} nodes, {} and {} edges: larger than what the detector was made for",
                 surfaces[0].node_count(),
                 surfaces[1].node_count(),
                 surfaces[0].edges().len(),
                 surfaces[1].edges().len()
-            )));
-        }
+            ))
+        );
         self.overlap.clear(surfaces.map(Surface::node_count), self.pixel);
         for view in 0..self.view_count {
-            if !self.detect_along(self.views[view], bodies) {
-                return Err(Error::Capacity(
-                    "crossings: a single ray passes more faces than there is room for".into(),
-                ));
-            }
+            ensure!(
+                self.detect_along(self.views[view], bodies),
+                Error::Capacity("crossings: a single ray passes more faces than there is room for".into(),)
+            );
         }
         let overlap = &mut self.overlap;
         for inside in &mut overlap.inside {

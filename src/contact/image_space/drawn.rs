@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::layers::{Layers, RayCrossing};
 use super::projection::{Frame, LARGEST_IMAGE, Projection};
-use crate::base::{Error, Result};
+use crate::base::{Result, ensure};
 use crate::codec::saved;
 use crate::geometry::Bounds;
 
@@ -60,12 +60,12 @@ impl Drawn {
             let frame = Frame::AXES[axis];
             let size = frame.coordinates(bounds.max - bounds.min);
             let [columns, rows] = [size.x, size.y].map(|length| (length / pixel).ceil().max(1.0));
-            if !(columns * rows <= LARGEST_IMAGE as f64) {
-                return Err(Error::invalid(format!(
-                    "contact_resolution is {pixel} m: an image of {} x {} m would have {columns} x {rows} pixels, at most {LARGEST_IMAGE} are possible",
-                    size.x, size.y
-                )));
-            }
+            ensure!(
+                columns * rows <= LARGEST_IMAGE as f64,
+                "contact_resolution is {pixel} m: an image of {} x {} m would have {columns} x {rows} pixels, at most {LARGEST_IMAGE} are possible",
+                size.x,
+                size.y
+            );
             // No image is so small that each triangle could not be seen once.
             let pixels = (STRETCHED * columns * rows) as usize + 1;
             let crossings = (STRETCHED * areas.dot(frame.forward) / (pixel * pixel)) as usize + count;

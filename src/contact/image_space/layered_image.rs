@@ -6,7 +6,7 @@ use super::covered::nearest_covered;
 use super::layers::{Layers, RayCrossing};
 use super::projection::{Frame, Projection};
 use super::surface;
-use crate::base::{Error, Result, above_zero, memory};
+use crate::base::{Error, Result, above_zero, ensure, memory};
 use crate::contact::distance::closest_on_triangle;
 use crate::contact::exact::coarse::{CoarseField, Sample};
 use crate::geometry::Bounds;
@@ -174,9 +174,7 @@ impl LayeredImage {
         above_zero("pixel", pixel)?;
         surface::check(positions.len(), triangles)?;
         surface::check_positions(positions)?;
-        if !mesh::is_closed(triangles)? {
-            return Err(Error::invalid(surface::OPEN));
-        }
+        ensure!(mesh::is_closed(triangles)?, Error::invalid(surface::OPEN));
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for &node in triangles.as_flattened() {
             low = low.min(positions[node as usize]);

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3, Vec3};
 
-use crate::base::{Error, Result};
+use crate::base::{Result, ensure};
 use crate::codec::saved;
 use crate::raster::{GUARD, PixelVertex, Window};
 
@@ -74,12 +74,14 @@ impl Projection {
     pub fn new(frame: Frame, low: DVec3, high: DVec3, pixel: f64) -> Result<Self> {
         let size = [high.x - low.x, high.y - low.y];
         let counts = size.map(|length| (length / pixel).ceil().max(1.0));
-        if !(counts[0] * counts[1] <= LARGEST_IMAGE as f64 && counts[0].max(counts[1]) < GUARD / 2.0) {
-            return Err(Error::invalid(format!(
-                "pixel is {pixel} m: an image of {} x {} m would have {} x {} pixels, at most {LARGEST_IMAGE} are possible",
-                size[0], size[1], counts[0], counts[1]
-            )));
-        }
+        ensure!(
+            counts[0] * counts[1] <= LARGEST_IMAGE as f64 && counts[0].max(counts[1]) < GUARD / 2.0,
+            "pixel is {pixel} m: an image of {} x {} m would have {} x {} pixels, at most {LARGEST_IMAGE} are possible",
+            size[0],
+            size[1],
+            counts[0],
+            counts[1]
+        );
         let middle = [low.x + high.x, low.y + high.y];
         Ok(Self {
             frame,

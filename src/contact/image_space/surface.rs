@@ -63,9 +63,7 @@ impl Surface {
     /// [`Error::OutOfMemory`].
     pub fn closed(node_count: usize, triangles: &[[u32; 3]]) -> Result<Self> {
         check(node_count, triangles)?;
-        if !mesh::is_closed(triangles)? {
-            return Err(Error::invalid(OPEN));
-        }
+        ensure!(mesh::is_closed(triangles)?, Error::invalid(OPEN));
         Self::new(node_count, triangles, true)
     }
 
@@ -121,12 +119,11 @@ impl Placed<'_> {
             "{} positions of a surface of {node_count} nodes",
             self.positions.len()
         );
-        if !(self.thickness >= 0.0 && self.thickness.is_finite()) {
-            return Err(Error::invalid(format!(
-                "thickness is {} m: must be finite and at least 0",
-                self.thickness
-            )));
-        }
+        ensure!(
+            self.thickness >= 0.0 && self.thickness.is_finite(),
+            "thickness is {} m: must be finite and at least 0",
+            self.thickness
+        );
         check_positions(self.positions)
     }
 }

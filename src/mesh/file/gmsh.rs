@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::scanner::{Scanner, parse, shown};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
-use crate::base::memory;
+use crate::base::{ensure, memory};
 
 /// The layouts of the nodes and elements.
 #[derive(Clone, Copy, PartialEq)]
@@ -45,9 +45,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
             _ => return Err(scanner.fail(format!("{} has no place here", shown(section)))),
         }
     }
-    if !has_elements {
-        return Err(scanner.fail("the file ends without elements"));
-    }
+    ensure!(has_elements, scanner.fail("the file ends without elements"));
     Ok(raw)
 }
 

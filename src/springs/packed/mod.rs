@@ -21,7 +21,7 @@ use pack::{Loose, NO_KIND, pack};
 use super::ends::Ends;
 use super::kernels::{Columns, SpringMaterial};
 use super::{Course, Link, Motion, Rewiring, SpringChange, Springs, already_joined, not_joined, rewire_by};
-use crate::base::{Result, memory};
+use crate::base::{Result, ensure, memory};
 use crate::codec::{Saved, Writer, saved};
 use crate::simd::ChosenKernel;
 use crate::soa::{TILE, TileForces, View, tile_count, tile_nodes};
@@ -150,9 +150,7 @@ impl Packed {
     /// Puts a spring beside the columns.
     fn insert(&mut self, spring: &Spring) -> Result<()> {
         let [a, b] = spring.nodes;
-        if self.has(a, b) {
-            return Err(already_joined(a, b));
-        }
+        ensure!(!self.has(a, b), already_joined(a, b));
         for node in [a, b] {
             let node_count = self.node_count;
             let columns = &mut self.tile_mut(node).columns;
@@ -340,9 +338,7 @@ impl Springs for Packed {
     }
 
     fn remove(&mut self, a: u32, b: u32) -> Result<()> {
-        if !self.has(a, b) {
-            return Err(not_joined(a, b));
-        }
+        ensure!(self.has(a, b), not_joined(a, b));
         self.take_out([a, b]);
         self.mend(a);
         self.mend(b);

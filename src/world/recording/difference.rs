@@ -5,7 +5,7 @@
 //! looked for from the beginning, and from the end.
 
 use super::put;
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, ensure};
 
 /// A shorter copy is not worth its part.
 const WORTH_COPYING: usize = 48;
@@ -52,9 +52,7 @@ pub(super) fn applied(old: &[u8], difference: &[u8], size: usize) -> Result<Vec<
         let end = from.checked_add(length).ok_or_else(damaged)?;
         let copied = old.get(from..end).ok_or_else(damaged)?;
         let (literal, behind) = behind.split_at_checked(fresh).ok_or_else(damaged)?;
-        if copied.len() + literal.len() > size - made.len() {
-            return Err(damaged());
-        }
+        ensure!(copied.len() + literal.len() <= size - made.len(), damaged());
         made.try_reserve(copied.len() + literal.len())?;
         made.extend_from_slice(copied);
         made.extend_from_slice(literal);
