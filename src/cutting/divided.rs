@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::tracked::Tracked;
-use crate::base::Result;
+use crate::base::{Result, ensure, memory};
 use crate::codec::saved;
 
 /// No simplex, or no corner.
@@ -116,6 +116,22 @@ pub(crate) trait Divided<const N: usize> {
             .min()
     }
 
+    /// The nodes that are to move a vertex between others of one cell, which have these shares in it, and how much each does.
+    fn bonds_between(&self, sources: [u32; 3], shares: [f64; 3]) -> ([u32; N], [f64; N]) {
+        let (mut nodes, mut weights) = ([NONE; N], [0.0; N]);
+        for (source, share) in sources.into_iter().zip(shares) {
+            let (of_source, parts) = self.bonds(source);
+            for (node, part) in of_source.into_iter().zip(parts).filter(|(_, part)| part * share != 0.0) {
+                // There is room for the nodes of a cell.
+                if let Some(k) = (0..N).find(|&k| nodes[k] == node || nodes[k] == NONE) {
+                    nodes[k] = node;
+                    weights[k] += part * share;
+                }
+            }
+        }
+        (nodes.map(|node| if node == NONE { nodes[0] } else { node }), weights)
+    }
+
     /// Whether a vertex is at a node.
     fn is_at(&self, vertex: u32, node: u32) -> bool {
         let (nodes, weights) = self.bonds(vertex);
@@ -220,6 +236,31 @@ macro_rules! divided {
 }
 
 pub(crate) use divided;
+
+/// Nodes at these places in the rest shape, which no cell has yet; refused unless all are finite.
+pub(crate) fn nodes_at(rest: &[Vec3]) -> Result<Vec<Node>> {
+    for (at, place) in rest.iter().enumerate() {
+        ensure!(place.is_finite(), "rest position {at} is {place}");
+    }
+    memory::collected(rest.iter().map(|&rest| Node { rest, first: NONE }))
+}
+
+/// Where the nodes of a cell are in the rest shape; refused unless they are known.
+pub(crate) fn places_of<const N: usize>(number: usize, nodes: [u32; N], rest: &[Vec3]) -> Result<[DVec3; N]> {
+    let count = rest.len();
+    for node in nodes {
+        ensure!((node as usize) < count, "cell {number} has node {node} of {count}");
+    }
+    Ok(nodes.map(|node| rest[node as usize].as_dvec3()))
+}
+
+/// Puts the corners of a cell first among those at its nodes: the next corner at each.
+pub(crate) fn put_at<const N: usize>(nodes: &mut [Node], number: usize, corners: [u32; N]) -> [u32; N] {
+    std::array::from_fn(|k| {
+        let first = (N * number + k) as u32;
+        std::mem::replace(&mut nodes[corners[k] as usize].first, first)
+    })
+}
 
 /// The place that nodes at these places give by weights.
 pub(crate) fn weighed<const N: usize>((nodes, weights): ([u32; N], [f64; N]), place: impl Fn(u32) -> Vec3) -> DVec3 {

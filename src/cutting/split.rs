@@ -2,7 +2,7 @@
 
 use super::changes::NewVertex;
 use super::cut::Cut;
-use super::divided::NONE;
+use super::divided::{Divided, NONE};
 use super::surface::{SurfaceTriangle, SurfaceVertex};
 use crate::base::{Result, memory};
 
@@ -82,30 +82,13 @@ impl Cut<'_> {
 
     /// A vertex between the corners of one triangle.
     fn new_vertex(&mut self, sources: [u32; 3], weights: [f64; 3], around: u32) -> Result<u32> {
-        let mut vertex = SurfaceVertex {
-            nodes: [NONE; 3],
-            weights: [0.0; 3],
+        let (nodes, shares) = self.surface.bonds_between(sources, weights);
+        let vertex = SurfaceVertex {
+            nodes,
+            weights: shares,
             point: NONE,
             around,
         };
-        for (&source, &share) in sources.iter().zip(&weights) {
-            let source = &self.surface.vertices[source];
-            for (&node, &weight) in source.nodes.iter().zip(&source.weights) {
-                if weight * share == 0.0 {
-                    continue;
-                }
-                // All lie in one cell: there is room for its nodes.
-                if let Some(k) = (0..3).find(|&k| vertex.nodes[k] == node || vertex.nodes[k] == NONE) {
-                    vertex.nodes[k] = node;
-                    vertex.weights[k] += weight * share;
-                }
-            }
-        }
-        for k in 1..3 {
-            if vertex.nodes[k] == NONE {
-                vertex.nodes[k] = vertex.nodes[0];
-            }
-        }
         self.add_vertex(vertex, NewVertex { sources, weights })
     }
 

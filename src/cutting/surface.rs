@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::divided::{Cell, Divided, NONE, Node, SNAP, Simplex, divided, weighed};
+use super::divided::{Cell, Divided, NONE, Node, SNAP, Simplex, divided, nodes_at, places_of, put_at, weighed};
 use super::pieces::piece_count;
 use super::tracked::Tracked;
 use crate::base::{Error, Result, ensure, memory};
@@ -149,14 +149,11 @@ impl CutSurface {
     /// Refused unless positions are finite, nodes are known, each cell has an area, and the surface is manifold and turned one way all over:
     /// at most two cells at an edge, which run along it in opposite directions, and one fan of cells at a node.
     pub fn new(rest: &[Vec3], cells: &[[u32; 3]]) -> Result<Self> {
-        for (at, place) in rest.iter().enumerate() {
-            ensure!(place.is_finite(), "rest position {at} is {place}");
-        }
         ensure!(
             rest.len().max(cells.len()) < (NONE / 3) as usize,
             "more than 2^32 / 3 nodes or cells"
         );
-        let mut nodes = memory::collected(rest.iter().map(|&rest| Node { rest, first: NONE }))?;
+        let mut nodes = nodes_at(rest)?;
         let mut vertices = memory::collected((0..rest.len() as u32).map(|node| SurfaceVertex {
             nodes: [node; 3],
             weights: [1.0, 0.0, 0.0],
@@ -166,22 +163,13 @@ impl CutSurface {
         let mut made = memory::reserved(cells.len())?;
         let mut triangles = memory::reserved(cells.len())?;
         for (number, &corners) in cells.iter().enumerate() {
-            for node in corners {
-                ensure!(
-                    (node as usize) < rest.len(),
-                    "cell {number} has node {node} of {}",
-                    rest.len()
-                );
-            }
-            let places = corners.map(|node| rest[node as usize].as_dvec3());
+            let places = places_of(number, corners, rest)?;
             let area = area_of(places);
             ensure!(area > 0.0, "cell {number} of nodes {corners:?} has no area");
             let shortest = (0..3)
                 .map(|k| places[k].distance(places[(k + 1) % 3]))
                 .fold(f64::INFINITY, f64::min);
-            let mut next = [NONE; 3];
-            for (k, &node) in corners.iter().enumerate() {
-                next[k] = std::mem::replace(&mut nodes[node as usize].first, 3 * number as u32 + k as u32);
+            for node in corners {
                 vertices[node as usize].around = number as u32;
             }
             made.push(SurfaceCell {
@@ -189,7 +177,7 @@ impl CutSurface {
                 area,
                 snap: SNAP * shortest,
                 first: number as u32,
-                next,
+                next: put_at(&mut nodes, number, corners),
             });
             triangles.push(SurfaceTriangle {
                 corners,

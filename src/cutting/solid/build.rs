@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use super::body::{CutSolid, FACES, Face, SolidCell, SolidTetrahedron, SolidTriangle, SolidVertex};
 use super::sever::{Mark, SolidStroke};
 use crate::base::{Error, Result, ensure, memory};
-use crate::cutting::divided::{NONE, Node, SNAP};
+use crate::cutting::divided::{NONE, SNAP, nodes_at, places_of, put_at};
 use crate::cutting::tracked::Tracked;
 
 impl CutSolid {
@@ -16,14 +16,11 @@ impl CutSolid {
     /// Refused unless positions are finite, nodes are known, each cell has a volume, at a face there are two cells at most, on either side of it,
     /// the cells about a node hang together by faces at it, and triangles are as they are asked for.
     pub fn new(rest: &[Vec3], cells: &[[u32; 4]], drawn: &[[u32; 3]]) -> Result<Self> {
-        for (at, place) in rest.iter().enumerate() {
-            ensure!(place.is_finite(), "rest position {at} is {place}");
-        }
         ensure!(
             rest.len().max(cells.len()) < (NONE / 4) as usize,
             "more than 2^30 nodes or cells"
         );
-        let mut nodes = memory::collected(rest.iter().map(|&rest| Node { rest, first: NONE }))?;
+        let mut nodes = nodes_at(rest)?;
         let mut vertices = memory::collected((0..rest.len() as u32).map(|node| SolidVertex {
             nodes: [node; 4],
             weights: [1.0, 0.0, 0.0, 0.0],
@@ -35,19 +32,10 @@ impl CutSolid {
         let mut made = memory::reserved(cells.len())?;
         let mut tetrahedra = memory::reserved(cells.len())?;
         for (number, &corners) in cells.iter().enumerate() {
-            for node in corners {
-                ensure!(
-                    (node as usize) < rest.len(),
-                    "cell {number} has node {node} of {}",
-                    rest.len()
-                );
-            }
-            let places = corners.map(|node| rest[node as usize].as_dvec3());
+            let places = places_of(number, corners, rest)?;
             let volume = volume_of(places);
             ensure!(volume.abs() > 0.0, "cell {number} of nodes {corners:?} has no volume");
-            let mut next = [NONE; 4];
-            for (k, &node) in corners.iter().enumerate() {
-                next[k] = std::mem::replace(&mut nodes[node as usize].first, 4 * number as u32 + k as u32);
+            for node in corners {
                 vertices[node as usize].around = number as u32;
             }
             made.push(SolidCell {
@@ -55,7 +43,7 @@ impl CutSolid {
                 volume: volume.abs(),
                 snap: SNAP * shortest_edge(places),
                 first: number as u32,
-                next,
+                next: put_at(&mut nodes, number, corners),
             });
             let [a, b, c, d] = corners;
             tetrahedra.push(SolidTetrahedron {

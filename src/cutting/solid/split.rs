@@ -5,7 +5,7 @@ use super::cut::SolidCut;
 use super::sever::Mark;
 use crate::base::{Result, memory};
 use crate::cutting::changes::NewVertex;
-use crate::cutting::divided::NONE;
+use crate::cutting::divided::{Divided, NONE};
 
 impl SolidCut<'_> {
     /// Splits an edge of a tetrahedron `along` of the way from its first end to its second. Each tetrahedron about it keeps the half at the first.
@@ -84,36 +84,19 @@ impl SolidCut<'_> {
 
     /// A vertex on an edge.
     fn vertex_between(&mut self, edge: [u32; 2], along: f64, around: u32) -> Result<u32> {
-        let mut vertex = SolidVertex {
-            nodes: [NONE; 4],
-            weights: [0.0; 4],
+        let (sources, shares) = ([edge[0], edge[1], edge[0]], [1.0 - along, along, 0.0]);
+        let (nodes, weights) = self.solid.bonds_between(sources, shares);
+        let vertex = SolidVertex {
+            nodes,
+            weights,
             point: NONE,
             around,
             mark: Mark::NONE,
             other_mark: self.mark_between(edge),
         };
-        let shares = [1.0 - along, along];
-        for (source, share) in edge.into_iter().zip(shares) {
-            let source = &self.solid.vertices[source];
-            for (&node, &weight) in source.nodes.iter().zip(&source.weights) {
-                if weight == 0.0 {
-                    continue;
-                }
-                // Both ends lie in one cell: there is room for its nodes.
-                if let Some(k) = (0..4).find(|&k| vertex.nodes[k] == node || vertex.nodes[k] == NONE) {
-                    vertex.nodes[k] = node;
-                    vertex.weights[k] += weight * share;
-                }
-            }
-        }
-        for k in 1..4 {
-            if vertex.nodes[k] == NONE {
-                vertex.nodes[k] = vertex.nodes[0];
-            }
-        }
         let from = NewVertex {
-            sources: [edge[0], edge[1], edge[0]],
-            weights: [shares[0], shares[1], 0.0],
+            sources,
+            weights: shares,
         };
         self.add_vertex(vertex, from)
     }
