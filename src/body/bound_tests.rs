@@ -482,7 +482,7 @@ fn a_surface_that_changes_under_a_tool_is_met_as_it_is_then() {
                     drawn += 10;
                     assert!(!body.system.contacts.as_ref().is_some_and(|contacts| contacts.are_far()));
                     if anew {
-                        body.system.contacts.as_mut().expect("contacts").forget();
+                        body.system.contacts.as_mut().expect("contacts").look_again();
                     }
                 }
             }

@@ -136,9 +136,7 @@ impl Body {
         if !axes.any() {
             return self.unpin(node);
         }
-        self.check_node(&"node", node)?;
-        self.check_not_bound(&"node", node)?;
-        self.system.check_not_held(&"node", node)?;
+        self.check_free_to_pin(&"node", node)?;
         let own = self.system.order.own(node);
         let before = self.system.pins.axes_of(own);
         if axes == before {
@@ -171,9 +169,7 @@ impl Body {
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it has no mass and is pinned for good.
     pub fn unpin(&mut self, node: u32) -> Result<()> {
-        self.check_node(&"node", node)?;
-        self.check_not_bound(&"node", node)?;
-        self.system.check_not_held(&"node", node)?;
+        self.check_free_to_pin(&"node", node)?;
         let own = self.system.order.own(node);
         let mass = self.mass_of_unpinned(node)?;
         if self.system.pins.get(own).is_some() {
@@ -193,9 +189,7 @@ impl Body {
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, it is not pinned or a tool holds it, or the position is not finite.
     pub fn move_pin(&mut self, node: u32, position: Vec3) -> Result<()> {
-        self.check_node(&"node", node)?;
-        self.check_not_bound(&"node", node)?;
-        self.system.check_not_held(&"node", node)?;
+        self.check_free_to_pin(&"node", node)?;
         finite_vector("position", position)?;
         match self.system.pins.get_mut(self.system.order.own(node)) {
             Some(pin) => pin.target = Some(position),

@@ -13,7 +13,7 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it is a point that is bound to nodes.
     /// [`Error::OutOfMemory`]. Then no node has changed.
     pub fn pin_nodes(&mut self, nodes: &[u32]) -> Result<()> {
-        self.check_free_to_pin(nodes)?;
+        self.check_all_free_to_pin(nodes)?;
         self.system.pins.reserve(nodes.len(), self.node_count())?;
         nodes.iter().try_for_each(|&node| self.pin(node))
     }
@@ -23,7 +23,7 @@ impl Body {
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it has no mass. Then no node has changed.
     pub fn unpin_nodes(&mut self, nodes: &[u32]) -> Result<()> {
-        self.check_free_to_pin(nodes)?;
+        self.check_all_free_to_pin(nodes)?;
         for &node in nodes {
             self.mass_of_unpinned(node)?;
         }
@@ -73,14 +73,16 @@ impl Body {
     }
 
     /// Refuses nodes that are none, that a tool holds, or that are bound to others.
-    fn check_free_to_pin(&self, nodes: &[u32]) -> Result<()> {
-        for (index, &node) in nodes.iter().enumerate() {
-            let name = format_args!("nodes[{index}]");
-            self.check_node(&name, node)?;
-            self.check_not_bound(&name, node)?;
-            self.system.check_not_held(&name, node)?;
-        }
-        Ok(())
+    fn check_all_free_to_pin(&self, nodes: &[u32]) -> Result<()> {
+        let mut named = nodes.iter().enumerate();
+        named.try_for_each(|(index, &node)| self.check_free_to_pin(&format_args!("nodes[{index}]"), node))
+    }
+
+    /// Refuses a node that is not there, is bound, or that a tool holds.
+    pub(super) fn check_free_to_pin(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
+        self.check_node(name, node)?;
+        self.check_not_bound(name, node)?;
+        self.system.check_not_held(name, node)
     }
 
     /// The nodes in a box that a pin can hold.

@@ -421,8 +421,7 @@ impl Candidates {
         }
         let is_visible = |index: &u32| *index >= features.node_count || !bindings.is_hidden(*index);
         self.near.retain(is_visible);
-        fresh.sort_unstable();
-        fresh.dedup();
+        memory::sort_once(fresh);
         fresh.retain(|&index| {
             let Some(feature) = features.get(index) else {
                 return false;

@@ -264,9 +264,7 @@ impl Contacts {
     /// The step that was begun last is not taken: the body is where it was, and touches what it touched, but nothing pressed it.
     pub fn stay(&mut self) {
         self.touches.clear();
-        for pair in &mut self.touched {
-            *pair = [pair[0]; 2];
-        }
+        self.sleep_on();
     }
 
     /// The step is over in which the body was asleep: it touches what it touched.
@@ -298,7 +296,7 @@ impl Contacts {
         self.look_again();
     }
 
-    /// Other tools may meet the body than those that what is near was gathered for.
+    /// Forgets what was near: other tools may meet the body, nodes were moved from outside, or their coordinates begin elsewhere.
     pub fn look_again(&mut self) {
         self.candidates.invalidate();
     }
@@ -342,11 +340,6 @@ impl Contacts {
     /// An equation with the contacts that were foreseen has been solved: its holds are what the next begins with.
     pub fn remember(&mut self, tools: &[ToolPath]) {
         self.holds.remember(&self.constraints, |place| tools[place].slot);
-    }
-
-    /// Forgets what was near: nodes were moved from outside, or their coordinates begin elsewhere.
-    pub fn forget(&mut self) {
-        self.candidates.invalidate();
     }
 
     /// Shows each node that a tool gave something to, and along what normal; with friction `None`: all of its motion. Where motion is
@@ -411,10 +404,7 @@ impl Contacts {
 
     /// The box of all velocities, given that of those before the contacts.
     pub fn velocities(&self, before: Bounds) -> Bounds {
-        Bounds {
-            min: before.min.min(self.given.min),
-            max: before.max.max(self.given.max),
-        }
+        before.and(&self.given)
     }
 
     /// Finds the contacts that the equation of the substep is to know of: all that may touch with these velocities, or are open by

@@ -88,7 +88,7 @@ impl Meeting<'_> {
     /// Whether the slice is the whole of a substep in which every node moves by its mass alone: none is held along some axes, asleep, or bound to others.
     pub(super) fn is_even(&self, slice: &Slice) -> bool {
         let is_whole = slice.first && slice.duration == self.substep && self.drifts && !self.mobility.half;
-        is_whole && !self.pins.have_partial() && self.mobility.asleep.is_none() && self.bindings.is_none()
+        is_whole && !self.pins.are_partial() && self.mobility.asleep.is_none() && self.bindings.is_none()
     }
 
     /// The axes along which nodes of a feature are held that are free along others.

@@ -164,8 +164,7 @@ impl Presses {
         for constraint in constraints {
             self.nodes.extend_from_slice(constraint.nodes());
         }
-        self.nodes.sort_unstable();
-        self.nodes.dedup();
+        memory::sort_once(&mut self.nodes);
     }
 
     /// Whether a node is listed.

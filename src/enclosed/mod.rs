@@ -247,32 +247,24 @@ impl Enclosed {
 
     /// Opens the cavities whose surface has an edge between two nodes: how many.
     pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
-        let (surface, cavities) = (&self.surface, &mut self.cavities);
-        let mut opened = 0;
-        surface.visit_node(a as usize, &mut |cavity, triangles| {
-            let has_edge = |&triangle: &u32| surface.triangles[triangle as usize].contains(&b);
-            let cavity = &mut cavities[cavity];
-            if !cavity.is_open && triangles.iter().any(has_edge) {
-                cavity.is_open = true;
-                opened += 1;
-            }
-        });
-        opened
+        self.open_where(a, |corners| corners.contains(&b))
     }
 
     /// Opens the cavities with a triangle of these nodes: whether any was closed.
     pub fn open_at(&mut self, [a, b, c]: [u32; 3]) -> bool {
-        let mut opened = false;
+        self.open_where(a, |corners| corners.contains(&b) && corners.contains(&c)) > 0
+    }
+
+    /// Opens the cavities that have such a triangle about a node: how many.
+    fn open_where(&mut self, node: u32, is_it: impl Fn(&[u32; 3]) -> bool) -> usize {
         let (surface, cavities) = (&self.surface, &mut self.cavities);
-        surface.visit_node(a as usize, &mut |cavity, triangles| {
-            let is_it = |&triangle: &u32| {
-                let corners = surface.triangles[triangle as usize];
-                corners.contains(&b) && corners.contains(&c)
-            };
+        let mut opened = 0;
+        surface.visit_node(node as usize, &mut |cavity, triangles| {
             let cavity = &mut cavities[cavity];
-            if !cavity.is_open && triangles.iter().any(is_it) {
+            let mut corners = triangles.iter().map(|&triangle| &surface.triangles[triangle as usize]);
+            if !cavity.is_open && corners.any(&is_it) {
                 cavity.is_open = true;
-                opened = true;
+                opened += 1;
             }
         });
         opened

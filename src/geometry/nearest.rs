@@ -60,24 +60,14 @@ pub(crate) fn nearest_of_segments(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> (f6
             (way, false)
         }
     };
-    let ((on_first, first_is_long), (on_second, second_is_long)) =
-        (along(first, first_squared), along(second, second_squared));
+    let (on_first, on_second) = (along(first, first_squared), along(second, second_squared));
     // The point of the one that is closest to a point of the other.
-    let to_first = |point: DVec3| {
-        if first_is_long {
-            (point - a).dot(on_first).clamp(0.0, 1.0)
-        } else {
-            0.0
-        }
+    let closest = |from: DVec3, (on, is_long): (DVec3, bool)| {
+        if is_long { from.dot(on).clamp(0.0, 1.0) } else { 0.0 }
     };
-    let to_second = |point: DVec3| {
-        if second_is_long {
-            (point - c).dot(on_second).clamp(0.0, 1.0)
-        } else {
-            0.0
-        }
-    };
-    if !first_is_long {
+    let to_first = |point: DVec3| closest(point - a, on_first);
+    let to_second = |point: DVec3| closest(point - c, on_second);
+    if !on_first.1 {
         return (0.0, to_second(a));
     }
     let parallel = first.dot(second);

@@ -74,8 +74,7 @@ pub(crate) fn element_edges(
         packed.extend(CELL_EDGES.map(|ends| pack(cell, ends)));
         packed.extend(CELL_DIAGONALS.map(|ends| pack(cell, ends)));
     }
-    packed.sort_unstable();
-    packed.dedup();
+    memory::sort_once(&mut packed);
 
     let edges = packed.iter().map(|&edge| unpack(edge)).filter(|[a, b]| a != b);
     memory::collected_within(packed.len(), edges)

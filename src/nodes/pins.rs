@@ -122,11 +122,6 @@ impl Pins {
         Ragged::new(&mut self.pins, starts)
     }
 
-    /// Whether some are held along some axes alone.
-    pub fn have_partial(&self) -> bool {
-        self.partial_count > 0
-    }
-
     pub fn get(&self, node: u32) -> Option<&Pin> {
         self.find(node).ok().map(|index| &self.pins[index])
     }
@@ -144,10 +139,10 @@ impl Pins {
     /// The axes along which a node that moves is held.
     #[inline]
     pub fn partial_axes_of(&self, node: u32) -> BVec3 {
-        if self.partial_count == 0 {
-            BVec3::FALSE
-        } else {
+        if self.are_partial() {
             self.axes_of(node)
+        } else {
+            BVec3::FALSE
         }
     }
 

@@ -1,6 +1,7 @@
 //! Some nodes of a body, and what is to be done with what lies between them.
 
 use super::TILE;
+use crate::base::memory;
 
 /// Some nodes, in the body's own numbers.
 #[derive(Debug)]
@@ -20,8 +21,7 @@ pub(crate) struct Scale {
 
 impl Region {
     pub fn of(mut nodes: Vec<u32>) -> Self {
-        nodes.sort_unstable();
-        nodes.dedup();
+        memory::sort_once(&mut nodes);
         Self { nodes }
     }
 

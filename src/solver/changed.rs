@@ -113,7 +113,7 @@ impl System {
             // Another motion begins, which may need no shorter substeps.
             Cached::Refinement => self.carry.energy = EnergyAccount::UNKNOWN,
             Cached::Remainders => self.state.forget_remainders(),
-            Cached::Candidates => self.contacts.iter_mut().for_each(|contacts| contacts.forget()),
+            Cached::Candidates => self.contacts.iter_mut().for_each(|contacts| contacts.look_again()),
             Cached::Holds => self.contacts.iter_mut().for_each(|contacts| contacts.holds.forget()),
             Cached::EquationEnergy | Cached::History | Cached::Matrix => {}
         }

@@ -347,8 +347,7 @@ impl System {
             return Ok(());
         };
         more.sort_unstable_by_key(|grasp| grasp.id);
-        nodes.sort_unstable();
-        nodes.dedup();
+        memory::sort_once(&mut nodes);
         nodes.retain(|&node| grasps.place_of(node).is_err());
         let mut held = memory::reserved(nodes.len())?;
         let untouched = memory::collected(nodes.iter().map(|&node| (node, tool)))?;

@@ -150,8 +150,7 @@ impl Skin {
         let pierces = memory::filled(false, edges.len())?;
         let spare = body.spare_nodes();
         let mut nodes = memory::copied(triangles.as_flattened())?;
-        nodes.sort_unstable();
-        nodes.dedup();
+        memory::sort_once(&mut nodes);
         let positions = body.state.positions();
         let at = |node: u32| positions.get(node as usize);
         let forest = Forest::new(triangles.len(), |triangle| triangles[triangle as usize].map(at))?;

@@ -29,6 +29,16 @@ struct Pair {
     squared: f64,
 }
 
+impl Pair {
+    fn new(weights: [f64; 3], offset: DVec3) -> Self {
+        Self {
+            weights,
+            offset,
+            squared: offset.length_squared(),
+        }
+    }
+}
+
 /// The closest pairs of a feature so far.
 #[derive(Clone, Copy, Debug)]
 struct ClosestPairs {
@@ -88,11 +98,7 @@ impl ExactSolid {
                 let others = self.facets.ends(edge);
                 let (along, other) = nearest_of_segments(ends[0], ends[1], others[0], others[1]);
                 let offset = ends[0].lerp(ends[1], along) - others[0].lerp(others[1], other);
-                let pair = Pair {
-                    weights: [1.0 - along, along, 0.0],
-                    offset,
-                    squared: offset.length_squared(),
-                };
+                let pair = Pair::new([1.0 - along, along, 0.0], offset);
                 let between = along > 0.0 && along < 1.0 && (0.0..=1.0).contains(&other);
                 let at_end = other == 0.0 || other == 1.0;
                 let across = || {
@@ -108,11 +114,7 @@ impl ExactSolid {
                 let along = ((position - ends[0]).dot(way) / way.length_squared()).clamp(0.0, 1.0);
                 let along = if along >= 0.0 { along } else { 0.0 };
                 let offset = ends[0].lerp(ends[1], along) - position;
-                let pair = Pair {
-                    weights: [1.0 - along, along, 0.0],
-                    offset,
-                    squared: offset.length_squared(),
-                };
+                let pair = Pair::new([1.0 - along, along, 0.0], offset);
                 pairs.see(pair, || {
                     along > 0.0 && along < 1.0 && self.facets.leads_off_node(node, offset)
                 });
@@ -154,11 +156,7 @@ impl ExactSolid {
                 let position = self.facets.position(node);
                 let (weights, part) = nearest_on_triangle(position, face);
                 let offset = face[0] * weights[0] + face[1] * weights[1] + face[2] * weights[2] - position;
-                let pair = Pair {
-                    weights,
-                    offset,
-                    squared: offset.length_squared(),
-                };
+                let pair = Pair::new(weights, offset);
                 pairs.see(pair, || part == Spot::Face && self.facets.leads_off_node(node, offset));
             }
             pairs.limit as f32

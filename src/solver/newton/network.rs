@@ -128,8 +128,7 @@ impl Network {
             });
         }
         show_pairs(&forces.beside, &mut |pair| self.edges.push(pair));
-        self.edges.sort_unstable();
-        self.edges.dedup();
+        memory::sort_once(&mut self.edges);
         if let Some(elements) = elements.filter(|_| !self.volumes.is_empty()) {
             self.read_rings(elements);
         }
