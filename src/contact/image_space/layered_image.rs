@@ -11,7 +11,7 @@ use crate::contact::distance::closest_on_triangle;
 use crate::contact::exact::coarse::{CoarseField, Sample};
 use crate::geometry::Bounds;
 use crate::geometry::nearest::nearest_on_triangle;
-use crate::geometry::tree::Tree;
+use crate::geometry::tree::{PlacedTriangle, Tree};
 use crate::mesh;
 
 /// How often a search goes on from the foot of the perpendicular on the face that it has found.
@@ -49,7 +49,7 @@ const EQUAL: f32 = 1e-4;
 /// ```
 #[derive(Debug)]
 pub struct LayeredImage {
-    triangles: Vec<SearchTriangle>,
+    triangles: Vec<PlacedTriangle>,
     images: [AxisImage; 3],
     /// What is far away is known from here.
     coarse: CoarseField,
@@ -57,14 +57,6 @@ pub struct LayeredImage {
     high: Vec3,
     /// Metres.
     pixel: f32,
-}
-
-/// All that a search needs of a triangle, side by side.
-#[derive(Clone, Copy, Debug)]
-struct SearchTriangle {
-    corners: [Vec3; 3],
-    /// Of unit length; zero for a triangle without area.
-    normal: Vec3,
 }
 
 /// One of the three images.
@@ -175,23 +167,18 @@ impl LayeredImage {
         surface::check(positions.len(), triangles)?;
         surface::check_positions(positions)?;
         ensure!(mesh::is_closed(triangles)?, Error::invalid(surface::OPEN));
-        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for &node in triangles.as_flattened() {
-            low = low.min(positions[node as usize]);
-            high = high.max(positions[node as usize]);
-        }
-        let drawn = memory::collected(triangles.iter().map(|triangle| {
-            let corners = triangle.map(|node| positions[node as usize]);
-            let [a, b, c] = corners.map(|corner| corner.as_dvec3());
-            SearchTriangle {
-                corners,
-                normal: (b - a).cross(c - a).normalize_or_zero().as_vec3(),
-            }
-        }))?;
+        let corners_of = |triangle: &[u32; 3]| triangle.map(|node| positions[node as usize]);
+        let bounds = Bounds::of(triangles.iter().flat_map(corners_of));
+        let (low, high) = (bounds.min, bounds.max);
+        let drawn = memory::collected(
+            triangles
+                .iter()
+                .map(|triangle| PlacedTriangle::new(corners_of(triangle))),
+        )?;
         let image = |axis: usize| AxisImage::new(Frame::AXES[axis], positions, triangles, [low, high], pixel);
         let images = [image(0)?, image(1)?, image(2)?];
         let tree = Tree::new(triangles.len(), |triangle| drawn[triangle as usize].corners)?;
-        let mut coarse = CoarseField::new(Bounds { min: low, max: high }, triangles.len(), |point, hint| {
+        let mut coarse = CoarseField::new(bounds, triangles.len(), |point, hint| {
             let (distance, place) = nearest_of(&tree, point, hint);
             let side = if shows_inside(&images, point) { -1.0 } else { 1.0 };
             (side * distance, place)
@@ -291,7 +278,7 @@ impl LayeredImage {
     }
 
     fn meet_face(&self, triangle: u32, point: Vec3, faces: &mut Faces) {
-        let SearchTriangle { corners, normal } = self.triangles[triangle as usize];
+        let PlacedTriangle { corners, normal } = self.triangles[triangle as usize];
         // As seen from the point, so that no digits are lost.
         let [a, b, c] = corners.map(|corner| corner - point);
         let height = -a.dot(normal);

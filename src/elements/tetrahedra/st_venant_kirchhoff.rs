@@ -57,6 +57,13 @@ impl<L: Lanes> Constants<L> {
         }
     }
 
+    /// With no resistance of volume where that is a matter of rings.
+    #[inline(always)]
+    unsafe fn without_rings(law: Law) -> Self {
+        // SAFETY: the same contract.
+        unsafe { Self::new(if law.rings { Law { kappa: 0.0, ..law } } else { law }) }
+    }
+
     /// The stress S of twice a strain.
     #[inline(always)]
     unsafe fn stress(self, twice_strain: Six<L>, twice_trace: L) -> Six<L> {
@@ -272,24 +279,16 @@ impl WithLanes for FindStresses<'_> {
         let Self { law, stresses, of } = self;
         // SAFETY: the same contract; corners lead to positions, and lanes are of a group.
         unsafe {
-            let mut constants = Constants::<L>::new(law);
-            if law.rings {
-                constants.kappa = L::splat(0.0);
-            }
+            let constants = Constants::<L>::without_rings(law);
             for (group, stresses) in of.groups.iter().zip(stresses) {
                 for first in turns::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
                     let deformed = of.deformed(group, first, inverse);
                     let [a, b, c, d, e, f] = constants.stress(deformed.twice_strain, deformed.twice_trace);
-                    let [to_a, to_b, to_c, to_d, to_e, to_f, pressures] = &mut stresses.0;
-                    a.store(to_a.as_mut_ptr().add(first));
-                    b.store(to_b.as_mut_ptr().add(first));
-                    c.store(to_c.as_mut_ptr().add(first));
-                    d.store(to_d.as_mut_ptr().add(first));
-                    e.store(to_e.as_mut_ptr().add(first));
-                    f.store(to_f.as_mut_ptr().add(first));
                     let pressure = constants.kappa.multiply(deformed.growth);
-                    pressure.store(pressures.as_mut_ptr().add(first));
+                    for (entry, to) in [a, b, c, d, e, f, pressure].into_iter().zip(&mut stresses.0) {
+                        entry.store(to.as_mut_ptr().add(first));
+                    }
                 }
             }
         }
@@ -305,10 +304,7 @@ impl WithLanes for FindEnergy<'_> {
         let mut energy = 0.0;
         // SAFETY: the same contract; corners lead to positions.
         unsafe {
-            let mut constants = Constants::<L>::new(law);
-            if law.rings {
-                constants.kappa = L::splat(0.0);
-            }
+            let constants = Constants::<L>::without_rings(law);
             for group in of.groups {
                 for first in turns::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
