@@ -60,6 +60,13 @@ fn attempt_implicitly(body: &mut System, request: &StepRequest, team: &Team) -> 
 }
 
 impl System {
+    /// The longest stable substep with the nodes where a step has led them, s, where it is known.
+    pub fn newest_limit(&self, carry: &Carry) -> Option<f32> {
+        carry
+            .limit()
+            .map(|limit| limit.min(self.forces.newest_limit_beside_springs()))
+    }
+
     /// Whether stability limits its substeps, as that of VERLET does.
     pub fn is_explicit(&self) -> bool {
         self.implicit.is_none()
@@ -246,7 +253,7 @@ fn run_to_tolerance(
     let mut error = 0.0;
     compare(body, request, &carry);
     loop {
-        let stable_substep = newest_limit(body, &carry);
+        let stable_substep = body.newest_limit(&carry).unwrap_or(f32::INFINITY);
         substeps = substeps.saturating_mul(2);
         middle = middle.saturating_mul(2);
         if substeps > request.max_substeps || substeps == u32::MAX {
@@ -270,16 +277,11 @@ fn run_to_tolerance(
 fn compare(body: &mut System, request: &StepRequest, carry: &Carry) -> f32 {
     let (positions, velocities) = body.state.newest();
     // 1 over the highest frequency.
-    let time = (0.5 * newest_limit(body, carry)).min(request.dt);
+    let limit = body.newest_limit(carry).unwrap_or(f32::INFINITY);
+    let time = (0.5 * limit).min(request.dt);
     body.coarse
         .as_mut()
         .map_or(0.0, |coarse| coarse.pass_end(positions, velocities, time))
-}
-
-/// The longest stable substep with the nodes where a step has led them, s; infinity where any is.
-fn newest_limit(body: &System, carry: &Carry) -> f32 {
-    let with = |limit: f32| limit.min(body.forces.newest_limit_beside_springs());
-    carry.limit().map_or(f32::INFINITY, with)
 }
 
 pub(crate) fn finish(body: &System, substeps: u32, taken: StepResult, error: f32) -> Outcome {

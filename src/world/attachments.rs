@@ -39,6 +39,11 @@ pub(super) struct Which<'a> {
 }
 
 impl Which<'_> {
+    pub const ONLY: Self = Self {
+        prefix: "",
+        index: None,
+    };
+
     fn name(&self, one: &str, many: &str) -> String {
         match self.index {
             Some(index) => format!("{}{many}[{index}]", self.prefix),

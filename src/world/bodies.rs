@@ -133,16 +133,12 @@ impl World {
         if it.topology_version() == before {
             return Ok(changed);
         }
-        let which = Which {
-            prefix: "",
-            index: None,
-        };
         for (anchor, point) in carried {
             let it = self.bodies.get(body.0)?;
             let now = point.and_then(|point| it.surface_point(&point, before));
             let now = now.map_or(anchor, Anchor::Point);
             // What cannot be bound anew stays bound as it was.
-            if let Ok(bound) = self.bound(body, which, &now) {
+            if let Ok(bound) = self.bound(body, Which::ONLY, &now) {
                 moved.push((anchor, bound));
             }
         }

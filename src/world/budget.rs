@@ -174,9 +174,8 @@ impl World {
     fn known_substep(&self) -> f32 {
         let explicit = self.bodies.iter().filter(|(_, body)| body.system().is_explicit());
         let known = explicit.filter_map(|(_, body)| {
-            let limit = body.system().carry.limit()?;
-            let stable = limit.min(body.system().forces.newest_limit_beside_springs());
-            Some(body.system().carry.limit_by_energy(stable))
+            let system = body.system();
+            Some(system.carry.limit_by_energy(system.newest_limit(&system.carry)?))
         });
         known.fold(f32::INFINITY, f32::min)
     }

@@ -40,14 +40,10 @@ impl World {
         let place = self.bodies.place(proxy.body.0)?;
         let count = points.iter().flatten().count();
         self.make_room_for_holds(place, if count > proxy.holds.len() { count } else { 0 })?;
-        let which = Which {
-            prefix: "",
-            index: None,
-        };
         let mut bounds = [None; MOST_HOLDS];
         for (bound, (anchor, _)) in bounds.iter_mut().zip(points.iter().flatten()) {
             *bound = Some(match anchor {
-                HoldAt::Anchor(anchor) => self.bound(proxy.body, which, anchor)?,
+                HoldAt::Anchor(anchor) => self.bound(proxy.body, Which::ONLY, anchor)?,
                 HoldAt::Inside(nodes, weights) => self.bound_inside(proxy.body, *nodes, *weights)?,
             });
         }

@@ -45,32 +45,33 @@ impl World {
         } else {
             self.step_with(dt, &Team::alone())?
         };
-        let watch = Stopwatch::start(self.profile.as_deref());
-        self.tear();
-        watch.stop(self.profile.as_deref(), Stage::Cutting);
-        let watch = Stopwatch::start(self.profile.as_deref());
-        self.publish_to_hands(dt);
-        watch.stop(self.profile.as_deref(), Stage::Publish);
+        self.timed(Stage::Cutting, Self::tear);
+        self.timed(Stage::Publish, |world| world.publish_to_hands(dt));
         Ok(report)
+    }
+
+    /// Does something that is timed as this stage.
+    fn timed(&mut self, stage: Stage, act: impl FnOnce(&mut Self)) {
+        let watch = Stopwatch::start(self.profile.as_deref());
+        act(self);
+        watch.stop(self.profile.as_deref(), stage);
     }
 
     /// The step, with the threads that help.
     fn step_with(&mut self, dt: f32, team: &Team) -> Result<StepReport> {
         self.lead_by_hand();
         self.record(|recorder, world| recorder.begin(world, dt));
-        let watch = Stopwatch::start(self.profile.as_deref());
-        for (_, tool) in self.tools.iter_mut() {
-            tool.set_out();
-        }
-        self.lead_blades();
-        watch.stop(self.profile.as_deref(), Stage::Plan);
+        self.timed(Stage::Plan, |world| {
+            world.tools.iter_mut().for_each(|(_, tool)| tool.set_out());
+            world.lead_blades();
+        });
         self.divide_as_before();
         let (mut left, mut rounds) = (TRIES, 0);
         let crossings = loop {
-            let watch = Stopwatch::start(self.profile.as_deref());
-            self.plan_tools();
-            self.plan_flights(dt);
-            watch.stop(self.profile.as_deref(), Stage::Plan);
+            self.timed(Stage::Plan, |world| {
+                world.plan_tools();
+                world.plan_flights(dt);
+            });
             match self.attempt(dt, team) {
                 Ok(crossings) => {
                     self.press_pinned(dt);
@@ -100,13 +101,9 @@ impl World {
             crossing_body: self.most_crossing(crossings),
             ..report(&self.bodies, &self.outcomes, crossings)
         };
-        let watch = Stopwatch::start(self.profile.as_deref());
-        self.commit(dt, team);
-        watch.stop(self.profile.as_deref(), Stage::Publish);
+        self.timed(Stage::Publish, |world| world.commit(dt, team));
         self.count_outcomes();
-        let watch = Stopwatch::start(self.profile.as_deref());
-        self.move_blades(dt);
-        watch.stop(self.profile.as_deref(), Stage::Cutting);
+        self.timed(Stage::Cutting, |world| world.move_blades(dt));
         Ok(report)
     }
 
@@ -301,16 +298,16 @@ fn wrench(
 ) -> [DVec3; 2] {
     let mut wrench = [DVec3::ZERO; 2];
     for (place, body) in bodies.iter() {
-        if let (Some(Outcome::Asleep), Some(contacts)) = (&outcomes[place], &body.system().contacts) {
+        let system = body.system();
+        let (time, [force, torque]) = match outcomes[place] {
+            Some(Outcome::Asleep) => (system.last_step(), [DVec3::ZERO; 2]),
+            Some(Outcome::Done { substeps, .. }) => (dt, system.pull_of(path.slot, substeps)),
+            _ => continue,
+        };
+        if let Some(contacts) = &system.contacts {
             let load = contacts.loads()[index];
-            wrench[0] += load.impulse / f64::from(body.system().last_step());
-            wrench[1] += load.angular_impulse / f64::from(body.system().last_step());
-        }
-        if let (Some(Outcome::Done { substeps, .. }), Some(contacts)) = (&outcomes[place], &body.system().contacts) {
-            let load = contacts.loads()[index];
-            let [force, torque] = body.system().pull_of(path.slot, *substeps);
-            wrench[0] += load.impulse / f64::from(dt) - force;
-            wrench[1] += load.angular_impulse / f64::from(dt) - torque;
+            wrench[0] += load.impulse / f64::from(time) - force;
+            wrench[1] += load.angular_impulse / f64::from(time) - torque;
         }
     }
     wrench
@@ -371,12 +368,9 @@ fn attempt_bodies(
     }
     for (place, body) in bodies.iter_mut() {
         if outcomes[place].is_none() && goes_alone(place) {
-            let alone = body.node_count() < SHARED_FROM;
-            outcomes[place] = Some(if alone {
-                attempt(body.system_mut(), request, &Team::alone())
-            } else {
-                attempt(body.system_mut(), request, team)
-            });
+            let alone = Team::alone();
+            let team = if body.node_count() < SHARED_FROM { &alone } else { team };
+            outcomes[place] = Some(attempt(body.system_mut(), request, team));
         }
     }
 }
@@ -401,9 +395,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) ->
                     (report.substeps, report.substeps_body) = (substeps, id());
                 }
                 report.error_estimate = report.error_estimate.max(error);
-                carry
-                    .limit()
-                    .map(|limit| limit.min(body.system().forces.newest_limit_beside_springs()))
+                body.system().newest_limit(&carry)
             }
             Some(Outcome::Unstable { stable_substep, error }) => {
                 report.error_estimate = report.error_estimate.max(error);
