@@ -177,9 +177,12 @@ impl BodyContact {
         check_reach("contact_thickness", self.thickness)?;
         not_negative("contact_friction", self.friction)?;
         not_negative("contact_resolution", self.resolution)?;
-        ensure!(self.detection != Detection::DistanceField, Error::Unsupported(
+        ensure!(
+            self.detection != Detection::DistanceField,
+            Error::Unsupported(
                 "contact_detection is DistanceField: a distance that is sampled once is for rigid tools, tissue changes its shape".into(),
-            ));
+            )
+        );
         Ok(())
     }
 }

@@ -91,7 +91,7 @@ impl World {
         self.write(&mut count);
         ensure!(
             !count.is_too_large(),
-            Error::Unsupported("the world keeps more room than bytes can ask for".into(),)
+            Error::Unsupported("the world keeps more room than bytes can ask for".into())
         );
         bytes.clear();
         memory::reserve(bytes, count.size())?;

@@ -212,7 +212,7 @@ impl ImageSpace {
         for view in 0..self.view_count {
             ensure!(
                 self.detect_along(self.views[view], bodies),
-                Error::Capacity("crossings: a single ray passes more faces than there is room for".into(),)
+                Error::Capacity("crossings: a single ray passes more faces than there is room for".into())
             );
         }
         let overlap = &mut self.overlap;
