@@ -11,7 +11,7 @@ use crate::body::Body;
 use crate::cutting::CutMaterial;
 use crate::def::{BodyDefinition, Values};
 use crate::geometry::vertex_normals;
-use crate::mesh::Mesh;
+use crate::mesh::{FURTHEST, Mesh};
 use crate::world::World;
 
 use bind::Binding;
@@ -302,7 +302,6 @@ fn check_is_to_come(definition: &BodyDefinition) -> Result<()> {
 }
 
 fn check(definition: &EmbeddingDefinition, node_count: usize) -> Result<()> {
-    const FURTHEST: f32 = 1e9;
     let EmbeddingDefinition {
         vertices,
         triangles,

@@ -125,17 +125,13 @@ pub(crate) fn clamped(matrix: &Matrix6, range: [f64; 2]) -> Matrix6 {
 mod tests {
     use super::*;
     use crate::geometry::rotation;
+    use crate::random::Random;
     use glam::DQuat;
 
-    /// Numbers from a fixed seed.
+    /// Numbers from -0.5 to 0.5.
     fn numbers() -> impl FnMut() -> f64 {
-        let mut state = 9u64;
-        move || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        }
+        let mut random = Random(9);
+        move || f64::from(random.unit()) - 0.5
     }
 
     fn symmetric(next: &mut impl FnMut() -> f64) -> Matrix6 {

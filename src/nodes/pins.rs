@@ -267,16 +267,16 @@ impl Pins {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
     use crate::threads::Team;
 
     #[test]
     fn every_tile_has_its_own_pins() {
-        let mut seed = 1_u64;
+        let mut random = Random(1);
         let mut pins = Pins::default();
         for _ in 0..2000 {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            let node = (seed >> 33) as u32 % (8 * TILE as u32);
-            if seed >> 32 & 1 == 0 {
+            let node = random.below(8 * TILE) as u32;
+            if random.below(2) == 0 {
                 pins.hold(node, BVec3::TRUE).expect("memory");
             } else {
                 pins.remove(node);

@@ -8,19 +8,7 @@ use std::time::Duration;
 use super::split::Split;
 use super::*;
 use crate::base::Error;
-
-/// Numbers that look random (SplitMix64).
-struct SplitMix64(u64);
-
-impl SplitMix64 {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((bits ^ (bits >> 31)) % end as u64) as usize
-    }
-}
+use crate::random::Random;
 
 type Task<'a> = &'a (dyn Fn(u32) + Sync);
 type TestJobs = &'static (dyn for<'a> Fn(u32, Task<'a>) + Sync);
@@ -78,7 +66,7 @@ fn everybody() -> Vec<Threads> {
 fn every_tile_of_every_pass_is_run_once_with_its_own_part() {
     for mut threads in everybody() {
         let name = format!("{threads:?}");
-        let mut random = SplitMix64(7);
+        let mut random = Random(7);
         for _ in 0..20 {
             let passes: Vec<usize> = (0..20).map(|_| random.below(40)).collect();
             let length = 1 + random.below(9);

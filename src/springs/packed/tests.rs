@@ -106,22 +106,39 @@ fn records(vectors: &Vectors) -> Records {
     records
 }
 
-fn forces(packed: &dyn Springs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<Vec3> {
+/// Checks forces on nodes, to this part of the terms of their sums: the sum of them all.
+fn check(what: &str, found: &[Vec3], expected: &[(DVec3, f64)], part: f64) -> DVec3 {
+    for (node, (found, (expected, size))) in found.iter().zip(expected).enumerate() {
+        let error = (found.as_dvec3() - *expected).length();
+        assert!(error <= part * size, "{what}, node {node}: {found} for {expected}");
+    }
+    found.iter().map(|force| force.as_dvec3()).sum()
+}
+
+fn forces_in(packed: &dyn Springs, motion: &Motion, count: usize) -> Vec<Vec3> {
     let mut all = Vec::new();
-    let records = records(positions);
-    for tile in 0..tile_count(positions.len()) {
+    for tile in 0..tile_count(count) {
         let mut forces = TileForces::ZERO;
-        packed.forces(tile, &Motion::at(positions, velocities), &mut forces);
-        let motion = Motion {
-            positions: positions.view().with_records(Some(&records)),
-            ..Motion::at(positions, velocities)
-        };
-        let mut of_records = TileForces::ZERO;
-        packed.forces(tile, &motion, &mut of_records);
-        assert_eq!(forces.axes(), of_records.axes(), "from records");
-        all.extend((0..tile_nodes(tile, positions.len()).len()).map(|place| forces.get(place)));
+        packed.forces(tile, motion, &mut forces);
+        all.extend((0..tile_nodes(tile, count).len()).map(|place| forces.get(place)));
     }
     all
+}
+
+/// From positions as they are, without records: with those the last places of a sum may differ.
+fn plain_forces(packed: &dyn Springs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<Vec3> {
+    forces_in(packed, &Motion::at(positions, velocities), positions.len())
+}
+
+fn forces(packed: &dyn Springs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<Vec3> {
+    let found = plain_forces(packed, positions, velocities);
+    let records = records(positions);
+    let motion = Motion {
+        positions: positions.view().with_records(Some(&records)),
+        ..Motion::at(positions, velocities)
+    };
+    assert_eq!(found, forces_in(packed, &motion, positions.len()), "from records");
+    found
 }
 
 /// The same in `f64`, and how large the terms of each sum are.
@@ -166,15 +183,7 @@ fn every_kernel_computes_the_forces() {
                 tried += 1;
                 assert_eq!(packed.damped(), damped && !pairs.is_empty());
                 let found = forces(&packed, &positions, velocities.as_ref().filter(|_| packed.damped()));
-                let mut sum = DVec3::ZERO;
-                for (node, (found, (expected, size))) in found.iter().zip(&expected).enumerate() {
-                    let error = (found.as_dvec3() - *expected).length();
-                    assert!(
-                        error <= 1e-6 * size,
-                        "{name}, {kernel:?}, node {node}: {found} for {expected}"
-                    );
-                    sum += found.as_dvec3();
-                }
+                let sum = check(&format!("{name}, {kernel:?}"), &found, &expected, 1e-6);
                 // Each end sees the opposite of what the other sees: only the sums of each node are rounded.
                 let total: f64 = expected.iter().map(|(_, size)| size).sum();
                 assert!(sum.length() <= 1e-7 * total.max(1e-30), "{name}, {kernel:?}: {sum}");
@@ -358,9 +367,7 @@ fn any_change_of_springs_is_kept() {
         assert!(packed.is_sound());
         assert_eq!(links(&packed, count), pairs);
         let expected = reference(&pairs, &positions, None);
-        for (found, (expected, size)) in forces(&packed, &positions, None).iter().zip(expected) {
-            assert!((found.as_dvec3() - expected).length() <= 1e-6 * size);
-        }
+        check("changed", &forces(&packed, &positions, None), &expected, 1e-6);
         let (used, held) = packed.bytes();
         assert!(used <= held);
     }
@@ -435,17 +442,6 @@ fn springs_that_are_changed_have_what_they_were_given_at_both_ends() {
     }
 }
 
-/// From positions as they are, without records: with those the last places of a sum may differ.
-fn plain_forces(packed: &dyn Springs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<Vec3> {
-    let mut all = Vec::new();
-    for tile in 0..tile_count(positions.len()) {
-        let mut forces = TileForces::ZERO;
-        packed.forces(tile, &Motion::at(positions, velocities), &mut forces);
-        all.extend((0..tile_nodes(tile, positions.len()).len()).map(|place| forces.get(place)));
-    }
-    all
-}
-
 #[test]
 fn nodes_that_come_later_have_their_springs() {
     const MORE: usize = 700;
@@ -480,12 +476,7 @@ fn nodes_that_come_later_have_their_springs() {
                 let expected = reference(&pairs, &positions, velocities.as_ref());
                 let found = plain_forces(&packed, &positions, velocities.as_ref());
                 assert_eq!(found.len(), count + MORE);
-                for (node, (found, (expected, size))) in found.iter().zip(expected).enumerate() {
-                    assert!(
-                        (found.as_dvec3() - expected).length() <= 2e-6 * size,
-                        "{name}, node {node}"
-                    );
-                }
+                check(name, &found, &expected, 2e-6);
                 // And as it was, without them.
                 rewiring.removed = std::mem::take(&mut rewiring.added);
                 packed.rewire(&rewiring).expect("memory");
@@ -496,12 +487,7 @@ fn nodes_that_come_later_have_their_springs() {
                 let positions = vectors(count, &mut random);
                 let expected = reference(&pairs, &positions, None);
                 if !packed.damped() {
-                    for (found, (expected, size)) in plain_forces(&packed, &positions, None).iter().zip(expected) {
-                        assert!(
-                            (found.as_dvec3() - expected).length() <= 2e-6 * size,
-                            "{name}, as it was"
-                        );
-                    }
+                    check(name, &plain_forces(&packed, &positions, None), &expected, 2e-6);
                 }
             }
         }
