@@ -9,6 +9,8 @@ use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
 use super::tool::{sinew_tool_id, write_pose};
+use crate::base::Result;
+use crate::def::CollisionFilter;
 use crate::world::World;
 
 /// 1 where there is a world that has something, else 0.
@@ -22,6 +24,15 @@ unsafe fn is_there(world: *const sinew_world, mut has: impl FnMut(&World) -> boo
         Ok(())
     });
     u32::from(is_there)
+}
+
+/// Writes what a filter holds.
+///
+/// # Safety
+/// As of what calls it.
+unsafe fn write_filter(filter: CollisionFilter, out_category: *mut u32, out_mask: *mut u32) -> Result<()> {
+    let category = ("out_category", out_category, filter.category);
+    memory::write_both(category, ("out_mask", out_mask, filter.mask))
 }
 
 /// Returns 1 if a body with this id exists in the world, else 0; also for a NULL world.
@@ -137,9 +148,7 @@ pub unsafe extern "C" fn sinew_tool_get_collision(
     out_mask: *mut u32,
 ) -> sinew_status {
     with_world(world, |world| {
-        let filter = world.collision_filter(tool.id())?;
-        let category = ("out_category", out_category, filter.category);
-        memory::write_both(category, ("out_mask", out_mask, filter.mask))
+        write_filter(world.collision_filter(tool.id())?, out_category, out_mask)
     })
 }
 
@@ -152,9 +161,7 @@ pub unsafe extern "C" fn sinew_body_get_collision(
     out_mask: *mut u32,
 ) -> sinew_status {
     with_body(world, body, |body| {
-        let filter = body.collision_filter();
-        let category = ("out_category", out_category, filter.category);
-        memory::write_both(category, ("out_mask", out_mask, filter.mask))
+        write_filter(body.collision_filter(), out_category, out_mask)
     })
 }
 
@@ -190,8 +197,6 @@ pub unsafe extern "C" fn sinew_blade_get_collision(
     out_mask: *mut u32,
 ) -> sinew_status {
     with_world(world, |world| {
-        let filter = world.blade_collision_filter(blade.id())?;
-        let category = ("out_category", out_category, filter.category);
-        memory::write_both(category, ("out_mask", out_mask, filter.mask))
+        write_filter(world.blade_collision_filter(blade.id())?, out_category, out_mask)
     })
 }

@@ -120,6 +120,12 @@ impl Pose {
         }
     }
 
+    /// The pose at another position, and turned, `None`: as it is; checked.
+    pub(crate) fn moved(self, position: Vec3, orientation: Option<Quat>) -> Result<Self> {
+        let orientation = orientation.unwrap_or(self.orientation);
+        Self { position, orientation }.checked()
+    }
+
     /// The pose with its orientation normalised; refused where it has no direction, is not finite or too far away.
     pub(crate) fn checked(self) -> Result<Self> {
         finite_vector("position", self.position)?;

@@ -141,11 +141,21 @@ pub(crate) trait Divided<const N: usize> {
 
 /// What surfaces and solids tell of themselves alike, and [`Divided`] with what is particular to each.
 macro_rules! divided {
-    ($body:ident, $corners:literal, $cell:ident { $material:ident }, $simplices:ident, { $($own:tt)* }) => {
+    ($body:ident, $corners:literal, $cell:ident { $material:ident }, $simplices:ident, $triangle:ident, { $($own:tt)* }) => {
         impl $body {
             /// How many nodes there are: those of the body, and copies and bound points, which are numbered on.
             pub fn node_count(&self) -> u32 {
                 self.nodes.count()
+            }
+
+            /// The cells; those made by cuts follow the first ones.
+            pub fn cells(&self) -> &[$cell] {
+                self.cells.values()
+            }
+
+            /// The triangles that are drawn; none is ever taken away.
+            pub fn triangles(&self) -> &[$triangle] {
+                self.triangles.values()
             }
 
             /// Where a node is in the rest shape.

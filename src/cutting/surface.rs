@@ -129,7 +129,7 @@ pub struct CutSurface {
 
 saved! { CutSurface { nodes, cells, triangles, vertices } }
 
-divided!(CutSurface, 3, SurfaceCell { area }, triangles, {
+divided!(CutSurface, 3, SurfaceCell { area }, triangles, SurfaceTriangle, {
     const EDGES: &'static [[usize; 2]] = &[[0, 1], [1, 2], [2, 0]];
     const SIDES: [&'static [usize]; 3] = [&[0, 1], &[1, 2], &[2, 0]];
 
@@ -206,16 +206,6 @@ impl CutSurface {
         self.cells.reserve(2 * nodes)?;
         self.triangles.reserve(4 * nodes)?;
         self.vertices.reserve(4 * nodes)
-    }
-
-    /// The cells; those made by cuts follow the first ones.
-    pub fn cells(&self) -> &[SurfaceCell] {
-        self.cells.values()
-    }
-
-    /// The triangles that are drawn; none is ever taken away.
-    pub fn triangles(&self) -> &[SurfaceTriangle] {
-        self.triangles.values()
     }
 
     /// The vertices of what is drawn; none is ever taken away.

@@ -10,7 +10,6 @@ use glam::{DVec3, Quat, Vec3};
 use super::World;
 use super::blade::{Blade, BladeDefinition, BladeReport, MOST_HOLDS, Stand};
 use crate::base::{BladeId, BodyId, Result, SlotId};
-use crate::contact::Pose;
 use crate::def::CollisionFilter;
 use crate::slots::Slots;
 use crate::tissue::Lead;
@@ -69,11 +68,7 @@ impl World {
     pub fn set_blade_pose(&mut self, blade: BladeId, position: Vec3, orientation: Option<Quat>) -> Result<()> {
         let blade = self.blades.get_mut(blade.0)?;
         let pose = blade.target.unwrap_or(blade.pose);
-        let target = Pose {
-            position,
-            orientation: orientation.unwrap_or(pose.orientation),
-        };
-        blade.target = Some(target.checked()?);
+        blade.target = Some(pose.moved(position, orientation)?);
         Ok(())
     }
 

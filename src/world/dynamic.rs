@@ -4,7 +4,7 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::World;
 use crate::base::{Error, Result, ToolId, ensure, memory};
-use crate::contact::{DynamicTool, MassProperties, Pose, Rigid};
+use crate::contact::{DynamicTool, MassProperties, Rigid};
 use crate::def::finite_vector;
 use crate::solver::Outcome;
 
@@ -107,12 +107,7 @@ impl World {
     pub fn teleport(&mut self, tool: ToolId, position: Vec3, orientation: Option<Quat>) -> Result<()> {
         self.check_not_led(tool)?;
         let place = self.tools.place(tool.0)?;
-        let it = self.tools.get(tool.0)?;
-        let pose = Pose {
-            position,
-            orientation: orientation.unwrap_or(it.pose.orientation),
-        };
-        let pose = pose.checked()?;
+        let pose = self.tools.get(tool.0)?.pose.moved(position, orientation)?;
         ensure!(
             !self.is_holding(place),
             "tool holds attachments: release them before it is moved at once"

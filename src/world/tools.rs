@@ -104,11 +104,7 @@ impl World {
         self.check_kinematic(tool)?;
         let tool = self.tools.get_mut(tool.0)?;
         let pose = tool.target.unwrap_or(tool.pose);
-        let target = Pose {
-            position,
-            orientation: orientation.unwrap_or(pose.orientation),
-        };
-        tool.target = Some(target.checked()?);
+        tool.target = Some(pose.moved(position, orientation)?);
         Ok(())
     }
 

@@ -192,7 +192,7 @@ pub struct CutSolid {
 
 saved! { CutSolid { nodes, cells, tetrahedra, triangles, vertices, strokes, stroke, before } }
 
-divided!(CutSolid, 4, SolidCell { volume }, tetrahedra, {
+divided!(CutSolid, 4, SolidCell { volume }, tetrahedra, SolidTriangle, {
     const EDGES: &'static [[usize; 2]] = &[[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
     const SIDES: [&'static [usize]; 4] = [&FACES[0], &FACES[1], &FACES[2], &FACES[3]];
 
@@ -225,19 +225,9 @@ impl CutSolid {
         self.vertices.reserve(4 * nodes)
     }
 
-    /// The cells; those made by cuts follow the first ones.
-    pub fn cells(&self) -> &[SolidCell] {
-        self.cells.values()
-    }
-
     /// The tetrahedra of the material; none is ever taken away.
     pub fn tetrahedra(&self) -> &[SolidTetrahedron] {
         self.tetrahedra.values()
-    }
-
-    /// The triangles that are drawn; none is ever taken away.
-    pub fn triangles(&self) -> &[SolidTriangle] {
-        self.triangles.values()
     }
 
     /// The vertices of the material, drawn or not; none is ever taken away. At first there is one for each node, with its number.
