@@ -6,7 +6,7 @@ use super::cuttable::Cuttable;
 use super::{Body, CutReport};
 use crate::base::{Error, Result, memory};
 use crate::cutting::{CutSurface, Divided, VertexLoad};
-use crate::def::{TearReport, Values, Withheld, check_values};
+use crate::def::{TearReport, Values, Withheld, check_given};
 use crate::springs::{Link, pull};
 use crate::threads::Team;
 use crate::tissue::Skin;
@@ -36,11 +36,7 @@ impl Body {
         strains: Option<Values>,
         forces: Option<Values>,
     ) -> Result<()> {
-        for (name, values) in [("strain", &strains), ("force", &forces)] {
-            if let Some(values) = values {
-                check_values(name, values, pairs.len())?;
-            }
-        }
+        check_given([("strain", strains), ("force", forces)], pairs.len())?;
         let springs = self.borne_by_pairs(pairs)?;
         let tears = self.tears.as_mut().ok_or_else(not_made_to_tear)?;
         tears.reserve(pairs.len())?;

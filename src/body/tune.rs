@@ -2,7 +2,7 @@
 
 use super::Body;
 use crate::base::{Error, Result, memory};
-use crate::def::{Values, check_values};
+use crate::def::{Values, check_given};
 use crate::solver::{Changed, make_up_for};
 use crate::springs::{Link, SpringChange, not_joined, pull};
 
@@ -60,11 +60,7 @@ impl Body {
         stiffnesses: Option<Values>,
         rest_lengths: Option<Values>,
     ) -> Result<()> {
-        for (name, values) in [("stiffness", &stiffnesses), ("rest_length", &rest_lengths)] {
-            if let Some(values) = values {
-                check_values(name, values, pairs.len())?;
-            }
-        }
+        check_given([("stiffness", stiffnesses), ("rest_length", rest_lengths)], pairs.len())?;
         let mut changes = memory::reserved(pairs.len())?;
         for index in 0..pairs.len() {
             let (node, before) = self.link_of_pair(pairs, index)?;

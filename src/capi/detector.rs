@@ -409,8 +409,6 @@ pub unsafe extern "C" fn sinew_detector_destroy(detector: *mut sinew_detector) {
 }
 
 fn index_of(side: u32) -> Result<usize> {
-    if side < 2 {
-        return Ok(side as usize);
-    }
-    Err(Error::invalid(format!("side is {side}: must be 0 or 1")))
+    ensure!(side < 2, "side is {side}: must be 0 or 1");
+    Ok(side as usize)
 }

@@ -30,7 +30,7 @@ pub(crate) use springs::{Rounding, Spring, distance};
 pub(crate) use tearing::Withheld;
 pub use tearing::{TearReport, Tearing};
 pub use values::Values;
-pub(crate) use values::{check_values, expect_count, finite_vector, finite_vectors, node_indices};
+pub(crate) use values::{check_given, check_values, expect_count, finite_vector, finite_vectors, node_indices};
 pub use viscosity::Viscosity;
 pub(crate) use viscosity::{Carried, RelaxationStep};
 pub use yielding::Yielding;

@@ -124,11 +124,10 @@ impl Tearing {
                 self.force
             )));
         }
-        if definition.triangles.is_empty() && definition.tetrahedra.is_empty() {
-            return Err(Error::Unsupported(format!(
-                "most_tears is {most}: bodies without triangles do not tear"
-            )));
-        }
+        ensure!(
+            !definition.triangles.is_empty() || !definition.tetrahedra.is_empty(),
+            Error::Unsupported(format!("most_tears is {most}: bodies without triangles do not tear"))
+        );
         Ok(())
     }
 }

@@ -87,6 +87,12 @@ pub(crate) fn check_values(name: &str, values: &Values, count: usize) -> Result<
     }
 }
 
+/// The same for those that are given.
+pub(crate) fn check_given(given: [(&str, Option<Values>); 2], count: usize) -> Result<()> {
+    let mut given = given.iter().filter_map(|(name, values)| Some((name, values.as_ref()?)));
+    given.try_for_each(|(name, values)| check_values(name, values, count))
+}
+
 fn plural(name: &str) -> String {
     match name.strip_suffix("ss") {
         Some(_) => format!("{name}es"),
