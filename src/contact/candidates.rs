@@ -199,24 +199,7 @@ impl Candidates {
         self.zones.clear();
         self.slack = slack;
         for tool in tools.clone() {
-            self.zones.push(match Zone::of(tool, origin) {
-                Zone::Box { slot, bounds } => Zone::Box {
-                    slot,
-                    bounds: bounds.extended(slack),
-                },
-                Zone::Mesh {
-                    slot,
-                    bounds,
-                    standing,
-                    allowance,
-                } => Zone::Mesh {
-                    slot,
-                    bounds: bounds.extended(slack),
-                    standing,
-                    allowance: allowance + slack,
-                },
-                plane => plane,
-            });
+            self.zones.push(Zone::of(tool, origin).extended(slack));
         }
         let reach = margin + slack;
         self.reach = reach;

@@ -41,7 +41,7 @@ pub(super) enum Solid {
 }
 
 /// Where a mesh is and how it is turned, in a body's coordinates.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placement {
     pub centre: Vec3,
     pub orientation: Quat,

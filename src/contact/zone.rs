@@ -14,7 +14,7 @@ use crate::geometry::Bounds;
 /// cannot, its corners alone meet the tool.
 const SAG: f32 = 0.04;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Zone {
     /// About all that a tool sweeps, with the slack that nodes need.
     Box { slot: usize, bounds: Bounds },
@@ -66,6 +66,17 @@ impl Zone {
         matches!(self, Zone::Box { .. } | Zone::Mesh { .. })
     }
 
+    /// With so much slack, m.
+    pub(super) fn extended(mut self, slack: f32) -> Self {
+        if let Zone::Box { bounds, .. } | Zone::Mesh { bounds, .. } = &mut self {
+            *bounds = bounds.extended(slack);
+        }
+        if let Zone::Mesh { allowance, .. } = &mut self {
+            *allowance += slack;
+        }
+        self
+    }
+
     /// Whether it is good for this tool on its way.
     pub(super) fn covers(&self, tool: &ToolPath, origin: DVec3) -> bool {
         match (*self, Zone::of(tool, origin)) {
@@ -85,14 +96,7 @@ impl Zone {
                 },
                 Zone::Mesh { slot: other, .. },
             ) => slot == other && tool.furthest_from(&standing, origin) <= allowance,
-            (
-                Zone::Behind { slot, point, normal },
-                Zone::Behind {
-                    slot: other,
-                    point: there,
-                    normal: turned,
-                },
-            ) => slot == other && point == there && normal == turned,
+            (behind @ Zone::Behind { .. }, other) => behind == other,
             _ => false,
         }
     }

@@ -413,21 +413,18 @@ impl World {
     /// Ends what the last step was too much for.
     pub(super) fn end_slipped(&mut self) {
         self.slipped.clear();
+        let mut end = |id| {
+            if self.attachments.remove(id).is_ok() {
+                self.slipped.push(AttachmentId(id));
+            }
+        };
         for (place, body) in self.bodies.iter_mut() {
             if let Some(Outcome::Done { .. }) = self.outcomes[place] {
-                body.system_mut().slip(|id| {
-                    if self.attachments.remove(id).is_ok() {
-                        self.slipped.push(AttachmentId(id));
-                    }
-                });
+                body.system_mut().slip(&mut end);
             }
         }
         if let Some(tissue) = &mut self.tissue {
-            tissue.bonds.slip(&mut self.bodies, |id| {
-                if self.attachments.remove(id).is_ok() {
-                    self.slipped.push(AttachmentId(id));
-                }
-            });
+            tissue.bonds.slip(&mut self.bodies, end);
         }
     }
 }
