@@ -159,6 +159,15 @@ impl<T: Numbers> Past<T> {
 }
 
 impl OfPart {
+    /// Of so many groups; whether what relaxes is remembered, and what yields.
+    fn new(has_arms: bool, yields: bool, count: usize) -> Result<Self> {
+        Ok(Self {
+            past: Past::new(if has_arms { count } else { 0 })?,
+            set: if yields { Some(PlasticSet::new(count)?) } else { None },
+            newest: memory::filled(Stresses::ZERO, count)?,
+        })
+    }
+
     /// On top of the elastic stresses.
     pub fn loads(&self) -> &[Stresses] {
         self.set.as_ref().map_or(&self.past.loads, |set| &set.loads)
@@ -187,13 +196,7 @@ impl OfPart {
         let [stresses, kept, loads] = set
             .as_mut()
             .map_or([&mut [][..], &mut [], &mut []], PlasticSet::fields_mut);
-        let Past {
-            arms,
-            elastic,
-            loads: of_arms,
-            kept_arms,
-            kept_elastic,
-        } = past;
+        let [arms, elastic, of_arms, kept_arms, kept_elastic] = past.fields_mut();
         [
             arms,
             elastic,
@@ -228,21 +231,18 @@ impl Memory {
         if viscosity.is_none() && !yields {
             return Ok(None);
         }
-        let of_parts = memory::try_collected(parts.iter().map(|part| {
-            let count = part.groups.as_slice().len();
-            Ok(OfPart {
-                past: Past::new(if viscosity.is_none() { 0 } else { count })?,
-                set: if yields { Some(PlasticSet::new(count)?) } else { None },
-                newest: memory::filled(Stresses::ZERO, count)?,
-            })
-        }))?;
+        let has_arms = !viscosity.is_none();
+        let of_parts = parts
+            .iter()
+            .map(|part| OfPart::new(has_arms, yields, part.groups.as_slice().len()));
+        let of_parts = memory::try_collected(of_parts)?;
         Ok(Some(memory::boxed(Self {
             viscosity,
             gain: 0.0,
             bounds: yields.then(|| YieldBounds::new(law, yielding)),
             parts: of_parts,
             spare: Vec::new(),
-            rings: Past::new(if viscosity.is_none() { 0 } else { ring_count })?,
+            rings: Past::new(if has_arms { ring_count } else { 0 })?,
         })?))
     }
 
@@ -250,12 +250,7 @@ impl Memory {
     pub fn reserve_parts(&mut self, more: usize, groups: usize) -> Result<()> {
         self.parts.try_reserve(more)?;
         while self.spare.len() < more {
-            let yields = self.bounds.is_some();
-            let part = OfPart {
-                past: Past::new(if self.viscosity.is_none() { 0 } else { groups })?,
-                set: if yields { Some(PlasticSet::new(groups)?) } else { None },
-                newest: memory::filled(Stresses::ZERO, groups)?,
-            };
+            let part = OfPart::new(!self.viscosity.is_none(), self.bounds.is_some(), groups)?;
             memory::push(&mut self.spare, part)?;
         }
         Ok(())
