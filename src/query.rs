@@ -8,7 +8,7 @@ use crate::base::{BodyId, Result, ToolId, ensure};
 use crate::body::Body;
 use crate::def::{CollisionFilter, finite_vector};
 use crate::geometry::Bounds;
-use crate::geometry::nearest::nearest_on_triangle;
+use crate::geometry::nearest::{nearest_on_triangle, weighted};
 use crate::geometry::predicates::pierce;
 use crate::world::World;
 
@@ -193,7 +193,7 @@ impl World {
             body.query_tree()?.nearest(&about, limit as f32, |triangle| {
                 let (_, corners) = body.surface_triangle(triangle);
                 let (weights, _) = nearest_on_triangle(place, corners);
-                let distance = place.distance(mixed(corners, weights));
+                let distance = place.distance(weighted(corners, weights));
                 if distance < limit || distance == limit && found.is_none() {
                     replace_if_first(&mut first, (distance, triangle));
                 }
@@ -218,7 +218,7 @@ impl SurfaceHit {
             body: id,
             triangle: triangle as u32,
             weights: weights.map(|weight| weight as f32),
-            position: mixed(corners, weights).as_vec3(),
+            position: weighted(corners, weights).as_vec3(),
             normal: (b - a).cross(c - a).normalize_or_zero().as_vec3(),
             distance: distance as f32,
         }
@@ -246,10 +246,6 @@ fn replace_if_first(first: &mut Option<(f64, usize)>, other: (f64, usize)) {
     if first.is_none_or(|first| other < first) {
         *first = Some(other);
     }
-}
-
-fn mixed(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
-    corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
 }
 
 fn check_distance(max_distance: f32) -> Result<()> {

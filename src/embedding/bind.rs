@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3, Vec3};
 use crate::base::{Result, ensure, memory};
 use crate::cutting::{CutSolid, CutSurface};
 use crate::geometry::Bounds;
-use crate::geometry::nearest::nearest_on_triangle;
+use crate::geometry::nearest::{nearest_on_triangle, weighted};
 use crate::geometry::tree::Tree;
 
 /// A vertex in a tetrahedron, or beside one.
@@ -176,10 +176,6 @@ fn over(point: DVec3, nodes: [u32; 3], corners: [Vec3; 3]) -> OverTriangle {
         weights: [along_b, along_c],
         offset,
     }
-}
-
-pub(super) fn weighted(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
-    corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
 }
 
 /// A tetrahedron where it is.

@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
-use super::bind::{Binding, PlacedTetrahedron, weighted};
+use super::bind::{Binding, PlacedTetrahedron};
 use crate::base::{Error, Result, memory};
 use crate::cutting::{CutMaterial, Divided, weighed};
-use crate::geometry::nearest::nearest_on_triangle;
+use crate::geometry::nearest::{nearest_on_triangle, weighted};
 
 /// What following cuts asks for: kept for bodies that may be cut.
 #[derive(Debug)]

@@ -11,6 +11,11 @@ pub(crate) enum Spot {
     Corner(usize),
 }
 
+/// The point of a triangle with these weights.
+pub(crate) fn weighted(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
+    corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
+}
+
 /// The point of triangle `a b c` that is closest to `point`, as weights, and what it lies on (Ericson 2005, chapter 5).
 pub(crate) fn nearest_on_triangle(point: DVec3, [a, b, c]: [DVec3; 3]) -> ([f64; 3], Spot) {
     let (ab, ac) = (b - a, c - a);

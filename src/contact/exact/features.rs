@@ -7,7 +7,7 @@ use super::deepest::{Deepest, deepest, lies_between};
 use super::{ExactSolid, ROUNDING, TOUCHING};
 use crate::contact::closest::Closest;
 use crate::geometry::Bounds;
-use crate::geometry::nearest::{Spot, nearest_of_segments, nearest_on_triangle};
+use crate::geometry::nearest::{Spot, nearest_of_segments, nearest_on_triangle, weighted};
 use crate::geometry::predicates::pierce;
 use crate::geometry::tree::PlacedTriangle;
 
@@ -155,7 +155,7 @@ impl ExactSolid {
             for node in self.facets.salient_nodes(place) {
                 let position = self.facets.position(node);
                 let (weights, part) = nearest_on_triangle(position, face);
-                let offset = face[0] * weights[0] + face[1] * weights[1] + face[2] * weights[2] - position;
+                let offset = weighted(face, weights) - position;
                 let pair = Pair::new(weights, offset);
                 pairs.see(pair, || part == Spot::Face && self.facets.leads_off_node(node, offset));
             }
@@ -227,7 +227,7 @@ impl ExactSolid {
         if !(furthest > 0.0 && furthest.is_finite()) {
             return weights;
         }
-        let from = face[0] * weights[0] + face[1] * weights[1] + face[2] * weights[2];
+        let from = weighted(face, weights);
         let ends = [from, from + inward * furthest];
         let mut leaves = 1.0_f64;
         let bounds = Bounds::of(ends.map(|end| end.as_vec3()).into_iter());

@@ -19,7 +19,7 @@ use self::deepest::Signed;
 use self::facets::Facets;
 use crate::base::Result;
 use crate::geometry::Bounds;
-use crate::geometry::nearest::{Spot, nearest_on_triangle};
+use crate::geometry::nearest::{Spot, nearest_on_triangle, weighted};
 use crate::geometry::predicates::pierce;
 use crate::geometry::tree::Tree;
 use crate::mesh::ClosedSurface;
@@ -152,7 +152,7 @@ impl ExactSolid {
             }
             let corners = placed.exact();
             let (weights, part) = nearest_on_triangle(exact, corners);
-            let offset = exact - (corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]);
+            let offset = exact - weighted(corners, weights);
             let squared = offset.length_squared();
             if squared < limit || found.is_none() && squared == limit {
                 limit = squared;

@@ -10,7 +10,7 @@ use crate::base::{Error, Result, above_zero, ensure, memory};
 use crate::contact::distance::closest_on_triangle;
 use crate::contact::exact::coarse::{CoarseField, Sample};
 use crate::geometry::Bounds;
-use crate::geometry::nearest::nearest_on_triangle;
+use crate::geometry::nearest::{nearest_on_triangle, weighted};
 use crate::geometry::tree::{PlacedTriangle, Tree};
 use crate::mesh;
 
@@ -328,7 +328,7 @@ fn nearest_of(tree: &Tree, point: Vec3, hint: u32) -> Sample {
     let squared = |place: usize| {
         let corners = tree.placed(place).exact();
         let (weights, _) = nearest_on_triangle(exact, corners);
-        exact.distance_squared(corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2])
+        exact.distance_squared(weighted(corners, weights))
     };
     let mut best = (squared(hint as usize), hint);
     let bounds = Bounds { min: point, max: point };
