@@ -317,28 +317,20 @@ impl Columns {
 
     /// Bytes in use, and bytes held from the allocator.
     pub fn bytes(&self) -> (usize, usize) {
-        let (strays, strays_held) = self.strays.bytes();
-        let used = size_of_val(&*self.blocks)
-            + size_of_val(&*self.runs)
-            + size_of_val(&*self.own_runs)
-            + size_of_val(&*self.near)
-            + size_of_val(&*self.near_indices)
-            + size_of_val(&*self.far)
-            + size_of_val(&*self.far_indices)
-            + size_of_val(&*self.own_rest_lengths)
-            + size_of_val(&*self.own_stiffnesses)
-            + size_of_val(&*self.own_dampings);
-        let held = held(&self.blocks)
-            + held(&self.runs)
-            + held(&self.own_runs)
-            + held(&self.near)
-            + held(&self.near_indices)
-            + held(&self.far)
-            + held(&self.far_indices)
-            + held(&self.own_rest_lengths)
-            + held(&self.own_stiffnesses)
-            + held(&self.own_dampings);
-        (used + strays, held + strays_held)
+        let of_lists = [
+            bytes_of(&self.blocks),
+            bytes_of(&self.runs),
+            bytes_of(&self.own_runs),
+            bytes_of(&self.near),
+            bytes_of(&self.near_indices),
+            bytes_of(&self.far),
+            bytes_of(&self.far_indices),
+            bytes_of(&self.own_rest_lengths),
+            bytes_of(&self.own_stiffnesses),
+            bytes_of(&self.own_dampings),
+        ];
+        let add = |(used, held), (more, more_held)| (used + more, held + more_held);
+        of_lists.into_iter().fold(self.strays.bytes(), add)
     }
 
     /// Shows the links of `node`.
@@ -516,8 +508,8 @@ impl Columns {
     }
 }
 
-fn held<T>(values: &Vec<T>) -> usize {
-    values.capacity() * size_of::<T>()
+fn bytes_of<T>(values: &Vec<T>) -> (usize, usize) {
+    (size_of_val(&**values), values.capacity() * size_of::<T>())
 }
 
 fn set_lanes(lanes: u16) -> impl Iterator<Item = usize> {
