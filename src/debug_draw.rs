@@ -180,7 +180,7 @@ fn draw_sleeping(body: &Body, canvas: &mut dyn DebugCanvas) {
     let positions = body.positions();
     let count = body.node_count();
     let sleeps = |node: u32| {
-        let tile = body.system().own(node) as usize / TILE;
+        let tile = body.system().order.own(node) as usize / TILE;
         tile < tile_count(count) && sleeper.is_asleep(tile)
     };
     for triangle in body.surface() {
@@ -194,7 +194,7 @@ fn draw_springs(body: &Body, full: f32, canvas: &mut dyn DebugCanvas) {
     let positions = body.positions();
     for (node, &place) in positions.iter().enumerate() {
         let system = body.system();
-        let own = system.own(node as u32) as usize;
+        let own = system.order.own(node as u32) as usize;
         system.forces.springs.visit(own, &mut |link| {
             let other = system.callers(link.neighbour as usize);
             if other > node && link.rest_length > 0.0 {

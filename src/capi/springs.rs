@@ -43,16 +43,14 @@ pub unsafe extern "C" fn sinew_body_get_springs(
 ) -> sinew_status {
     with_body(world, body, |body| {
         let pairs = memory::array("pairs", pairs.cast::<[u32; 2]>(), count)?;
-        let mut out_stiffnesses = memory::optional_output_array("out_stiffnesses", out_stiffnesses, count)?;
-        let mut out_rest_lengths = memory::optional_output_array("out_rest_lengths", out_rest_lengths, count)?;
+        let out_stiffnesses = memory::optional_output_array("out_stiffnesses", out_stiffnesses, count)?;
+        let out_rest_lengths = memory::optional_output_array("out_rest_lengths", out_rest_lengths, count)?;
         let springs = body.springs(pairs)?;
-        for (index, spring) in springs.into_iter().enumerate() {
-            if let Some(out_stiffnesses) = &mut out_stiffnesses {
-                out_stiffnesses[index] = spring.stiffness;
-            }
-            if let Some(out_rest_lengths) = &mut out_rest_lengths {
-                out_rest_lengths[index] = spring.rest_length;
-            }
+        for (out, spring) in out_stiffnesses.unwrap_or_default().iter_mut().zip(&springs) {
+            *out = spring.stiffness;
+        }
+        for (out, spring) in out_rest_lengths.unwrap_or_default().iter_mut().zip(&springs) {
+            *out = spring.rest_length;
         }
         Ok(())
     })

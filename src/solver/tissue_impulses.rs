@@ -38,11 +38,6 @@ impl System {
         self.order.own_triangles(&self.surface)
     }
 
-    /// Its own number of one of the caller's.
-    pub fn own(&self, callers: u32) -> u32 {
-        self.order.own(callers)
-    }
-
     /// How many nodes may come that there is room for.
     pub fn spare_nodes(&self) -> usize {
         self.node_room.saturating_sub(self.node_count())

@@ -115,7 +115,7 @@ impl Skin {
             return Ok(None);
         };
         let known = body.node_count();
-        let own = |corners: [u32; 3]| corners.map(|corner| body.own(corner));
+        let own = |corners: [u32; 3]| corners.map(|corner| body.order.own(corner));
         let (changed, added) = (to_be.change.changed, to_be.change.added);
         let mut triangles = memory::reserved(changed.len() + added.len())?;
         triangles.extend(changed.iter().map(|&(number, corners)| (number as usize, own(corners))));
