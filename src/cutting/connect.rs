@@ -59,7 +59,7 @@ impl Cut<'_> {
     pub(crate) fn set_cut(&mut self, triangle: u32, side: usize, is_cut: bool) -> Result<()> {
         let it = &self.surface.triangles[triangle];
         let across = it.neighbours[side];
-        let back = self.side_from(across, it.corners[(side + 1) % 3]);
+        let back = self.surface.corner(across, it.corners[(side + 1) % 3]);
         self.surface
             .triangles
             .edit(triangle, |triangle| triangle.rim[side] = is_cut)?;

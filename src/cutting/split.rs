@@ -17,7 +17,7 @@ impl Cut<'_> {
         if across == NONE {
             return self.point_at(b, far).map(|()| middle);
         }
-        let back = self.side_from(across, b);
+        let back = self.surface.corner(across, b);
         let other = self.half(across, back, middle)?;
         self.link(triangle, a, other)?;
         self.link(far, middle, across)?;
@@ -109,14 +109,9 @@ impl Cut<'_> {
         Ok(number)
     }
 
-    /// Which side of a triangle starts at a vertex.
-    pub(crate) fn side_from(&self, triangle: u32, vertex: u32) -> usize {
-        self.surface.corner(triangle, vertex)
-    }
-
     /// Across the side that starts at a vertex lies `neighbour`.
     fn link(&mut self, triangle: u32, from: u32, neighbour: u32) -> Result<()> {
-        let side = self.side_from(triangle, from);
+        let side = self.surface.corner(triangle, from);
         self.surface
             .triangles
             .edit(triangle, |triangle| triangle.neighbours[side] = neighbour)
