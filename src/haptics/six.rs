@@ -125,13 +125,17 @@ pub(crate) fn clamped(matrix: &Matrix6, range: [f64; 2]) -> Matrix6 {
 mod tests {
     use super::*;
     use crate::geometry::rotation;
-    use crate::random::Random;
     use glam::DQuat;
 
-    /// Numbers from -0.5 to 0.5.
+    /// Numbers from a fixed seed.
     fn numbers() -> impl FnMut() -> f64 {
-        let mut random = Random(9);
-        move || f64::from(random.unit()) - 0.5
+        let mut state = 9u64;
+        move || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        }
     }
 
     fn symmetric(next: &mut impl FnMut() -> f64) -> Matrix6 {
