@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{BodyId, Result, ensure, memory};
 use crate::body::Body;
 use crate::contact::{Contact, Form, Pose, Tool};

@@ -4,6 +4,8 @@ mod tools;
 
 use glam::{DVec3, Vec3};
 
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{BodyId, Result, ToolId, ensure};
 use crate::body::Body;
 use crate::def::{CollisionFilter, finite_vector};

@@ -9,6 +9,8 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{Result, all_finite, memory};
 use crate::def::{Values, check_values, expect_count, finite_vectors, node_indices};
 

@@ -25,6 +25,8 @@ mod tools;
 
 use glam::Vec3;
 
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{AttachmentId, Profile, Result, StateHasher, WorldTag, ensure, not_negative};
 use crate::body::Body;
 use crate::contact::{DynamicTool, Tool, ToolPath};

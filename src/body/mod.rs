@@ -36,6 +36,8 @@ mod whole;
 
 use glam::{DVec3, Vec3};
 
+#[cfg(doc)]
+use crate::base::Error;
 use crate::def::{BodyDefinition, EnclosedReport, Energy, SolverChoice, SolverReport, Storage, StorageReport};
 use crate::geometry::Bounds;
 use crate::simd::ChosenKernel;

@@ -3,6 +3,8 @@
 use glam::Vec3;
 
 use super::Body;
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{Result, ensure, memory};
 use crate::def::finite_vector;
 

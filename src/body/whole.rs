@@ -3,6 +3,8 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::Body;
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{Result, ensure, finite, memory};
 use crate::def::{CollisionFilter, expect_count, finite_vector};
 use crate::geometry::{Bounds, vertex_normals};

@@ -6,6 +6,8 @@ use super::definition::{Coupling, spread};
 use super::model::{HapticContact, WrenchModel};
 use super::observer::Observer;
 use super::six::{self, Vector6};
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{Result, ensure};
 use crate::contact::Pose;
 use crate::def::finite_vector;

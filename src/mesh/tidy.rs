@@ -7,6 +7,8 @@ use glam::DVec3;
 use super::topology::{boundary, smallest_first, sorted, turn_outward};
 use super::{Mesh, tetrahedron_volume};
 use crate::Result;
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{ensure, memory};
 
 /// In [`LoadedMesh::node_of_vertex`]: the vertex was dropped.

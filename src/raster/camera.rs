@@ -2,6 +2,8 @@
 
 use super::view::{View, axes};
 use crate::Result;
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::ensure;
 use glam::{DVec3, Vec3};
 

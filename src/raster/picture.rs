@@ -9,6 +9,8 @@ use super::shade::{self, Encoder, Lights, SurfacePlace};
 use super::shadow::ShadowMap;
 use super::view::{Homogeneous, View};
 use crate::Result;
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{ensure, memory};
 use glam::Vec3;
 

@@ -3,6 +3,8 @@
 use glam::Vec3;
 
 use super::ExactSolid;
+#[cfg(doc)]
+use crate::base::Error;
 use crate::base::{Result, ensure};
 use crate::mesh::ClosedSurface;
 
