@@ -54,8 +54,7 @@ impl Body {
     pub fn tear_limits(&self, pairs: &[[u32; 2]]) -> Result<Vec<[f32; 2]>> {
         let springs = self.borne_by_pairs(pairs)?;
         let tears = self.tears.as_ref().ok_or_else(not_made_to_tear)?;
-        let limits = memory::collected(springs.iter().map(|(node, link)| tears.limits([*node, link.neighbour])))?;
-        Ok(limits)
+        memory::collected(springs.iter().map(|(node, link)| tears.limits([*node, link.neighbour])))
     }
 
     fn borne_by_pairs(&self, pairs: &[[u32; 2]]) -> Result<Vec<(u32, Link)>> {

@@ -236,8 +236,8 @@ impl Tissue {
         if !moment.drifts {
             self.touches
                 .note(&self.links, self.duration, |places| !any_is_explicit(bodies, places));
-            let members = self.islands.members(island);
-            if !members.iter().any(|&place| is_explicit(bodies, place as usize)) {
+            let members = self.islands.members(island).iter();
+            if !any_is_explicit(bodies, members.map(|&place| place as usize)) {
                 return;
             }
         } else if moment.begins {
@@ -462,7 +462,7 @@ fn is_explicit(bodies: &impl Systems, place: usize) -> bool {
 }
 
 /// Whether one of the bodies at these places does.
-fn any_is_explicit(bodies: &impl Systems, places: [usize; 2]) -> bool {
+fn any_is_explicit(bodies: &impl Systems, places: impl IntoIterator<Item = usize>) -> bool {
     places.into_iter().any(|place| is_explicit(bodies, place))
 }
 

@@ -166,9 +166,10 @@ impl Skin {
                 nodes.iter().for_each(|&node| firsts.set(node as usize, at(node)));
             }
         }
-        let may_be_cut = body.may_be_cut.is_some();
-        let changing = may_be_cut.then(|| Changing::new(body, &nodes, edges.len(), &sides));
-        let changing = changing.transpose()?.map(memory::boxed).transpose()?;
+        let changing = match &body.may_be_cut {
+            Some(_) => Some(memory::boxed(Changing::new(body, &nodes, edges.len(), &sides)?)?),
+            None => None,
+        };
         let bounds = forest.bounds();
         let extent = (bounds.max - bounds.min).max_element();
         let asks_for_images = contact.with_bodies && contact.detection == Detection::ImageSpace;

@@ -169,7 +169,8 @@ impl Pushes {
                 hasher.write_u64(body as u64);
                 nodes.into_iter().for_each(|node| hasher.write_u64(u64::from(node)));
             }
-            hasher.write_floats(&[push.impulse, push.friction.x, push.friction.y, push.friction.z]);
+            hasher.write_floats(&[push.impulse]);
+            hasher.write_vectors([push.friction, push.normal]);
         }
     }
 }
