@@ -1,6 +1,6 @@
 //! Which features of a body are near a tool: a list that stays good while nothing has moved far.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3A};
 
 use super::features::{Feature, Features};
 use super::mesh_solid::MeshSolid;
@@ -340,15 +340,15 @@ impl Candidates {
     #[inline]
     pub fn corners(&self, feature: Feature) -> Option<Corners> {
         let mut corners = Corners {
-            points: [Vec3::ZERO; 3],
-            steps: [Vec3::ZERO; 3],
+            points: [Vec3A::ZERO; 3],
+            steps: [Vec3A::ZERO; 3],
             count: feature.nodes().len(),
         };
         let mut sides = !0;
         for (place, &node) in feature.nodes().iter().enumerate() {
             let corner = &self.corners[self.marks[node as usize] as usize];
             sides &= corner.sides;
-            (corners.points[place], corners.steps[place]) = (corner.start, corner.step);
+            (corners.points[place], corners.steps[place]) = (corner.start.into(), corner.step.into());
         }
         (sides == 0).then_some(corners)
     }

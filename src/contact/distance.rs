@@ -1,6 +1,6 @@
 //! Closest points of points, segments and triangles (Ericson 2005, Real-Time Collision Detection, chapter 5).
 
-use glam::Vec3;
+use glam::Vec3A;
 
 use crate::geometry::nearest::nearest_of_segments;
 
@@ -8,7 +8,7 @@ use crate::geometry::nearest::nearest_of_segments;
 const NEARLY_PARALLEL: f32 = 1e-4;
 
 /// How far along the segment from `a` to `b` the point closest to `point` lies, 0 to 1.
-pub(super) fn closest_on_segment(point: Vec3, a: Vec3, b: Vec3) -> f32 {
+pub(super) fn closest_on_segment(point: Vec3A, a: Vec3A, b: Vec3A) -> f32 {
     let along = b - a;
     let length_squared = along.length_squared();
     if length_squared > 0.0 {
@@ -19,7 +19,7 @@ pub(super) fn closest_on_segment(point: Vec3, a: Vec3, b: Vec3) -> f32 {
 }
 
 /// How far along the segments from `a` to `b` and from `c` to `d` their closest points lie, 0 to 1 each.
-pub(super) fn closest_of_segments(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> (f32, f32) {
+pub(super) fn closest_of_segments(a: Vec3A, b: Vec3A, c: Vec3A, d: Vec3A) -> (f32, f32) {
     let (first, second, between) = (b - a, d - c, a - c);
     let (first_squared, second_squared) = (first.length_squared(), second.length_squared());
     if second_squared == 0.0 {
@@ -46,7 +46,7 @@ pub(super) fn closest_of_segments(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> (f32, f
 }
 
 /// The barycentric weights of the point of triangle `a b c` that is closest to `point`.
-pub(super) fn closest_on_triangle(point: Vec3, a: Vec3, b: Vec3, c: Vec3) -> [f32; 3] {
+pub(super) fn closest_on_triangle(point: Vec3A, a: Vec3A, b: Vec3A, c: Vec3A) -> [f32; 3] {
     let (ab, ac) = (b - a, c - a);
     let from_a = point - a;
     let (d1, d2) = (ab.dot(from_a), ac.dot(from_a));
@@ -94,7 +94,7 @@ mod tests {
     #[test]
     fn nothing_sampled_is_closer() {
         let mut random = Random(7);
-        let mut point = || random.vector();
+        let mut point = || glam::Vec3A::from(random.vector());
         for _ in 0..500 {
             let [p, q, a, b, c] = [point(), point(), point(), point(), point()];
             let [wa, wb, wc] = closest_on_triangle(p, a, b, c);

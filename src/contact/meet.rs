@@ -1,6 +1,6 @@
 //! Where a feature of a body first meets a tool.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::constraint::Constraint;
 use super::features::Feature;
@@ -45,18 +45,18 @@ impl Motion<'_> {
         ) = (self.from, self.to)
         else {
             return Segment {
-                ends: [Vec3::INFINITY; 2],
-                steps: [Vec3::ZERO; 2],
+                ends: [Vec3A::INFINITY; 2],
+                steps: [Vec3A::ZERO; 2],
                 radius: 0.0,
             };
         };
         let steps = if drifts {
-            [last_a - a, last_b - b]
+            [last_a - a, last_b - b].map(Vec3A::from)
         } else {
-            [Vec3::ZERO; 2]
+            [Vec3A::ZERO; 2]
         };
         Segment {
-            ends: [a, b],
+            ends: [a, b].map(Vec3A::from),
             steps,
             radius,
         }
@@ -113,8 +113,14 @@ pub(super) fn meet_rounded(
         return None;
     }
     let points = corners.points.iter().zip(separation.weights);
-    let matter: Vec3 = points.map(|(point, weight)| *point * weight).sum();
-    Some(round_geometry(meeting, slice, motion, segment, (&separation, matter)))
+    let matter: Vec3A = points.map(|(point, weight)| *point * weight).sum();
+    Some(round_geometry(
+        meeting,
+        slice,
+        motion,
+        segment,
+        (&separation, matter.into()),
+    ))
 }
 
 /// The contact of a round tool with a point of a feature, which is separated from it so.
@@ -126,21 +132,19 @@ pub(super) fn round_geometry(
     segment: &Segment,
     (separation, matter): (&Separation, Vec3),
 ) -> ContactGeometry {
-    let step = segment.steps[0].lerp(segment.steps[1], separation.along);
-    let start = segment.ends[0].lerp(segment.ends[1], separation.along);
+    let [step, start] = [segment.steps, segment.ends].map(|[a, b]| Vec3::from(a.lerp(b, separation.along)));
     let axis_velocity = if meeting.drifts {
         step / slice.duration
     } else {
         motion.velocity_at(start)
     };
     // A feature through the middle of the tool has no side of its own: it is carried ahead of the tool.
-    let normal = separation
-        .offset
+    let normal = Vec3::from(separation.offset)
         .try_normalize()
         .or_else(|| axis_velocity.try_normalize())
         .unwrap_or(Vec3::Y);
     let surface = normal * segment.radius;
-    let ends = [0, 1].map(|end| segment.ends[end] + segment.steps[end]);
+    let ends = [0, 1].map(|end| (segment.ends[end] + segment.steps[end]).into());
     ContactGeometry {
         weights: separation.weights,
         normal,
@@ -166,11 +170,12 @@ pub(super) fn meet_mesh(
     let mut own = *corners;
     let mut travel = 0.0_f32;
     for corner in 0..count {
-        let (point, step) = (corners.points[corner], corners.steps[corner]);
-        own.points[corner] = from.own(point);
+        let [point, step] = [corners.points[corner], corners.steps[corner]].map(Vec3::from);
+        let own_point = from.own(point);
+        own.points[corner] = own_point.into();
         if meeting.drifts {
-            travel = travel.max(to.placed(own.points[corner]).distance(point));
-            own.steps[corner] = to.own(point + step) - own.points[corner];
+            travel = travel.max(to.placed(own_point).distance(point));
+            own.steps[corner] = (to.own(point + step) - own_point).into();
         }
     }
     let supports = Supports::of(feature, meeting.bindings);
@@ -181,9 +186,9 @@ pub(super) fn meet_mesh(
         return None;
     }
     let weights = closest.weights;
-    let weighted = |corners: [Vec3; 3]| -> Vec3 {
+    let weighted = |corners: [Vec3A; 3]| -> Vec3 {
         let corners = corners.iter().zip(weights).take(count);
-        corners.map(|(corner, weight)| *corner * weight).sum()
+        corners.map(|(corner, weight)| *corner * weight).sum::<Vec3A>().into()
     };
     let surface = weighted(own.at(time)) - closest.normal * closest.distance;
     let gap = (weighted(own.points) - surface).dot(closest.normal);

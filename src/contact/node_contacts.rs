@@ -3,7 +3,7 @@
 //! A tool is kinematic, so what it gives to a node depends on no other node: the impulse with Coulomb friction has a closed form, and where
 //! several tools meet a node, a few iterations over their contacts alone find it.
 
-use glam::{BVec3, Vec3};
+use glam::{BVec3, Vec3, Vec3A};
 
 use super::distance::closest_on_segment;
 use super::features::Feature;
@@ -76,8 +76,8 @@ impl<'a> NodeLook<'a> {
     #[inline]
     fn meet_rounded(&self, meeting: &Meeting, slice: &Slice, node: usize, start: Vec3) -> Option<ContactGeometry> {
         let [a, b] = self.segment.ends;
-        let along = closest_on_segment(start, a, b);
-        let offset = start - a.lerp(b, along);
+        let along = closest_on_segment(start.into(), a, b);
+        let offset = Vec3A::from(start) - a.lerp(b, along);
         let touching = self.around + TOUCHING * self.around;
         let distance_squared = offset.length_squared();
         if distance_squared > (touching + self.closing) * (touching + self.closing) {

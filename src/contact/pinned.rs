@@ -3,8 +3,6 @@
 //! It is features whose neighbours are pinned too. A tool that is pressed on free tissue may reach over a pinned border: there tissue
 //! beside it gives way, and what it does is known.
 
-use glam::Vec3;
-
 use super::contacts::Contacts;
 use super::features::Feature;
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded};
@@ -140,14 +138,7 @@ fn is_marked(marks: &[u64], node: u32) -> bool {
 fn meet_standing(meeting: &Meeting, motion: &Motion, feature: Feature) -> Option<ContactGeometry> {
     let slice = Slice::ahead(meeting);
     let nodes = feature.nodes();
-    let mut corners = Corners {
-        points: [Vec3::ZERO; 3],
-        steps: [Vec3::ZERO; 3],
-        count: nodes.len(),
-    };
-    for (point, &node) in corners.points.iter_mut().zip(nodes) {
-        *point = meeting.position(&slice, node as usize);
-    }
+    let corners = Corners::still(nodes.iter().map(|&node| meeting.position(&slice, node as usize).into()));
     match (motion.from, motion.to) {
         (Solid::HalfSpace { .. }, _) if nodes.len() > 1 => None,
         (Solid::HalfSpace { .. }, _) => meet_plane(meeting, &slice, motion, nodes[0] as usize),

@@ -1,6 +1,6 @@
 //! Where a feature has to come in a slice to meet a tool: what its corners alone tell saves looking at most of what is near.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::distance::closest_on_segment;
 use super::meeting::{Meeting, Slice};
@@ -24,7 +24,10 @@ impl Motion<'_> {
             (Solid::Rounded { radius, .. }, _) => {
                 let segment = self.segment(meeting.drifts);
                 let reach = radius * (1.0 + TOUCHING) + segment.travel() + margin;
-                let ends = [0.0, 1.0].map(|share| segment.at(share)).into_iter().flatten();
+                let ends = [0.0, 1.0]
+                    .map(|share| segment.at(share).map(Vec3::from))
+                    .into_iter()
+                    .flatten();
                 Some(Room {
                     bounds: Bounds::of(ends).extended(reach),
                     rounded: Some((segment, reach)),
@@ -56,7 +59,8 @@ impl Room {
             return sides;
         };
         let [a, b] = segment.ends;
-        let distance = start.distance(a.lerp(b, closest_on_segment(start, a, b)));
+        let own = Vec3A::from(start);
+        let distance = own.distance(a.lerp(b, closest_on_segment(own, a, b)));
         let nearest = distance - step.length() - segment.travel();
         // A point with weights w of corners p is at a squared distance from c of Σ w |p - c|² - Σ w w' |p - p'|², and the weights' products
         // are a third in sum at most.

@@ -1,12 +1,11 @@
 //! When a moving node, edge or face first touches a moving tool: conservative advancement along the direction between the closest points (Mirtich 1996).
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::closest::Closest;
 use super::distance::{closest_of_segments, closest_on_segment, closest_on_triangle};
 use super::mesh_solid::MeshSolid;
 use super::nearest_plane::LastMet;
-use crate::geometry::Bounds;
 
 /// A gap of this part of the tool's radius, or of half its least extent, counts as touching.
 pub(super) const TOUCHING: f32 = 1e-4;
@@ -28,24 +27,31 @@ const ADVANCES: u32 = 32;
 /// The corners of a node, edge or face over a substep.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Corners {
-    pub points: [Vec3; 3],
-    pub steps: [Vec3; 3],
+    pub points: [Vec3A; 3],
+    pub steps: [Vec3A; 3],
     pub count: usize,
 }
 
 /// The segment within a rounded tool over a substep.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Segment {
-    pub ends: [Vec3; 2],
-    pub steps: [Vec3; 2],
+    pub ends: [Vec3A; 2],
+    pub steps: [Vec3A; 2],
     pub radius: f32,
+}
+
+/// A box about points, which is soon compared with others.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extent {
+    min: Vec3A,
+    max: Vec3A,
 }
 
 /// The closest points of a feature and a tool's segment.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Separation {
     /// From the segment to the feature.
-    pub offset: Vec3,
+    pub offset: Vec3A,
     /// The feature's point, as weights of its corners.
     pub weights: [f32; 3],
     /// The segment's point, 0 to 1.
@@ -54,12 +60,29 @@ pub(crate) struct Separation {
     pub inside: bool,
 }
 
+impl Extent {
+    pub fn of(mut points: impl Iterator<Item = Vec3A>) -> Self {
+        let first = points.next().unwrap_or(Vec3A::INFINITY);
+        let all = Self { min: first, max: first };
+        points.fold(all, |Self { min, max }, point| Self {
+            min: min.min(point),
+            max: max.max(point),
+        })
+    }
+
+    /// The square of how far it is from another; 0 where they overlap.
+    pub fn distance_squared(&self, other: &Self) -> f32 {
+        let apart = (self.min - other.max).max(other.min - self.max);
+        apart.max(Vec3A::ZERO).length_squared()
+    }
+}
+
 impl Segment {
     /// One without thickness that stays where it is.
-    pub fn still(ends: [Vec3; 2]) -> Self {
+    pub fn still(ends: [Vec3A; 2]) -> Self {
         Self {
             ends,
-            steps: [Vec3::ZERO; 2],
+            steps: [Vec3A::ZERO; 2],
             radius: 0.0,
         }
     }
@@ -74,7 +97,7 @@ impl Segment {
     }
 
     /// Where a point of it is, first and last.
-    pub fn at(&self, share: f32) -> [Vec3; 2] {
+    pub fn at(&self, share: f32) -> [Vec3A; 2] {
         let place = self.ends[0].lerp(self.ends[1], share);
         [place, place + self.steps[0].lerp(self.steps[1], share)]
     }
@@ -136,19 +159,19 @@ impl Separation {
     }
 
     /// Whether two edges that are `edges` from end to end come closest further than `margin` from all ends, m.
-    pub fn is_across_beyond(&self, margin: f32, edges: [Vec3; 2]) -> bool {
+    pub fn is_across_beyond(&self, margin: f32, edges: [Vec3A; 2]) -> bool {
         let shares = [self.along, self.weights[1]].map(|share| share.min(1.0 - share));
-        let is_beyond = |(edge, share): (Vec3, f32)| (edge * share).length_squared() > margin * margin;
+        let is_beyond = |(edge, share): (Vec3A, f32)| (edge * share).length_squared() > margin * margin;
         self.is_across() && edges.into_iter().zip(shares).all(is_beyond)
     }
 }
 
 impl Corners {
     /// Of what stays where it is.
-    pub fn still(points: impl Iterator<Item = Vec3>) -> Self {
+    pub fn still(points: impl Iterator<Item = Vec3A>) -> Self {
         let mut corners = Self {
-            points: [Vec3::ZERO; 3],
-            steps: [Vec3::ZERO; 3],
+            points: [Vec3A::ZERO; 3],
+            steps: [Vec3A::ZERO; 3],
             count: 0,
         };
         for point in points.take(3) {
@@ -159,21 +182,22 @@ impl Corners {
     }
 
     /// The box about them as the substep begins.
-    pub fn bounds(&self) -> Bounds {
-        Bounds::of(self.points[..self.count].iter().copied())
+    pub fn bounds(&self) -> Extent {
+        Extent::of(self.points.into_iter().take(self.count))
     }
 
     /// The box about their ways.
-    pub fn way(&self) -> Bounds {
-        let ways = self.points.iter().zip(&self.steps).take(self.count);
-        Bounds::of(ways.flat_map(|(&point, &step)| [point, point + step]))
+    pub fn way(&self) -> Extent {
+        let ends = self.points.iter().zip(&self.steps).map(|(&point, &step)| point + step);
+        let all = self.points.into_iter().take(self.count);
+        Extent::of(all.chain(ends.take(self.count)))
     }
 
     /// Of a node.
     pub fn of_node(point: Vec3, step: Vec3) -> Self {
         Self {
-            points: [point; 3],
-            steps: [step; 3],
+            points: [point.into(); 3],
+            steps: [step.into(); 3],
             count: 1,
         }
     }
@@ -219,11 +243,11 @@ impl Corners {
 
     /// What is along the direction of this offset at `time`; `None` where rounding decides that. A face is compared with the segment's first end
     /// alone.
-    fn along(&self, segment: &Segment, offset: Vec3, time: f32) -> Option<Along> {
+    fn along(&self, segment: &Segment, offset: Vec3A, time: f32) -> Option<Along> {
         let distance = offset.length();
         let normal = offset / distance;
-        let mut size = Vec3::ZERO;
-        let mut along = |place: Vec3, step: Vec3| {
+        let mut size = Vec3A::ZERO;
+        let mut along = |place: Vec3A, step: Vec3A| {
             let place = place - segment.ends[0];
             size = size.max(place.abs() + step.abs());
             let step_along = step.dot(normal);
@@ -305,12 +329,15 @@ impl Corners {
     /// The separation when they first touch, or else where they come closer than `ahead` beyond the radius, m, and whether they do not touch; `None`
     /// where not even that.
     pub fn meet(&self, start: Separation, segment: &Segment, ahead: f32) -> Option<(Separation, bool)> {
-        let closing = self.closing(segment);
         let gap = start.offset.length() - segment.radius;
+        let touching = TISSUE_TOUCHING * segment.radius;
+        if gap <= touching {
+            return Some((start, false));
+        }
+        let closing = self.closing(segment);
         if !(gap <= closing + ahead) {
             return None;
         }
-        let touching = TISSUE_TOUCHING * segment.radius;
         if let Some(touch) = self.approach_from(start, (segment, closing), [touching; 2]) {
             return Some((touch, false));
         }
@@ -335,7 +362,8 @@ impl Corners {
         is_pinned: bool,
         last: Option<(usize, &mut LastMet)>,
     ) -> Option<(Closest, f32)> {
-        let closest_at = |time: f32, within: f32| solid.closest(&self.at(time)[..self.count], within, is_pinned);
+        let closest_at =
+            |time: f32, within: f32| solid.closest(&self.at(time).map(Vec3::from)[..self.count], within, is_pinned);
         let closing = self.steps[..self.count]
             .iter()
             .fold(0.0, |closing: f32, step| closing.max(step.length()));
@@ -344,7 +372,8 @@ impl Corners {
         let mut time = 0.0;
         let mut closest = match last {
             Some((slot, last)) => {
-                last.closest((slot, solid), &self.points[..self.count], within + closing, is_pinned)?
+                let points = self.points.map(Vec3::from);
+                last.closest((slot, solid), &points[..self.count], within + closing, is_pinned)?
             }
             None => closest_at(0.0, within + closing)?,
         };
@@ -367,7 +396,7 @@ impl Corners {
     }
 
     /// The corners at `time`.
-    pub fn at(&self, time: f32) -> [Vec3; 3] {
+    pub fn at(&self, time: f32) -> [Vec3A; 3] {
         [0, 1, 2].map(|corner| self.points[corner] + self.steps[corner] * time)
     }
 }

@@ -6,7 +6,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3A};
 
 use super::sweep::{Corners, Segment};
 use crate::geometry::nearest::{nearest_of_segments, nearest_on_triangle};
@@ -25,8 +25,8 @@ struct Query {
 impl Query {
     /// What a sweep answers where the two keep `radius` times the longest edge apart.
     fn is_found(&self, radius: f32) -> bool {
-        let [start, end] = self.points.map(|points| points.map(DVec3::as_vec3));
-        let steps: [Vec3; 4] = std::array::from_fn(|point| end[point] - start[point]);
+        let [start, end] = self.points.map(|points| points.map(DVec3::as_vec3a));
+        let steps: [Vec3A; 4] = std::array::from_fn(|point| end[point] - start[point]);
         let ends = if self.is_face { [0, 0] } else { [0, 1] };
         let others = if self.is_face { [1, 2, 3] } else { [2, 3, 3] };
         let corners = Corners {

@@ -61,12 +61,6 @@ impl Bounds {
         self.min.cmple(other.min).all() && other.max.cmple(self.max).all()
     }
 
-    /// How far it is from the other; 0 where they overlap.
-    pub fn distance(&self, other: &Self) -> f32 {
-        let apart = (self.min - other.max).max(other.min - self.max);
-        apart.max(Vec3::ZERO).length()
-    }
-
     pub fn overlaps(&self, other: &Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::skin::{ELSEWHERE, NONE, Skin, number_of};
+use super::skin::{ELSEWHERE, NONE, NodeWay, Skin, number_of};
 use super::wound::Wound;
 use crate::base::{Result, memory};
 use crate::codec::saved;
@@ -267,7 +267,6 @@ impl Skin {
         };
         changing.roles.resize(change.node_count, 0);
         for vectors in [
-            Some(&mut self.starts),
             Some(&mut self.velocities),
             Some(&mut self.expected),
             Some(&mut self.changes),
@@ -279,6 +278,7 @@ impl Skin {
             vectors.grow(change.node_count);
         }
         self.strays.resize(change.node_count, 0.0);
+        self.ways.resize(change.node_count, NodeWay::default());
         if let Some(firsts) = &mut self.firsts {
             let first = change.node_count - change.firsts.len();
             for (number, &place) in (first..).zip(&change.firsts) {

@@ -117,7 +117,7 @@ fn mark(first: &Skin, second: &Skin, are_joined: impl Fn(&[u32], &[u32]) -> bool
     let is_of_one = std::ptr::eq(first, second);
     let edges = first.edges.iter().zip(pierces);
     for (edge, pierces) in edges.filter(|(edge, _)| edge[0] != NONE) {
-        let ends = edge.map(|node| first.starts.get(node as usize) + shift);
+        let ends = edge.map(|node| first.start(node) + shift);
         let mut passes = false;
         let around = Bounds::of(ends.into_iter());
         let see = |triangle: usize| {
@@ -125,7 +125,7 @@ fn mark(first: &Skin, second: &Skin, are_joined: impl Fn(&[u32], &[u32]) -> bool
             if passes || are_joined(edge, &nodes) {
                 return;
             }
-            let corners = nodes.map(|node| second.starts.get(node as usize));
+            let corners = nodes.map(|node| second.start(node));
             // What a cut has parted touches.
             let depth = if is_of_one {
                 first.crossing_depth(*edge, &nodes)
@@ -148,10 +148,10 @@ fn is_deep(first: &Skin, second: &Skin, depth: f32) -> bool {
     let shift = shift(first, second);
     let mut crossing = first.edges.iter().zip(&first.pierces).filter(|(_, pierces)| **pierces);
     crossing.any(|(edge, _)| {
-        let ends = edge.map(|node| first.starts.get(node as usize) + shift);
+        let ends = edge.map(|node| first.start(node) + shift);
         let mut passes = false;
         second.near(&Bounds::of(ends.into_iter()), 0.0, |triangle| {
-            let corners = second.triangles[triangle].map(|node| second.starts.get(node as usize));
+            let corners = second.triangles[triangle].map(|node| second.start(node));
             passes |= crosses(ends[0], ends[1], corners, f64::from(depth));
         });
         passes

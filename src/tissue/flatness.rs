@@ -36,23 +36,28 @@ impl Fan {
 pub(super) struct Ridge {
     /// By how much the faces about its ends leave their mean, rad; infinity: an end is at a rim, or this is not known.
     turn: f32,
-    /// m
+    /// m, and 1 / m
     length: f32,
+    per_length: f32,
 }
 
-saved! { Ridge { turn, length } }
+saved! { Ridge { turn, length, per_length } }
 
 impl Ridge {
     pub const UNKNOWN: Self = Self {
         turn: f32::INFINITY,
         length: 0.0,
+        per_length: 0.0,
     };
-    const FLAT: Self = Self { turn: 0.0, length: 0.0 };
+    const FLAT: Self = Self {
+        turn: 0.0,
+        ..Self::UNKNOWN
+    };
 
     /// How far another edge can enter the surface between its corners before one of its own ends touches that, m: as it turns about this edge, or
     /// further on where the other is longer.
     fn let_in(&self, other: &Self) -> f32 {
-        0.5 * self.turn * other.length * (other.length / self.length).max(1.0)
+        0.5 * self.turn * other.length * (other.length * self.per_length).max(1.0)
     }
 
     /// Whether corners alone keep two surfaces `radius` apart where these edges of them are, m, but for a part of that.
@@ -122,9 +127,11 @@ impl Flatness {
                 continue;
             }
             let [a, b] = edge.map(|node| fans[node as usize].turn());
+            let length = at(edge[0]).distance(at(edge[1]));
             *ridge = Ridge {
                 turn: ridge.turn.max(a).max(b),
-                length: at(edge[0]).distance(at(edge[1])),
+                length,
+                per_length: 1.0 / length.max(f32::MIN_POSITIVE),
             };
         }
     }
@@ -191,7 +198,11 @@ mod tests {
                 let ridge = flatness.of(number);
                 let let_in = ridge.let_in(&ridge);
                 assert!((let_in / height - 1.0).abs() < 0.01, "{edge:?}: {let_in} m of {height}");
-                let twice = Ridge { length: 0.2, ..ridge };
+                let twice = Ridge {
+                    length: 0.2,
+                    per_length: 5.0,
+                    ..ridge
+                };
                 assert!((ridge.let_in(&twice) / let_in - 4.0).abs() < 0.01);
                 seen += 1;
             }

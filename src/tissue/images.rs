@@ -42,7 +42,7 @@ impl Images {
 
     /// Draws what of the surface lies within `part`, where it is as a substep begins.
     pub fn draw(&mut self, skin: &Skin, part: &Bounds) {
-        let corners = |triangle: usize| skin.triangles[triangle].map(|node| skin.starts.get(node as usize));
+        let corners = |triangle: usize| skin.triangles[triangle].map(|node| skin.start(node));
         self.drawn
             .draw(&skin.forest.bounds(), part, skin.triangles.len(), corners);
     }
@@ -51,7 +51,7 @@ impl Images {
     pub fn near(&self, skin: &Skin, bounds: &Bounds, reach: f32, mut see: impl FnMut(usize)) {
         let around = bounds.extended(reach);
         self.drawn.near(bounds, reach, |triangle| {
-            let corners = skin.triangles[triangle].map(|node| skin.starts.get(node as usize));
+            let corners = skin.triangles[triangle].map(|node| skin.start(node));
             if Bounds::of(corners.into_iter()).overlaps(&around) {
                 see(triangle);
             }
@@ -63,7 +63,7 @@ impl Images {
         let around = bounds.extended(reach);
         skin.sides(triangle).map(|edge| {
             let is_near = skin.edges.get(edge as usize).is_some_and(|ends| {
-                let ends = ends.map(|node| skin.starts.get(node as usize));
+                let ends = ends.map(|node| skin.start(node));
                 Bounds::of(ends.into_iter()).overlaps(&around)
             });
             if is_near { edge } else { NONE }

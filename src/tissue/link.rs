@@ -42,11 +42,9 @@ pub(super) struct Link {
     /// Whether they only come near: another takes its place where there is no room for both.
     pub is_ahead: bool,
     pub friction: f32,
-    /// The nodes that move each side, so many of them, with their parts of it. They are the side's own but where it is bound to others.
-    movers: [[(u32, f32); MOST]; 2],
+    /// The nodes that move each side, so many of them. They are the side's own but where it is bound to others.
+    movers: [[Mover; MOST]; 2],
     counts: [u32; 2],
-    /// How much faster each of these becomes for an impulse, 1/kg.
-    answers: [[Vec3; MOST]; 2],
     mass: f32,
     /// What it has given so far, N s.
     impulse: f32,
@@ -58,8 +56,20 @@ pub(super) struct Link {
 }
 
 saved! { Link {
-    sides, normal, least_speed, depth, is_parted, is_ahead, friction, movers, counts, answers, mass, impulse, friction_impulse, recalled, push,
+    sides, normal, least_speed, depth, is_parted, is_ahead, friction, movers, counts, mass, impulse, friction_impulse, recalled, push,
 } }
+
+/// A node that moves a side of a contact.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mover {
+    node: u32,
+    /// Its part of the side.
+    part: f32,
+    /// How much faster it becomes for an impulse on the side, 1/kg.
+    answer: Vec3,
+}
+
+saved! { Mover { node, part, answer } }
 
 impl ContactSide {
     /// A node of a body.
@@ -120,17 +130,19 @@ fn weighted(parts: impl Iterator<Item = (u32, f32)>, vector_of: impl Fn(usize) -
 impl Link {
     /// A contact that has given nothing yet; `None` where neither side can move.
     pub fn new(sides: [ContactSide; 2], normal: Vec3, bodies: [&System; 2]) -> Option<Self> {
-        let mut answers = [[Vec3::ZERO; MOST]; 2];
         let (mut whole, mut leverage) = (0.0, 0.0_f32);
-        let movers = [0, 1].map(|side| used_first(sides[side].movers(bodies[side])));
-        let counts = movers.map(|movers| movers.iter().filter(|(_, part)| *part > 0.0).count() as u32);
-        for (movers, (body, answers)) in movers.iter().zip(bodies.into_iter().zip(&mut answers)) {
-            for (answer, &(node, weight)) in answers.iter_mut().zip(movers) {
-                let mobility = body.inverse_masses[node as usize] * weight;
+        let (mut movers, mut counts) = ([[Mover::default(); MOST]; 2], [0; 2]);
+        for side in 0..2 {
+            let body = bodies[side];
+            let with_part = sides[side].movers(body).into_iter().filter(|(_, part)| *part > 0.0);
+            for (mover, (node, part)) in movers[side].iter_mut().zip(with_part) {
+                let mobility = body.inverse_masses[node as usize] * part;
                 let held: BVec3 = body.pins.partial_axes_of(node);
-                *answer = Vec3::select(held, Vec3::ZERO, Vec3::splat(mobility));
-                whole += weight * (*answer * normal).dot(normal);
+                let answer = Vec3::select(held, Vec3::ZERO, Vec3::splat(mobility));
+                *mover = Mover { node, part, answer };
+                whole += part * (answer * normal).dot(normal);
                 leverage = leverage.max(mobility / LEVERAGE);
+                counts[side] += 1;
             }
         }
         (whole > 0.0).then(|| Self {
@@ -143,7 +155,6 @@ impl Link {
             friction: 0.0,
             movers,
             counts,
-            answers,
             mass: 1.0 / whole.max(leverage),
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
@@ -177,6 +188,9 @@ impl Link {
     pub fn solve(&mut self, skins: &mut [Option<Skin>]) -> f32 {
         let velocity = self.velocity(skins);
         let impulse = (self.impulse + (self.least_speed - velocity.dot(self.normal)) * self.mass).max(0.0);
+        if impulse == 0.0 && self.impulse == 0.0 {
+            return 0.0;
+        }
         let mut given = self.normal * (impulse - self.impulse);
         self.impulse = impulse;
         let slip = velocity.reject_from_normalized(self.normal);
@@ -195,9 +209,9 @@ impl Link {
         for (index, impulse) in [impulse, -impulse].into_iter().enumerate() {
             if let Some(skin) = &mut skins[self.sides[index].body] {
                 let values = values(skin);
-                for ((node, _), answer) in self.movers(index).zip(&self.answers[index]) {
-                    let value = values.get(node as usize) + impulse * *answer;
-                    values.set(node as usize, value);
+                for mover in self.movers_of(index) {
+                    let node = mover.node as usize;
+                    values.set(node, values.get(node) + impulse * mover.answer);
                 }
             }
         }
@@ -232,7 +246,11 @@ impl Link {
 
     /// The nodes that move a side, with their parts of it.
     pub fn movers(&self, side: usize) -> impl Iterator<Item = (u32, f32)> + '_ {
-        self.movers[side][..self.counts[side] as usize].iter().copied()
+        self.movers_of(side).iter().map(|mover| (mover.node, mover.part))
+    }
+
+    fn movers_of(&self, side: usize) -> &[Mover] {
+        &self.movers[side][..self.counts[side] as usize]
     }
 
     /// What the first side received, N s.
@@ -306,12 +324,4 @@ impl Link {
     pub fn speed(&self) -> f32 {
         self.given().length() / self.mass
     }
-}
-
-/// Those that have a part come first, in their order.
-fn used_first(movers: [(u32, f32); MOST]) -> [(u32, f32); MOST] {
-    let mut used = [(0, 0.0); MOST];
-    let with_part = movers.into_iter().filter(|(_, part)| *part > 0.0);
-    used.iter_mut().zip(with_part).for_each(|(used, mover)| *used = mover);
-    used
 }

@@ -83,6 +83,7 @@ impl Tissue {
             in_images: a != b && meet_in_images(own, others),
             again: false,
             measures: Measure::Nothing,
+            may_be_inside: a != b && (own.crossings > 0 || others.crossings > 0 || are_in_each_other(own, others)),
         })
     }
 
@@ -235,6 +236,15 @@ fn radius(first: &Party, second: &Party, bodies: [&System; 2]) -> Option<f32> {
 /// Whether two bodies that meet are found in images.
 fn meet_in_images(first: &Skin, second: &Skin) -> bool {
     first.asks_for_images || second.asks_for_images
+}
+
+/// Whether one of two surfaces may be inside the other as a whole: else nothing of it is, without edges that pass through faces.
+fn are_in_each_other(first: &Skin, second: &Skin) -> bool {
+    let (a, b) = (
+        first.forest.bounds(),
+        second.forest.bounds().moved(second.origin - first.origin),
+    );
+    a.contains(&b) || b.contains(&a)
 }
 
 /// A box about what of a surface another may meet that it keeps `radius` away from.

@@ -5,13 +5,13 @@
 //! are passed over. A substep so examines what touches and next to nothing else. What is found is a matter of distances alone: a search by the trees
 //! finds the same.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::search::{PairSearch, Party};
 use super::skin::{NONE, Skin};
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::contact::sweep::{Corners, Segment};
+use crate::contact::sweep::{Corners, Extent, Segment};
 use crate::geometry::Bounds;
 
 /// What is listed may come this part of a short edge nearer before all is looked for again, at least and at most, and in between as far as in so
@@ -225,7 +225,7 @@ impl Pairs {
         let shift = super::search::shift(of_nodes.skin, skin);
         let around = skin.forest.bounds().extended(within);
         for (number, &node) in of_nodes.skin.nodes.iter().enumerate() {
-            let place = of_nodes.skin.starts.get(node as usize) + shift;
+            let place = of_nodes.skin.start(node) + shift;
             let here = Bounds::of([place].into_iter());
             if !around.overlaps(&here) {
                 continue;
@@ -251,7 +251,7 @@ impl Pairs {
             if first.skin.pierces[number] || edge[0] == NONE {
                 continue;
             }
-            let ends = edge.map(|node| first.skin.starts.get(node as usize) + shift);
+            let ends = edge.map(|node| first.skin.start(node) + shift);
             let here = Bounds::of(ends.into_iter());
             if !around.overlaps(&here) {
                 continue;
@@ -306,8 +306,8 @@ impl PairSearch<'_> {
         if self.is_of_one() {
             return self.reach_of_edges();
         }
-        let depths = self.parties.map(|party| party.skin.depth());
-        (self.radius + self.ahead).max(depths[0]).max(depths[1]) + self.motion
+        let [a, b] = self.parties.map(|party| self.depth_in(party));
+        (self.radius + self.ahead).max(a).max(b) + self.motion
     }
 
     /// The same of edges: none is led out of a body.
@@ -330,9 +330,10 @@ impl PairSearch<'_> {
     /// How far a corner or an edge is from others, m, or how far the boxes about them are: a surface near itself is near much of itself, and most of that
     /// goes by before it is compared.
     fn apart_in_list(&self, ends: [Vec3; 2], party: Party, nodes: &[u32]) -> f32 {
-        let corners = Corners::still(nodes.iter().map(|&node| party.skin.starts.get(node as usize)));
+        let corners = Corners::still(nodes.iter().map(|&node| party.skin.own_way(node).start));
+        let ends = ends.map(Vec3A::from);
         if self.is_of_one() {
-            return Bounds::of(ends.into_iter()).distance(&corners.bounds());
+            return Extent::of(ends.into_iter()).distance_squared(&corners.bounds()).sqrt();
         }
         corners.separation(&Segment::still(ends), 0.0).offset.length()
     }

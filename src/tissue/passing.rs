@@ -3,7 +3,7 @@
 //! A contact asks for velocities along the normal that it was found with. What turns meanwhile, or what few sweeps leave, takes its sides nearer than
 //! that by little: but where they keep apart by little too they would pass, and of an open surface nothing tells afterwards which side was which.
 
-use glam::Vec3;
+use glam::Vec3A;
 
 use super::Tissue;
 use super::link::Link;
@@ -51,29 +51,27 @@ impl SidesEnd {
         let seen = (shift(own, others), others.drift);
         let ways = [0, 1].map(|end| own.way(first.nodes[end], seen, duration));
         let segment = Segment {
-            ends: ways.map(|(start, _)| start),
-            steps: ways.map(|(_, step)| step),
+            ends: ways.map(|way| way.start),
+            steps: ways.map(|way| way.step),
             radius: 0.0,
         };
-        let ways = second
-            .nodes
-            .map(|node| others.way(node, (Vec3::ZERO, others.drift), duration));
+        let ways = second.nodes.map(|node| others.own_way(node));
         let is_edge = second.nodes[1] == second.nodes[2];
         let corners = Corners {
-            points: ways.map(|(start, _)| start),
-            steps: ways.map(|(_, step)| step),
+            points: ways.map(|way| way.start),
+            steps: ways.map(|way| way.step),
             count: if is_edge { 2 } else { 3 },
         };
         // As the contact takes them: its points of both, along its normal.
         let [began, ended] = [0.0, 1.0].map(|time| {
             let [from, to] = segment.at(first.weights[1]);
             let parts = corners.at(time).into_iter().zip(second.weights);
-            let other: Vec3 = parts.map(|(at, weight)| at * weight).sum();
-            (from.lerp(to, time) - other).dot(link.normal)
+            let other: Vec3A = parts.map(|(at, weight)| at * weight).sum();
+            (from.lerp(to, time) - other).dot(link.normal.into())
         });
         // The offset leads from the segment to the corners.
         let end = corners.separation(&segment, 1.0);
-        let along = -end.offset.dot(link.normal);
+        let along = -end.offset.dot(link.normal.into());
         let is = if end.inside && (segment.is_point() || end.is_across()) {
             along.signum() * end.offset.length()
         } else {

@@ -1,14 +1,14 @@
 //! Which parts of two surfaces, or of one, meet within a step: the first touch of each node with a face and of each edge with an edge, both
 //! moving, by conservative advancement.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::clearances::{Clearances, SurfaceFeature};
 use super::link::ContactSide;
 use super::pairs::{Known, Near};
-use super::skin::{Clearance, NONE, PARTED, Skin};
+use super::skin::{Clearance, NONE, NodeWay, PARTED, Skin};
 use super::wound::Wound;
-use crate::contact::sweep::{Corners, Segment, Separation};
+use crate::contact::sweep::{Corners, Extent, Segment, Separation};
 use crate::geometry::Bounds;
 
 /// Distances that are the same but for this part are those of faces that share the closest point: which side it is on says the one that is
@@ -80,6 +80,8 @@ pub(super) struct PairSearch<'a> {
     /// Whether it is not the first of the substep: what impulses have led nowhere else is passed over.
     pub again: bool,
     pub measures: Measure,
+    /// Whether corners of one body may have been inside the other as the step began.
+    pub may_be_inside: bool,
 }
 
 /// What of two bodies that are near each other is remembered.
@@ -162,6 +164,15 @@ impl PairSearch<'_> {
         !self.again || a.skin.strayed_of(nodes) + b.skin.strayed_of(others) > self.ahead
     }
 
+    /// How deep what lies within one of the bodies may be to be led out of it, m.
+    pub(super) fn depth_in(&self, party: Party) -> f32 {
+        if self.may_be_inside && party.skin.is_closed {
+            party.skin.depth()
+        } else {
+            0.0
+        }
+    }
+
     pub(super) fn is_of_one(&self) -> bool {
         self.parties[0].place == self.parties[1].place
     }
@@ -229,7 +240,7 @@ impl PairSearch<'_> {
     ) -> (f32, bool) {
         let shift = shift(of_nodes.skin, of_faces.skin);
         let node = of_nodes.skin.nodes[corner];
-        let (place, step) = self.way(of_nodes, node, shift, of_faces.skin.drift);
+        let NodeWay { start: place, step } = self.way(of_nodes, node, shift, of_faces.skin.drift);
         let radius = self.radius_of(kept.as_deref(), SurfaceFeature::Corner(corner));
         let segment = Segment {
             ends: [place; 2],
@@ -241,15 +252,19 @@ impl PairSearch<'_> {
         // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
         let mut nearest = (f32::INFINITY, 0.0_f32);
         let mut behind: Option<(usize, Separation)> = None;
-        let around = Bounds::of([place, place + step].into_iter());
+        let around = Bounds::of([place, place + step].map(Vec3::from).into_iter());
         let is_solid = of_faces.skin.is_closed && !self.is_of_one();
-        let depth = if is_solid { of_faces.skin.depth() } else { 0.0 };
+        let depth = self.depth_in(of_faces);
+        // Of a crushed solid a face may come from its inner side at what is outside. What lies flush on one may seem to by rounding.
+        let flush = of_nodes.skin.least_thickness().min(of_faces.skin.least_thickness());
+        let within_behind = if self.may_be_inside { f32::INFINITY } else { flush };
         let reach = (self.radius + self.ahead).max(depth) + of_faces.skin.spread;
         let far = match from {
             From::Search => self.reach(),
             From::Known(_, [_, reach]) => reach,
         };
         let (within, around_it) = self.worth_comparing([place; 2], [step; 2], far);
+        let anywhere = |_: &Separation| true;
         let least = self.near_corner(from, of_faces.skin, &around, reach, |triangle| {
             let nodes = of_faces.skin.triangles[triangle];
             if self.is_of_one() && (nodes.contains(&node) || of_faces.skin.are_of_wound([node; 2], &nodes)) {
@@ -257,8 +272,8 @@ impl PairSearch<'_> {
             }
             let corners = self.corners(of_faces, &nodes);
             let apart = self.apart_at_least(&around_it, &corners);
-            if apart > within {
-                return apart;
+            if apart > within * within {
+                return apart.sqrt();
             }
             let start = corners.separation(&segment, 0.0);
             let distance = start.offset.length();
@@ -266,19 +281,24 @@ impl PairSearch<'_> {
                 return distance;
             }
             let height = if is_solid { height(&corners, &start) } else { 0.0 };
-            if height >= 0.0 {
+            let is_before = !(height < 0.0 && distance <= within_behind);
+            if is_before {
                 front = front.min(distance);
             }
             let is_nearer =
                 distance < nearest.0 * (1.0 - SAME) || distance < nearest.0 * (1.0 + SAME) && height.abs() > nearest.1;
             if is_solid && is_nearer {
                 nearest = (distance, height.abs());
-                behind = (height < 0.0).then_some((triangle, start));
+                behind = (!is_before).then_some((triangle, start));
             }
-            // Of a crushed solid a face may come from its inner side at what is outside.
             if self.may_find([of_nodes, of_faces], &[node], &nodes)
-                && let Some((found, is_ahead)) =
-                    self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners), start)
+                && let Some((found, is_ahead)) = self.approach(
+                    of_faces.skin,
+                    ([node; 2], &segment),
+                    (&nodes, &corners),
+                    start,
+                    anywhere,
+                )
             {
                 keep_closest(&mut touched, (is_ahead, distance, triangle, found));
             }
@@ -299,7 +319,6 @@ impl PairSearch<'_> {
             }
         }
         // What was made within another is led out as far as its thickness asks for; what lies flush on it by rounding touches it.
-        let flush = of_nodes.skin.least_thickness().min(of_faces.skin.least_thickness());
         let nearest_there = match behind {
             Some(_) if self.measures == Measure::Reductions && nearest.0 > flush => f32::INFINITY,
             Some(_) => 0.0,
@@ -318,7 +337,7 @@ impl PairSearch<'_> {
             nodes: of_faces.skin.triangles[triangle],
             weights: found.weights,
         };
-        let place_of = |side: &ContactSide| side.weighted(|node| of_faces.skin.starts.get(node));
+        let place_of = |side: &ContactSide| side.weighted(|node| of_faces.skin.start(node as u32));
         let alike = if self.is_of_one() { SAME } else { ALIKE };
         for place in 0..FACES {
             let Some((is_ahead, _, triangle, (found, clearance))) = touched[place] else {
@@ -333,9 +352,9 @@ impl PairSearch<'_> {
             if touched[..place].iter().flatten().any(is_alike) {
                 continue;
             }
-            let mut offset = if is_behind { found.offset } else { -found.offset };
+            let mut offset = Vec3::from(if is_behind { found.offset } else { -found.offset });
             if is_solid && offset == Vec3::ZERO {
-                offset = outwards(&self.corners(of_faces, &side.nodes));
+                offset = outwards(&self.corners(of_faces, &side.nodes)).into();
             }
             let sides = [ContactSide::of_node(of_nodes.place, node), side];
             self.show(sides, (offset, is_ahead), (clearance, shift), see);
@@ -361,8 +380,8 @@ impl PairSearch<'_> {
         let is_measured = self.is_measured(kept.as_deref(), index);
         let ways = edge.map(|node| self.way(first, node, shift, second.skin.drift));
         let segment = Segment {
-            ends: ways.map(|(place, _)| place),
-            steps: ways.map(|(_, step)| step),
+            ends: ways.map(|way| way.start),
+            steps: ways.map(|way| way.step),
             radius: self.radius_of(kept.as_deref(), SurfaceFeature::Edge(index)),
         };
         let near_end = if self.is_of_one() {
@@ -371,75 +390,83 @@ impl PairSearch<'_> {
             NEAR_END * segment.radius
         };
         let far = self.reach_of_edges();
-        let way = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
+        let way = Bounds::of(
+            ways.into_iter()
+                .flat_map(|way| [way.start(), (way.start + way.step).into()]),
+        );
         let (within, around_it) = self.worth_comparing(segment.ends, segment.steps, far);
         let mut least = f32::INFINITY;
         let mut nearest = f32::INFINITY;
         let mut touched: [Option<FeatureMet<[u32; 2]>>; EDGES] = [None; EDGES];
-        let mut see_edges = |edges: [u32; 3]| {
-            let mut least = f32::INFINITY;
-            for (other, pierces, other_ridge) in second.skin.edges_of(edges) {
-                // Of what passes through tissue there is no telling which side it belongs to; it is near all the same.
-                let meets = !pierces && !ridge.is_flat_beside(&other_ridge, self.radius);
-                if !meets && !is_measured {
-                    continue;
-                }
-                if self.is_of_one()
-                    && (other <= edge
-                        || other.iter().any(|node| edge.contains(node))
-                        || first.skin.are_of_wound(edge, &other))
-                {
-                    continue;
-                }
-                let corners = self.corners(second, &other);
-                let apart = self.apart_at_least(&around_it, &corners);
-                if apart > within {
-                    least = least.min(apart);
-                    continue;
-                }
-                let from_start = corners.separation(&segment, 0.0);
-                let start = from_start.offset.length();
-                least = least.min(start);
-                nearest = nearest.min(start);
-                if !meets || start > far || !self.may_find(self.parties, &edge, &other) {
-                    continue;
-                }
-                let met = self.approach(second.skin, (edge, &segment), (&other, &corners), from_start);
-                let Some(((found, clearance), is_ahead)) = met else {
-                    continue;
-                };
-                // At an end of either it is a corner that meets.
-                let edges = [segment.ends[1] - segment.ends[0], corners.points[1] - corners.points[0]];
-                let is_across = found.is_across_beyond(near_end, edges);
-                let is_known = touched.iter().flatten().any(|(_, _, edge, _)| *edge == other);
-                if is_across && !is_known {
-                    keep_closest(&mut touched, (is_ahead, start, other, (found, clearance)));
-                }
+        let mut see_edge = |number: u32| {
+            let Some((other, pierces, other_ridge)) = second.skin.edge(number) else {
+                return f32::INFINITY;
+            };
+            // Of what passes through tissue there is no telling which side it belongs to; it is near all the same.
+            let meets = !pierces && !ridge.is_flat_beside(&other_ridge, self.radius);
+            if !meets && !is_measured {
+                return f32::INFINITY;
             }
-            least
+            if self.is_of_one()
+                && (other <= edge
+                    || other.iter().any(|node| edge.contains(node))
+                    || first.skin.are_of_wound(edge, &other))
+            {
+                return f32::INFINITY;
+            }
+            let corners = self.corners(second, &other);
+            let apart = self.apart_at_least(&around_it, &corners);
+            if apart > within * within {
+                return apart.sqrt();
+            }
+            let from_start = corners.separation(&segment, 0.0);
+            let start = from_start.offset.length();
+            nearest = nearest.min(start);
+            if !meets || start > far || !self.may_find(self.parties, &edge, &other) {
+                return start;
+            }
+            // At an end of either it is a corner that meets.
+            let edges = [segment.ends[1] - segment.ends[0], corners.points[1] - corners.points[0]];
+            let is_across = |found: &Separation| found.is_across_beyond(near_end, edges);
+            let met = self.approach(second.skin, (edge, &segment), (&other, &corners), from_start, is_across);
+            if let Some((met, is_ahead)) = met
+                && !touched.iter().flatten().any(|(_, _, edge, _)| *edge == other)
+            {
+                keep_closest(&mut touched, (is_ahead, start, other, met));
+            }
+            start
         };
+
         let reach = self.radius + self.ahead + second.skin.spread;
         match &second.skin.images {
             _ if let From::Known(others, of) = from => {
-                least = nearest_of(others, of.into(), |other| see_edges([other, NONE, NONE]));
+                least = nearest_of(others, of.into(), see_edge);
             }
             Some(images) if self.in_images => {
                 // The box about all of a long edge is mostly beside it.
                 let [from, to] = segment.ends;
-                let pieces = images.pieces(to - from);
+                let pieces = images.pieces((to - from).into());
                 for piece in 0..pieces {
                     let shares = [piece, piece + 1].map(|end| end as f32 / pieces as f32);
-                    let places = shares.map(|share| segment.at(share)).into_iter().flatten();
+                    let places = shares
+                        .map(|share| segment.at(share).map(Vec3::from))
+                        .into_iter()
+                        .flatten();
                     let (skin, around) = (second.skin, Bounds::of(places));
                     images.near(skin, &around, reach, |triangle| {
-                        least = least.min(see_edges(images.edges_near(skin, triangle, &around, reach)));
+                        let edges = images.edges_near(skin, triangle, &around, reach);
+                        least = edges.into_iter().map(&mut see_edge).fold(least, f32::min);
                     });
                 }
             }
             _ => {
                 let skin = second.skin;
                 skin.near(&way, reach, |triangle| {
-                    least = least.min(see_edges(skin.owned(triangle)));
+                    least = skin
+                        .owned(triangle)
+                        .into_iter()
+                        .map(&mut see_edge)
+                        .fold(least, f32::min);
                 });
             }
         }
@@ -453,26 +480,25 @@ impl PairSearch<'_> {
                     weights: found.weights,
                 },
             ];
-            self.show(sides, (-found.offset, is_ahead), (clearance, shift), see);
+            self.show(sides, ((-found.offset).into(), is_ahead), (clearance, shift), see);
         }
         least
     }
 
     /// How near the box about a part of a surface others are to be compared with it, m, and that box. Of other bodies how far they are is remembered for
     /// the next substeps, so that it is worth knowing; of the same surface most moves too much for that, and only what its way leads near is compared.
-    fn worth_comparing(&self, ends: [Vec3; 2], steps: [Vec3; 2], far: f32) -> (f32, Bounds) {
-        let starts = Bounds::of(ends.into_iter());
+    fn worth_comparing(&self, ends: [Vec3A; 2], steps: [Vec3A; 2], far: f32) -> (f32, Extent) {
         if self.is_of_one() {
-            let way = starts.with(ends[0] + steps[0]).with(ends[1] + steps[1]);
-            (self.radius + self.ahead, way)
+            let way = [ends[0], ends[1], ends[0] + steps[0], ends[1] + steps[1]];
+            (self.radius + self.ahead, Extent::of(way.into_iter()))
         } else {
-            (far, starts)
+            (far, Extent::of(ends.into_iter()))
         }
     }
 
-    /// How far a feature is from such a box, m, at least.
-    fn apart_at_least(&self, around: &Bounds, corners: &Corners) -> f32 {
-        around.distance(&if self.is_of_one() {
+    /// The square of how far a feature is from such a box, m, at least.
+    fn apart_at_least(&self, around: &Extent, corners: &Corners) -> f32 {
+        around.distance_squared(&if self.is_of_one() {
             corners.way()
         } else {
             corners.bounds()
@@ -488,22 +514,30 @@ impl PairSearch<'_> {
         }
     }
 
-    /// Where a node or an edge comes too close to a face or an edge, how far they keep apart, and whether it only comes near.
+    /// Where a node or an edge comes too close to a face or an edge, if it counts there: how far they keep apart, and whether it only comes near.
+    #[inline(always)]
     fn approach(
         &self,
         skin: &Skin,
         (nodes, segment): ([u32; 2], &Segment),
         (others, corners): (&[u32], &Corners),
         start: Separation,
+        counts: impl Fn(&Separation) -> bool,
     ) -> Option<((Separation, Clearance), bool)> {
         let (found, is_ahead) = corners.meet(start, segment, self.ahead)?;
-        if !self.is_of_one() {
-            return Some(((found, Clearance::of(segment.radius)), is_ahead));
+        let whole = Clearance::of(segment.radius);
+        // What a cut has parted may keep less apart, and so count.
+        if !skin.may_be_parted() && !counts(&found) {
+            return None;
         }
-        let clearance = skin.keeps(nodes, (others, found.weights), self.radius)?;
+        let clearance = if self.is_of_one() {
+            skin.keeps(nodes, (others, found.weights), self.radius)?
+        } else {
+            whole
+        };
         // Without a thickness what a cut has parted keeps as far apart as all else does.
-        if clearance == Clearance::of(self.radius) {
-            return Some(((found, clearance), is_ahead));
+        if clearance == whole {
+            return counts(&found).then_some(((found, clearance), is_ahead));
         }
         // What was one place has no side yet.
         let radius = clearance.radius;
@@ -512,7 +546,7 @@ impl PairSearch<'_> {
         }
         let segment = Segment { radius, ..*segment };
         let (found, is_ahead) = corners.meet(start, &segment, self.ahead)?;
-        Some(((found, clearance), is_ahead))
+        counts(&found).then_some(((found, clearance), is_ahead))
     }
 
     /// Shows what meets in this direction, or only comes near, of sides that keep so far apart, and in coordinates so far apart.
@@ -543,25 +577,26 @@ impl PairSearch<'_> {
             } else {
                 self.parties[1]
             };
-            sides[index].weighted(|node| party.skin.starts.get(node))
+            sides[index].weighted(|node| party.skin.start(node as u32))
         });
         first + shift - second
     }
 
     /// Where a node begins and how far it goes, as seen from the other body, which goes with `drift`.
-    pub(super) fn way(&self, party: Party, node: u32, shift: Vec3, drift: Vec3) -> (Vec3, Vec3) {
+    pub(super) fn way(&self, party: Party, node: u32, shift: Vec3, drift: Vec3) -> NodeWay {
         party.skin.way(node, (shift, drift), self.dt)
     }
 
     /// The corners of an edge or a face in its own body's coordinates, and how far they leave its drift.
     pub(super) fn corners(&self, party: Party, nodes: &[u32]) -> Corners {
         let mut corners = Corners {
-            points: [Vec3::ZERO; 3],
-            steps: [Vec3::ZERO; 3],
+            points: [Vec3A::ZERO; 3],
+            steps: [Vec3A::ZERO; 3],
             count: nodes.len(),
         };
         for (corner, &node) in nodes.iter().enumerate() {
-            (corners.points[corner], corners.steps[corner]) = self.way(party, node, Vec3::ZERO, party.skin.drift);
+            let NodeWay { start, step } = party.skin.own_way(node);
+            (corners.points[corner], corners.steps[corner]) = (start, step);
         }
         corners
     }
@@ -595,7 +630,7 @@ fn height(face: &Corners, start: &Separation) -> f32 {
 }
 
 /// The normal of a face as the substep begins.
-fn outwards(face: &Corners) -> Vec3 {
+fn outwards(face: &Corners) -> Vec3A {
     let [a, b, c] = face.points;
     (b - a).cross(c - a).normalize_or_zero()
 }

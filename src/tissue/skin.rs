@@ -1,6 +1,6 @@
 //! The surface of a body that meets other tissue.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3A};
 
 use super::change::Changing;
 use super::flatness::{Flatness, Ridge};
@@ -43,8 +43,9 @@ pub(crate) struct Skin {
     pub crossings: u32,
     /// Where the body's coordinates begin.
     pub origin: DVec3,
-    /// Where nodes are as a step or substep begins, in the body's coordinates, and how fast they go through it, m/s.
-    pub starts: Vectors,
+    /// Where nodes are as a step or substep begins, in the body's coordinates, and how far they go in it, seen from what goes with the drift, m.
+    pub(super) ways: Vec<NodeWay>,
+    /// How fast they go through it, m/s.
     pub velocities: Vectors,
     /// How fast they are expected to go once contacts have acted, m/s: where they meet is searched for with these velocities.
     pub expected: Vectors,
@@ -82,10 +83,26 @@ pub(crate) struct Skin {
 }
 
 saved! { Skin {
-    nodes, edges, triangles, sides, forest, room, is_closed, pierces, flatness, bent, has_bent, crossings, origin, starts, velocities,
+    nodes, edges, triangles, sides, forest, room, is_closed, pierces, flatness, bent, has_bent, crossings, origin, ways, velocities,
     expected, changes, drift, spread, moved, given, strays, strayed, short, extent, firsts, travel, meets_bodies,
     asks_for_images, resolution, images, changing, is_fitted,
 } }
+
+/// Where a node begins in a substep, and how far it goes, m.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct NodeWay {
+    pub start: Vec3A,
+    pub step: Vec3A,
+}
+
+saved! { NodeWay { start, step } }
+
+impl NodeWay {
+    #[inline]
+    pub fn start(&self) -> Vec3 {
+        self.start.into()
+    }
+}
 
 /// Features that were no further apart at first than this part of the least thickness were one, and are parted.
 pub(super) const PARTED: f32 = 0.1;
@@ -200,7 +217,7 @@ impl Skin {
             pierces,
             crossings: 0,
             origin: body.origin,
-            starts: body.zeros()?,
+            ways: memory::filled(NodeWay::default(), body.node_count())?,
             velocities: body.zeros()?,
             expected: body.zeros()?,
             changes: body.zeros()?,
@@ -216,6 +233,7 @@ impl Skin {
         };
         skin.nodes.try_reserve_exact(spare)?;
         skin.strays.try_reserve_exact(spare)?;
+        skin.ways.try_reserve_exact(spare)?;
         for values in [&mut skin.triangles, &mut skin.sides] {
             values.try_reserve_exact(2 * spare)?;
         }
@@ -237,6 +255,11 @@ impl Skin {
             Some(changing) => changing.has(node),
             None => self.nodes.binary_search(&node).is_ok(),
         }
+    }
+
+    /// Whether cuts may part it.
+    pub fn may_be_parted(&self) -> bool {
+        self.changing.is_some()
     }
 
     /// What cuts have bared, where it is a solid that meets itself.
@@ -324,7 +347,7 @@ impl Skin {
     /// How far a node or an edge, and an edge or a face of the same body, were from each other at first, m; `None` where it does not meet itself.
     fn first_distance(&self, nodes: [u32; 2], others: &[u32]) -> Option<f32> {
         self.firsts.as_ref().map(|firsts| {
-            let at = |node: u32| firsts.get(node as usize);
+            let at = |node: u32| Vec3A::from(firsts.get(node as usize));
             let corners = Corners::still(others.iter().map(|&other| at(other)));
             corners.separation(&Segment::still(nodes.map(at)), 0.0).offset.length()
         })
@@ -340,36 +363,49 @@ impl Skin {
         let (bindings, motion_of) = body.motion();
         self.take(origin, bindings, duration, motion_of);
         if let Some(wound) = self.changing.as_mut().and_then(|changing| changing.wound.as_mut()) {
-            wound.turn(&self.triangles, &self.starts);
+            let ways = &self.ways;
+            wound.turn(&self.triangles, |node| ways[node as usize].start());
         }
         // Edges that were flat let others in by up to half of this: they are not passed over once that is a quarter of what is kept apart.
         self.bent += (self.moved.max - self.moved.min).length();
         let thickness = body.contact.thickness.min(0.5 * WITH_ITSELF * self.short);
         self.has_bent = self.bent > thickness.max(self.least_thickness());
         if begins || self.has_bent {
-            self.measure_flatness(duration);
+            self.measure_flatness();
             self.bent = 0.0;
         }
     }
 
     /// As the substep begins and as it ends: what bends the other way in it may be flat then or now.
-    fn measure_flatness(&mut self, duration: f32) {
-        let (starts, expected) = (&self.starts, &self.expected);
+    fn measure_flatness(&mut self) {
         self.flatness.clear();
-        for time in [0.0, duration] {
-            let at = |node: u32| starts.get(node as usize) + expected.get(node as usize) * time;
-            self.flatness.measure(starts.len(), &self.triangles, &self.edges, at);
+        for time in [0.0, 1.0] {
+            let ways = &self.ways;
+            let at = |node: u32| Vec3::from(ways[node as usize].start + ways[node as usize].step * time);
+            self.flatness.measure(ways.len(), &self.triangles, &self.edges, at);
         }
     }
 
     /// Where a node begins and how far it goes in a substep of `duration` seconds, as seen from a body that goes with `drift` and whose coordinates begin
     /// `shift` before its own.
-    pub fn way(&self, node: u32, (shift, drift): (Vec3, Vec3), duration: f32) -> (Vec3, Vec3) {
-        let node = node as usize;
-        (
-            self.starts.get(node) + shift,
-            (self.expected.get(node) - drift) * duration,
-        )
+    pub fn way(&self, node: u32, (shift, drift): (Vec3, Vec3), duration: f32) -> NodeWay {
+        let own = self.own_way(node);
+        NodeWay {
+            start: own.start + Vec3A::from(shift),
+            step: own.step + Vec3A::from((self.drift - drift) * duration),
+        }
+    }
+
+    /// The same in its own coordinates, seen from itself.
+    #[inline]
+    pub fn own_way(&self, node: u32) -> NodeWay {
+        self.ways[node as usize]
+    }
+
+    /// Where a node begins, in the body's coordinates.
+    #[inline]
+    pub fn start(&self, node: u32) -> Vec3 {
+        self.own_way(node).start()
     }
 
     /// How far impulses have led any of these nodes from where it was expected in the substep, m.
@@ -396,7 +432,9 @@ impl Skin {
             self.strays[node] += duration * velocity.distance(self.expected.get(node));
             self.strayed = self.strayed.max(self.strays[node]);
             self.expected.set(node, velocity);
-            all = all.with(velocity - self.drift);
+            let left = velocity - self.drift;
+            self.ways[node].step = (left * duration).into();
+            all = all.with(left);
         }
         self.spread = self.spread.max(duration * all.magnitudes().length());
     }
@@ -417,9 +455,9 @@ impl Skin {
     /// Takes the trees to where the triangles are, if they are not there.
     pub fn fit(&mut self) {
         if !self.is_fitted {
-            let (triangles, starts) = (&self.triangles, &self.starts);
+            let (triangles, ways) = (&self.triangles, &self.ways);
             self.forest
-                .refit(|triangle| triangles[triangle as usize].map(|node| starts.get(node as usize)));
+                .refit(|triangle| triangles[triangle as usize].map(|node| ways[node as usize].start()));
             self.is_fitted = true;
         }
     }
@@ -450,8 +488,8 @@ impl Skin {
         let (mut all, mut moved) = (Bounds::EMPTY, Bounds::EMPTY);
         for &node in self.changing.iter().flat_map(|changing| &changing.movers) {
             let (start, velocity) = motion_of(node as usize);
-            moved = moved.with(start - self.starts.get(node as usize));
-            self.starts.set(node as usize, start);
+            moved = moved.with(start - self.start(node));
+            self.ways[node as usize].start = start.into();
             self.velocities.set(node as usize, velocity);
         }
         let changes = &self.changes;
@@ -466,8 +504,8 @@ impl Skin {
                 ),
             };
             let expected = velocity + change;
-            moved = moved.with(start - self.starts.get(node as usize));
-            self.starts.set(node as usize, start);
+            moved = moved.with(start - self.start(node));
+            self.ways[node as usize].start = start.into();
             self.velocities.set(node as usize, velocity);
             self.expected.set(node as usize, expected);
             self.strays[node as usize] = 0.0;
@@ -475,6 +513,10 @@ impl Skin {
         }
         self.moved = moved;
         self.drift = 0.5 * (all.min + all.max);
+        for &node in &self.nodes {
+            let left = self.expected.get(node as usize) - self.drift;
+            self.ways[node as usize].step = (left * duration).into();
+        }
         self.travel = duration * all.magnitudes().length();
         self.spread = 0.5 * duration * (all.max - all.min).length();
         self.is_fitted = false;
@@ -514,13 +556,12 @@ impl Skin {
         self.sides[triangle].map(|side| if side & ELSEWHERE == 0 { side } else { NONE })
     }
 
-    /// These edges, whether they pass through tissue, and how the surface turns there.
-    pub(super) fn edges_of(&self, edges: [u32; 3]) -> impl Iterator<Item = ([u32; 2], bool, Ridge)> + '_ {
-        let edges = edges.into_iter().filter(|&edge| edge != NONE);
-        edges.map(|edge| {
-            let edge = edge as usize;
-            (self.edges[edge], self.pierces[edge], self.flatness.of(edge))
-        })
+    /// An edge, whether it passes through tissue, and how the surface turns there; `None` of no edge.
+    #[inline]
+    pub(super) fn edge(&self, number: u32) -> Option<([u32; 2], bool, Ridge)> {
+        let number = number as usize;
+        let edge = *self.edges.get(number)?;
+        Some((edge, self.pierces[number], self.flatness.of(number)))
     }
 }
 

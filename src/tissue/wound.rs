@@ -4,11 +4,11 @@
 //! before the faces of the other that look at it, at no distance at all: nothing is pushed apart when it is cut, and a wound that closes is as
 //! it was before it was cut.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::link::ContactSide;
 use super::search::{PairSearch, PairTouch};
-use super::skin::{Clearance, NONE, Skin};
+use super::skin::{Clearance, NONE, NodeWay, Skin};
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::contact::sweep::{Corners, Segment, Separation};
@@ -98,15 +98,15 @@ impl Wound {
         }
     }
 
-    /// Finds which way is out, with nodes at `starts`.
-    pub fn turn(&mut self, triangles: &[[u32; 3]], starts: &Vectors) {
+    /// Finds which way is out, with nodes where they start.
+    pub fn turn(&mut self, triangles: &[[u32; 3]], start: impl Fn(u32) -> Vec3) {
         for &node in &self.nodes {
             self.normals.set(node as usize, Vec3::ZERO);
             self.longest[node as usize] = 0.0;
         }
         for &face in &self.faces {
             let corners = triangles[face as usize];
-            let [a, b, c] = corners.map(|corner| starts.get(corner as usize));
+            let [a, b, c] = corners.map(&start);
             let normal = normal([a, b, c]);
             let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
             for corner in corners {
@@ -145,8 +145,8 @@ impl PairSearch<'_> {
             let border = skin.wound_border();
             let depth = (DEPTH * skin.short).min(wound.longest[node as usize]).max(border);
             let outward = wound.normals.get(node as usize);
-            let (start, step) = self.way(party, node, Vec3::ZERO, skin.drift);
-            let end = start + step;
+            let NodeWay { start, step } = skin.own_way(node);
+            let [start, end] = [start, start + step].map(Vec3::from);
             let around = Bounds::of([start, end].into_iter());
             let mut nearest: Option<((bool, f32), Over, usize, Vec3)> = None;
             // How far a face may be from what it is to have behind it or before it.
@@ -157,7 +157,7 @@ impl PairSearch<'_> {
                 if !wound.is_bared(triangle) || nodes.contains(&node) {
                     return further(reach);
                 }
-                let places = self.corners(party, &nodes).at(1.0);
+                let places = self.corners(party, &nodes).at(1.0).map(Vec3::from);
                 let across = normal(places);
                 let height = across.dot(end - places[0]);
                 let is_far = height * height > reach * reach * across.length_squared();
@@ -213,14 +213,9 @@ impl PairSearch<'_> {
             if edge[0] == NONE || !wound.has(edge.into_iter()) {
                 continue;
             }
-            let ways = edge.map(|node| self.way(party, node, Vec3::ZERO, skin.drift));
-            let ends = ways.map(|(start, step)| start + step);
-            let segment = Segment {
-                ends,
-                steps: [Vec3::ZERO; 2],
-                radius: 0.0,
-            };
-            let around = Bounds::of(ends.into_iter());
+            let ways = edge.map(|node| skin.own_way(node));
+            let segment = Segment::still(ways.map(|way| way.start + way.step));
+            let around = Bounds::of(segment.ends.into_iter().map(Vec3::from));
             let within = around.extended(border);
             let away = outward(edge);
             let mut deepest: Option<(f32, [u32; 2], Separation, Vec3)> = None;
@@ -233,13 +228,15 @@ impl PairSearch<'_> {
                     }
                     let mut corners = self.corners(party, &other);
                     corners.points = corners.at(1.0);
-                    corners.steps = [Vec3::ZERO; 3];
+                    corners.steps = [Vec3A::ZERO; 3];
                     // Most of what is near a long edge's box is not near the edge: what is easily told is told first.
                     let out = outward(other);
                     let along = out.dot(away);
                     let of_both = out.length_squared() * away.length_squared();
                     let look_one_way = along > 0.0 && along * along > ONE_WAY * ONE_WAY * of_both;
-                    if look_one_way || !Bounds::of(corners.points[..2].iter().copied()).overlaps(&within) {
+                    if look_one_way
+                        || !Bounds::of(corners.points[..2].iter().map(|&point| point.into())).overlaps(&within)
+                    {
                         continue;
                     }
                     let found = corners.separation(&segment, 0.0);
@@ -249,7 +246,7 @@ impl PairSearch<'_> {
                         continue;
                     }
                     // From the first edge to the other is out of the other, where the first is behind it.
-                    let normal = found.offset / depth;
+                    let normal = Vec3::from(found.offset) / depth;
                     let looks = |along: Vec3| normal.dot(along.normalize_or_zero());
                     let is_behind = looks(out) > SQUARELY && looks(away) < -SQUARELY;
                     let is_deeper = |most: f32, known: [u32; 2]| depth > most || depth == most && other < known;
@@ -286,18 +283,9 @@ impl Skin {
     /// in a thin wedge between two cuts.
     fn were_apart(&self, edge: [u32; 2], other: [u32; 2], along: Vec3) -> bool {
         self.firsts.as_ref().is_some_and(|firsts| {
-            let at = |number: u32| firsts.get(number as usize);
-            let segment = Segment {
-                ends: edge.map(at),
-                steps: [Vec3::ZERO; 2],
-                radius: 0.0,
-            };
-            let corners = Corners {
-                points: [at(other[0]), at(other[1]), Vec3::ZERO],
-                steps: [Vec3::ZERO; 3],
-                count: 2,
-            };
-            corners.separation(&segment, 0.0).offset.dot(along) > APART * self.least_thickness()
+            let at = |number: u32| Vec3A::from(firsts.get(number as usize));
+            let separation = Corners::still(other.into_iter().map(at)).separation(&Segment::still(edge.map(at)), 0.0);
+            separation.offset.dot(along.into()) > APART * self.least_thickness()
         })
     }
 
@@ -339,18 +327,9 @@ impl Over {
 
 /// From the closest point of a triangle to a point, and the parts of its corners in it.
 fn separation(point: Vec3, triangle: [Vec3; 3]) -> (Vec3, [f32; 3]) {
-    let segment = Segment {
-        ends: [point; 2],
-        steps: [Vec3::ZERO; 2],
-        radius: 0.0,
-    };
-    let corners = Corners {
-        points: triangle,
-        steps: [Vec3::ZERO; 3],
-        count: 3,
-    };
-    let found = corners.separation(&segment, 0.0);
-    (-found.offset, found.weights)
+    let corners = Corners::still(triangle.into_iter().map(Vec3A::from));
+    let found = corners.separation(&Segment::still([point.into(); 2]), 0.0);
+    ((-found.offset).into(), found.weights)
 }
 
 /// As long as twice the area.

@@ -1,6 +1,6 @@
 //! A rigid solid as three layered depth images along its own axes, and how far a point is from it.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3A};
 
 use super::covered::nearest_covered;
 use super::layers::{Layers, RayCrossing};
@@ -289,7 +289,7 @@ impl LayeredImage {
         if too_far || normal == Vec3::ZERO || faces.met().iter().any(|face| face.triangle == triangle) {
             return;
         }
-        let weights = closest_on_triangle(Vec3::ZERO, a, b, c);
+        let weights = closest_on_triangle(Vec3A::ZERO, a.into(), b.into(), c.into());
         let closest = a * weights[0] + b * weights[1] + c * weights[2];
         let within = weights.iter().all(|&weight| weight > 0.0);
         faces.add(FoundFace {
