@@ -178,13 +178,10 @@ pub unsafe extern "C" fn sinew_get_allocator(
 ) -> sinew_status {
     guard(|| {
         let (alloc, dealloc, context) = routed::given().copied().unwrap_or_default();
-        // SAFETY: the same contract.
-        unsafe {
-            memory::write_wanted_of_three(
-                ("out_alloc", out_alloc, alloc),
-                ("out_dealloc", out_dealloc, dealloc),
-                ("out_context", out_context, context as *mut c_void),
-            )
-        }
+        memory::write_wanted_of_three(
+            ("out_alloc", out_alloc, alloc),
+            ("out_dealloc", out_dealloc, dealloc),
+            ("out_context", out_context, context as *mut c_void),
+        )
     })
 }

@@ -35,8 +35,7 @@ pub(super) fn guard(mut call: impl FnMut() -> Result<()>) -> sinew_status {
 pub(super) unsafe fn destroy<T>(pointer: *mut T) {
     if !pointer.is_null() {
         guard(|| {
-            // SAFETY: the same contract.
-            drop(unsafe { Box::from_raw(pointer) });
+            drop(Box::from_raw(pointer));
             Ok(())
         });
     }

@@ -111,13 +111,10 @@ pub unsafe extern "C" fn sinew_get_log_callback(
 ) -> sinew_status {
     guard(|| {
         let (callback, context) = current();
-        // SAFETY: the same contract.
-        unsafe {
-            memory::write_wanted_of_three(
-                ("out_level", out_level, LEVEL.load(Ordering::Acquire)),
-                ("out_callback", out_callback, callback),
-                ("out_context", out_context, context as *mut c_void),
-            )
-        }
+        memory::write_wanted_of_three(
+            ("out_level", out_level, LEVEL.load(Ordering::Acquire)),
+            ("out_callback", out_callback, callback),
+            ("out_context", out_context, context as *mut c_void),
+        )
     })
 }

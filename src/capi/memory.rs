@@ -85,8 +85,7 @@ pub(super) unsafe fn output<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mu
 /// # Safety
 /// As [`output`].
 pub(super) unsafe fn write<T>(name: &str, pointer: *mut T, value: T) -> Result<()> {
-    // SAFETY: the same contract.
-    *unsafe { output(name, pointer) }? = value;
+    *output(name, pointer)? = value;
     Ok(())
 }
 
@@ -98,8 +97,7 @@ type Output<'a, T> = (&'a str, *mut T, T);
 /// # Safety
 /// As [`output`], for both.
 pub(super) unsafe fn write_both<A, B>((name, place, value): Output<A>, other: Output<B>) -> Result<()> {
-    // SAFETY: the same contract.
-    let (place, other_place) = unsafe { (output(name, place)?, output(other.0, other.1)?) };
+    let (place, other_place) = (output(name, place)?, output(other.0, other.1)?);
     (*place, *other_place) = (value, other.2);
     Ok(())
 }
@@ -109,11 +107,8 @@ pub(super) unsafe fn write_both<A, B>((name, place, value): Output<A>, other: Ou
 /// # Safety
 /// As [`output`], for both.
 pub(super) unsafe fn write_wanted<A, B>((name, place, value): Output<A>, other: Output<B>) -> Result<()> {
-    // SAFETY: the same contract.
-    let (place, other_place) = unsafe {
-        let place = optional_output_array(name, place, 1)?;
-        (place, optional_output_array(other.0, other.1, 1)?)
-    };
+    let place = optional_output_array(name, place, 1)?;
+    let other_place = optional_output_array(other.0, other.1, 1)?;
     if let Some(place) = place {
         place[0] = value;
     }
@@ -132,12 +127,10 @@ pub(super) unsafe fn write_wanted_of_three<A, B, C>(
     second: Output<B>,
     third: Output<C>,
 ) -> Result<()> {
-    // SAFETY: the same contract; the third is known to be usable before the first is written.
-    unsafe {
-        optional_output_array(third.0, third.1, 1)?;
-        write_wanted(first, second)?;
-        write_wanted(third, ("", std::ptr::null_mut(), ()))
-    }
+    // The third is known to be usable before the first is written.
+    optional_output_array(third.0, third.1, 1)?;
+    write_wanted(first, second)?;
+    write_wanted(third, ("", std::ptr::null_mut(), ()))
 }
 
 /// The array of `count` values that `pointer` points to; NULL is allowed where `count` is 0.
@@ -165,8 +158,7 @@ pub(super) unsafe fn array_apart<'a, T: Copy>(
     count: usize,
     own: Range<*const T>,
 ) -> Result<Cow<'a, [T]>> {
-    // SAFETY: the same contract.
-    let values = unsafe { array(name, pointer, count) }?;
+    let values = array(name, pointer, count)?;
     let given = values.as_ptr_range();
     if given.start < own.end && own.start < given.end {
         return memory::copied(values).map(Cow::Owned);
@@ -182,8 +174,7 @@ pub(super) unsafe fn optional_array<'a, T>(name: &str, pointer: *const T, count:
     if pointer.is_null() {
         return Ok(None);
     }
-    // SAFETY: the same contract.
-    unsafe { array(name, pointer, count) }.map(Some)
+    array(name, pointer, count).map(Some)
 }
 
 /// The place for `count` results; NULL is allowed where `count` is 0.
@@ -191,8 +182,7 @@ pub(super) unsafe fn optional_array<'a, T>(name: &str, pointer: *const T, count:
 /// # Safety
 /// `pointer` is NULL or points to `count` valid values that nobody else uses meanwhile.
 pub(super) unsafe fn output_array<'a, T>(name: &str, pointer: *mut T, count: usize) -> Result<&'a mut [T]> {
-    // SAFETY: the same contract.
-    let values = unsafe { array(name, pointer.cast_const(), count) }?;
+    let values = array(name, pointer.cast_const(), count)?;
     if values.is_empty() {
         return Ok(&mut []);
     }
@@ -209,8 +199,7 @@ pub(super) unsafe fn write_found<T>(
     (name, pointer, capacity): (&str, *mut T, usize),
     out_count: *mut usize,
 ) -> Result<()> {
-    // SAFETY: the same contract.
-    let (places, out_count) = unsafe { (output_array(name, pointer, capacity)?, output("out_count", out_count)?) };
+    let (places, out_count) = (output_array(name, pointer, capacity)?, output("out_count", out_count)?);
     let mut count = 0;
     for one in found {
         if let Some(place) = places.get_mut(count) {
@@ -234,8 +223,7 @@ pub(super) unsafe fn optional_output_array<'a, T>(
     if pointer.is_null() {
         return Ok(None);
     }
-    // SAFETY: the same contract.
-    unsafe { output_array(name, pointer, count) }.map(Some)
+    output_array(name, pointer, count).map(Some)
 }
 
 /// The 3 floats that `pointer` points to.
@@ -243,8 +231,7 @@ pub(super) unsafe fn optional_output_array<'a, T>(
 /// # Safety
 /// `pointer` is NULL or points to 3 floats that nobody changes meanwhile.
 pub(super) unsafe fn vector(name: &str, pointer: *const f32) -> Result<Vec3> {
-    // SAFETY: the same contract.
-    unsafe { reference(name, pointer.cast::<[f32; 3]>()) }.map(|&vector| vector.into())
+    reference(name, pointer.cast::<[f32; 3]>()).map(|&vector| vector.into())
 }
 
 /// The orientation that `pointer` points to; `None` where it is NULL.
@@ -252,8 +239,7 @@ pub(super) unsafe fn vector(name: &str, pointer: *const f32) -> Result<Vec3> {
 /// # Safety
 /// `pointer` is NULL or points to 4 floats that nobody changes meanwhile.
 pub(super) unsafe fn optional_orientation(name: &str, pointer: *const f32) -> Result<Option<Quat>> {
-    // SAFETY: the same contract.
-    let orientation = unsafe { optional_array(name, pointer.cast::<[f32; 4]>(), 1) }?;
+    let orientation = optional_array(name, pointer.cast::<[f32; 4]>(), 1)?;
     Ok(orientation.map(|orientation| Quat::from_array(orientation[0])))
 }
 
@@ -295,8 +281,7 @@ pub(super) unsafe fn optional_definition<T: Versioned>(name: &str, pointer: *con
     if pointer.is_null() {
         return Ok(defaults);
     }
-    // SAFETY: the same contract.
-    unsafe { definition(name, pointer, defaults) }
+    definition(name, pointer, defaults)
 }
 
 /// Fills the definition at `pointer` with `defaults`, as much of it as `size` says the caller knows.
@@ -336,8 +321,7 @@ pub(super) unsafe fn report<T: Versioned>(name: &str, pointer: *mut T) -> Result
 /// # Safety
 /// As [`report`].
 pub(super) unsafe fn write_report<T: Versioned>(name: &str, pointer: *mut T, value: T) -> Result<()> {
-    // SAFETY: the same contract.
-    unsafe { report(name, pointer)?.fill(value) };
+    report(name, pointer)?.fill(value);
     Ok(())
 }
 
@@ -349,8 +333,7 @@ pub(super) unsafe fn optional_report<T: Versioned>(name: &str, pointer: *mut T) 
     if pointer.is_null() {
         return Ok(None);
     }
-    // SAFETY: the same contract.
-    unsafe { report(name, pointer) }.map(Some)
+    report(name, pointer).map(Some)
 }
 
 impl<T: Versioned> Report<T> {
