@@ -32,11 +32,8 @@ const STRETCHED: [f32; 3] = [1.0, 0.15, 0.1];
 ///
 /// ```
 /// # use glam::Vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # world.create_body(&cloth)?;
 /// #[derive(Default)]
 /// struct LineList(Vec<[Vec3; 2]>);
@@ -63,11 +60,8 @@ pub trait DebugCanvas {
 ///
 /// ```
 /// # use glam::Vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// # struct LineCount(usize);
 /// # impl DebugCanvas for LineCount {

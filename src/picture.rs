@@ -15,11 +15,8 @@ use crate::world::World;
 /// How a world is drawn.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # world.create_body(&cloth)?;
 /// let definition = PictureDefinition { width: 64, height: 48, ..PictureDefinition::default() };
 /// let picture = world.picture(&definition)?;
@@ -63,11 +60,8 @@ impl Default for PictureDefinition {
 /// A body that is coloured by a number for each of its nodes, such as strain or a force.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// # let definition = PictureDefinition { width: 64, height: 48, ..PictureDefinition::default() };
 /// use sinew::raster::{ColourScale, Colours};

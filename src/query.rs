@@ -18,11 +18,8 @@ use crate::world::World;
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// let hit = world.cast_ray(vec3(0.01, 0.5, 0.02), Vec3::NEG_Y, 1.0)?.expect("the cloth is below");
 /// assert_eq!(hit.body, body);

@@ -99,10 +99,7 @@ impl Default for WorldDefinition {
 /// Bodies and tools that are stepped together.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
+#[doc = include_str!("doctest/cloth.txt")]
 /// let mut world = World::new(WorldDefinition::default())?;
 /// let body = world.create_body(&cloth)?;
 /// for _ in 0..6 {

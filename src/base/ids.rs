@@ -60,11 +60,8 @@ impl WorldTag {
 /// A body of a world.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let body = world.create_body(&cloth)?;
 /// world.destroy_body(body)?;
 /// assert!(!world.has_body(body));
@@ -88,11 +85,8 @@ pub struct ToolId(pub(crate) SlotId);
 /// What a tool holds of a body, or a body of another.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// # let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))?;
 /// let held = world.attach_node(body, 12, ball, 0.0)?;

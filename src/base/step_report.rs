@@ -5,11 +5,8 @@ use super::ids::BodyId;
 /// What bounds the substeps of a body.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { max_substeps: 1, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # world.create_body(&BodyDefinition { solver: Solver::Verlet, ..cloth })?;
 /// let Err(Error::Unstable { report, .. }) = world.step(1.0 / 60.0) else { panic!("a single substep suffices") };
 /// assert_eq!(report.limit.map(|limit| limit.of.kind), Some(LimitKind::Spring));
@@ -48,11 +45,8 @@ impl LimitKind {
 /// The part of a body that allows the shortest substep.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { max_substeps: 1, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # world.create_body(&BodyDefinition { solver: Solver::Verlet, ..cloth })?;
 /// if let Err(Error::Unstable { report: StepReport { limit: Some(limit), .. }, .. }) = world.step(1.0 / 60.0) {
 ///     let SubstepLimit { kind, nodes, node_count } = limit.of;
@@ -92,11 +86,8 @@ impl SubstepLimit {
 /// What a step did.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// let report = world.step(1.0 / 60.0)?;
 /// assert!(report.substeps as f32 * report.stable_substep >= 1.0 / 60.0);
@@ -131,11 +122,8 @@ pub struct StepReport {
 /// The body that needs more substeps than are allowed.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { max_substeps: 1, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&BodyDefinition { solver: Solver::Verlet, ..cloth })?;
 /// if let Err(Error::Unstable { report: StepReport { limit: Some(limit), .. }, .. }) = world.step(1.0 / 60.0) {
 ///     assert_eq!(limit.body, body);

@@ -80,11 +80,8 @@ const FEW_NODES: usize = 32;
 /// Coordinates and indices are the caller's throughout.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// world.body_mut(body)?.pin(0)?;
 /// world.step(1.0 / 60.0)?;

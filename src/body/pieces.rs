@@ -7,11 +7,9 @@ use crate::base::{DisjointSets, Result, memory};
 ///
 /// ```
 /// # use glam::vec3;
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::cutting::Sweep;
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
 /// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
 /// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };

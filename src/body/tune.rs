@@ -9,11 +9,8 @@ use crate::springs::{Link, SpringChange, not_joined, pull};
 /// A spring as it is.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// let body = world.body_mut(body)?;
 /// body.set_springs(&[[0, 1]], Some(Values::Uniform(40.0)), None)?;

@@ -9,11 +9,8 @@ use crate::codec::saved;
 ///
 /// ```
 /// # use glam::Vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// # let block = world.create_body(&block)?;
 /// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
 /// # ball.pose.position = 0.03 * Vec3::Y;
@@ -45,11 +42,8 @@ pub struct Contact {
 ///
 /// ```
 /// # use glam::Vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// # let block = world.create_body(&block)?;
 /// # let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
 /// # ball.pose.position = 0.03 * Vec3::Y;
@@ -74,11 +68,8 @@ pub struct ContactChange {
 ///
 /// ```
 /// # use glam::{Quat, Vec3, vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let contact = BodyContact { thickness: 0.001, with_bodies: true, ..BodyContact::default() };
 /// # let [lower, upper] = [0, 1].map(|_| world.create_body(&BodyDefinition { contact, ..cloth }));
 /// # let (lower, upper) = (lower?, upper?);
@@ -104,11 +95,8 @@ pub struct BodyContactChange {
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, toughness: 0.01, ..cloth })?;
 /// # let mut blade = BladeDefinition::new([0.01 * Vec3::NEG_Y, 0.01 * Vec3::Y]);
 /// # blade.pose.position = vec3(0.003, 0.0, -0.051);

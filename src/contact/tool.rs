@@ -19,11 +19,8 @@ use crate::mesh::FURTHEST;
 ///
 /// ```
 /// # use glam::{Quat, Vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// # world.body_mut(body)?.transform(0.01 * Vec3::Y, Quat::IDENTITY, None)?;
 /// // The cloth begins 1 cm above it.
@@ -155,11 +152,8 @@ impl Pose {
 ///
 /// ```
 /// # use glam::Vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// # world.create_body(&block)?;
 /// let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
 /// ball.pose.position = 0.03 * Vec3::Y;

@@ -5,13 +5,7 @@ use crate::base::{Result, memory};
 /// A part of what a node was before the cut.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+#[doc = include_str!("../doctest/cut_sheet.txt")]
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// # assert!(!changes.nodes.is_empty());
@@ -34,13 +28,7 @@ pub struct PieceOfNode {
 /// A part of what a spring was before the cut. It has its source's rest length.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+#[doc = include_str!("../doctest/cut_sheet.txt")]
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// # assert!(!changes.springs.is_empty());
@@ -63,13 +51,7 @@ pub struct PieceOfSpring {
 /// A part of what a cell was before the cut.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+#[doc = include_str!("../doctest/cut_sheet.txt")]
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// // The copies of cells that fell apart are numbered from the last old cell on.
@@ -90,13 +72,7 @@ pub struct PieceOfCell {
 /// A point of what is drawn that is at no node, but bound to some.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+#[doc = include_str!("../doctest/cut_sheet.txt")]
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// # assert!(!changes.bound.is_empty());
@@ -119,13 +95,7 @@ pub struct BoundPoint {
 /// Where a new node or point that is drawn comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+#[doc = include_str!("../doctest/cut_sheet.txt")]
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// # assert!(!changes.sources.is_empty());
@@ -157,13 +127,7 @@ pub(crate) struct NewVertex {
 /// meets the skin.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+#[doc = include_str!("../doctest/cut_sheet.txt")]
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// // Each edge of the cut is two of the rim.
@@ -186,14 +150,7 @@ pub struct RimEdge {
 /// A face of a solid's material that has opened.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSolid, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
-/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
-/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
-/// # let near = solid.near(&across, &mesh.positions)?;
+#[doc = include_str!("../doctest/cut_solid.txt")]
 /// # let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// let area: f64 = changes.faces.iter().map(|face| face.area).sum();
 /// // The block is cut across, snapped to its nodes where it passes near them.
@@ -212,13 +169,7 @@ pub struct CutFace {
 /// depends on what is cut and the blade alone.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+#[doc = include_str!("../doctest/cut_sheet.txt")]
 /// let near = sheet.near(&across, &mesh.positions)?;
 /// let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// let triangles = sheet.triangles().len() as u32;

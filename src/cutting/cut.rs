@@ -11,11 +11,9 @@ use crate::base::{Error, Result, ensure, memory};
 ///
 /// ```
 /// # use glam::vec3;
-/// # use sinew::{cutting::Sweep, mesh::Mesh, *};
+/// # use sinew::cutting::Sweep;
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
 /// // An upright edge, moved along z.
 /// let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
@@ -80,13 +78,7 @@ impl Sweep {
 /// How many there may be after a cut; one that needs more is refused.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+#[doc = include_str!("../doctest/cut_sheet.txt")]
 /// let near = sheet.near(&across, &mesh.positions)?;
 /// let refused = sheet.cut(&across, &mesh.positions, &near, Limits { nodes: 26, ..Limits::NONE });
 /// assert!(matches!(refused, Err(sinew::Error::Capacity(_))));

@@ -11,13 +11,7 @@ use crate::codec::saved;
 /// A triangle that is simulated.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+#[doc = include_str!("../doctest/cut_sheet.txt")]
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// let area: f64 = sheet.cells().iter().map(|cell| cell.area).sum();
@@ -44,13 +38,7 @@ saved! { SurfaceCell { nodes, area, snap, first, next } }
 /// A triangle that is drawn and touched.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSurface, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let mut sheet = CutSurface::new(&mesh.positions, &mesh.triangles)?;
-/// # let edge = |z| [vec3(0.003, -0.01, z), vec3(0.003, 0.01, z)];
-/// # let across = Sweep { start: edge(-0.06), end: edge(0.06) };
+#[doc = include_str!("../doctest/cut_sheet.txt")]
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// let rim = sheet.triangles().iter().flat_map(|triangle| triangle.rim).filter(|&is_rim| is_rim);

@@ -6,11 +6,8 @@ use crate::codec::{saved, saved_enum};
 ///
 /// ```
 /// # use glam::vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// # let ball = world.create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))?;
 /// let hit = world.nearest_point(vec3(0.01, 0.02, 0.005), 0.1)?.expect("the cloth is 2 cm away");
@@ -33,11 +30,8 @@ saved! { SurfacePoint { triangle, weights } }
 ///
 /// ```
 /// # use glam::{Quat, Vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let [left, right] = [0, 1].map(|_| world.create_body(&cloth));
 /// # let (left, right) = (left?, right?);
 /// # world.body_mut(right)?.transform(0.1 * Vec3::X, Quat::IDENTITY, None)?;

@@ -15,11 +15,8 @@ use crate::mesh::Mesh;
 /// How a body keeps its springs.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let packed = world.create_body(&BodyDefinition { storage: Storage::Packed, ..cloth })?;
 /// let linked = world.create_body(&BodyDefinition { storage: Storage::Efficient, ..cloth })?;
 /// let bytes = |body| world.body(body).map(|body| body.storage_report().bytes_used);
@@ -42,11 +39,8 @@ pub enum Storage {
 /// How a body is moved.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let stiff = BodyDefinition { stiffnesses: Values::Uniform(1e5), solver: Solver::Implicit, ..cloth };
 /// # world.create_body(&stiff)?;
 /// let report = world.step(1.0 / 60.0)?;

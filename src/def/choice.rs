@@ -6,11 +6,8 @@ use crate::codec::{saved, saved_enum};
 /// Why a body has its solver.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let body = world.create_body(&BodyDefinition { solver: Solver::Implicit, ..cloth })?;
 /// assert_eq!(world.body(body)?.solver_choice().reason, ChoiceReason::Given);
 /// # Ok::<(), sinew::Error>(())
@@ -31,11 +28,8 @@ saved_enum!(ChoiceReason { 0 => Given, 1 => FewSubsteps, 2 => ManySubsteps });
 /// The solver of a body, and what [`Solver::Auto`] chose it by.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let body = world.create_body(&BodyDefinition { solver: Solver::Auto, ..cloth })?;
 /// let choice = world.body(body)?.solver_choice();
 /// assert_eq!((choice.solver, choice.reason), (Solver::Verlet, ChoiceReason::FewSubsteps));

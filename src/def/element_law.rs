@@ -9,11 +9,8 @@ use crate::codec::saved_enum;
 /// tetrahedra at a node together from a Poisson's ratio of 0.4 on.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// let rubber = BodyDefinition { element_law: ElementLaw::MooneyRivlin { ratio: 0.25 }, ..block };
 /// assert!(world.create_body(&rubber).is_ok());
 /// let refused = BodyDefinition { element_law: ElementLaw::MooneyRivlin { ratio: 1.5 }, ..block };

@@ -6,11 +6,8 @@ use crate::base::{Error, Result, above_zero, ensure, not_negative};
 /// How a material's numbers become forces.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// # let material = material.expect("the block has one");
 /// let mut with = |model| world.create_body(&BodyDefinition { material: Some(Material { model, ..material }), ..block });
 /// // Poisson's ratio is 0.45: elements can have it, springs cannot.
@@ -53,11 +50,8 @@ pub enum Model {
 /// What a body is made of, by its numbers. Plain data.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// let material = Material {
 ///     model: Model::Tetrahedra,
 ///     young_modulus: 5000.0,

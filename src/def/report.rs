@@ -5,11 +5,8 @@ use crate::codec::saved;
 /// How much memory the springs of a body take.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// let report = world.body(body)?.storage_report();
 /// assert_eq!(report.spring_count, mesh.edges()?.len());
@@ -58,11 +55,8 @@ pub struct EnclosedReport {
 /// How a body's solver took the last step.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let body = world.create_body(&BodyDefinition { solver: Solver::Implicit, ..cloth })?;
 /// # world.body_mut(body)?.pin(0)?;
 /// world.step(1.0 / 60.0)?;
@@ -104,11 +98,8 @@ impl SolverReport {
 /// Energy in joules, at the time of the positions.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// world.step(1.0 / 60.0)?;
 /// let energy = world.body(body)?.energy(world.gravity());

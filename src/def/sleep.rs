@@ -7,11 +7,8 @@ use crate::codec::saved;
 ///
 /// ```
 /// # use glam::Vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let sleep = Sleep { speed: 1e-3, time: 0.1 };
 /// let body = world.create_body(&BodyDefinition { sleep, ..cloth })?;
 /// for _ in 0..20 {
@@ -33,11 +30,8 @@ saved! { Sleep { speed, time } }
 /// What of a body can be set after it was made.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&cloth)?;
 /// let settings = world.body(body)?.settings();
 /// world.set_body_settings(body, BodySettings { thickness: 0.002, ..settings })?;

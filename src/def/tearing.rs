@@ -18,11 +18,8 @@ use crate::codec::{saved, saved_enum};
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let tearing = Tearing { strain: 0.5, most_per_step: 4, ..Tearing::default() };
 /// let body = world.create_body(&BodyDefinition { tearing, spare_nodes: 200, ..cloth })?;
 /// let stretched: Vec<Vec3> = mesh.positions.iter().map(|place| vec3(2.0, 1.0, 1.0) * place).collect();
@@ -49,11 +46,8 @@ saved! { Tearing { strain, force, most_per_step, smallest_piece } }
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let tearing = Tearing { strain: 0.5, most_per_step: 4, ..Tearing::default() };
 /// # let body = world.create_body(&BodyDefinition { tearing, spare_nodes: 200, ..cloth })?;
 /// # let stretched: Vec<Vec3> = mesh.positions.iter().map(|place| vec3(2.0, 1.0, 1.0) * place).collect();

@@ -7,11 +7,8 @@ use crate::base::{Error, Result, ensure, not_negative};
 /// One value for all, or one for each.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// let mut masses = vec![1e-4; mesh.positions.len()];
 /// // The first node is pinned for good.
 /// masses[0] = 0.0;

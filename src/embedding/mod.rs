@@ -21,11 +21,8 @@ use follow::Follower;
 ///
 /// ```
 /// # use glam::Vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&block)?;
 /// let skin = EmbeddingDefinition { vertices: &[0.01 * Vec3::ONE], tetrahedra: &mesh.tetrahedra, ..EmbeddingDefinition::default() };
 /// let embedding = world.create_embedding(body, &skin)?;
@@ -52,11 +49,8 @@ pub struct EmbeddingDefinition<'a> {
 ///
 /// ```
 /// # use glam::Vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&block)?;
 /// # let skin = EmbeddingDefinition { vertices: &[0.01 * Vec3::ONE], tetrahedra: &mesh.tetrahedra, ..EmbeddingDefinition::default() };
 /// let mut embedding = world.create_embedding(body, &skin)?;

@@ -32,10 +32,7 @@ pub(crate) struct Record(pub [f32; 4]);
 /// The widest instructions that kernels use.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
+#[doc = include_str!("../doctest/cloth.txt")]
 /// let fallen = |kernel| {
 ///     let mut world = World::new(WorldDefinition { kernel, ..WorldDefinition::default() })?;
 ///     let body = world.create_body(&cloth)?;

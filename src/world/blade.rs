@@ -29,11 +29,8 @@ const MOST_TURN: f64 = 0.5;
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let sheet = world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
 /// let mut blade = BladeDefinition::new([0.01 * Vec3::NEG_Y, 0.01 * Vec3::Y]);
 /// blade.pose.position = vec3(0.003, 0.0, -0.06);
@@ -72,11 +69,8 @@ impl BladeDefinition {
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # world.create_body(&BodyDefinition { spare_nodes: 200, ..cloth })?;
 /// # let mut blade = BladeDefinition::new([0.01 * Vec3::NEG_Y, 0.01 * Vec3::Y]);
 /// # blade.pose.position = vec3(0.003, 0.0, -0.06);

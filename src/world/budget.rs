@@ -31,11 +31,8 @@ const STEPS: usize = 8;
 /// What a step of bounded work did.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # world.create_body(&BodyDefinition { solver: Solver::Implicit, ..cloth })?;
 /// let report = world.step_with_budget(1.0 / 60.0, 1000)?;
 /// assert!(report.work_done <= report.work);

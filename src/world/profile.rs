@@ -10,11 +10,8 @@ use crate::solver::Outcome;
 /// can exceed `step` together; with one thread the sum of the stages is less than `step`. What is left is checks and choices of substeps.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # world.create_body(&cloth)?;
 /// world.set_profiling(true)?;
 /// world.step(1.0 / 60.0)?;

@@ -10,11 +10,8 @@ use crate::tissue::{Thread, distance};
 ///
 /// ```
 /// # use glam::{Quat, Vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let [left, right] = [0, 1].map(|_| world.create_body(&cloth));
 /// # let (left, right) = (left?, right?);
 /// # world.body_mut(right)?.transform(0.11 * Vec3::X, Quat::IDENTITY, None)?;
@@ -50,11 +47,8 @@ impl Default for SutureDefinition {
 ///
 /// ```
 /// # use glam::{Quat, Vec3};
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition { gravity: Vec3::ZERO, ..WorldDefinition::default() })?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # let [left, right] = [0, 1].map(|_| world.create_body(&cloth));
 /// # let (left, right) = (left?, right?);
 /// # world.body_mut(right)?.transform(0.11 * Vec3::X, Quat::IDENTITY, None)?;

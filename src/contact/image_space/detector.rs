@@ -14,14 +14,7 @@ use crate::base::{Error, Result, above_zero, ensure};
 /// From where bodies are looked at.
 ///
 /// ```
-/// # use glam::Vec3;
-/// # use sinew::detection::image_space::*;
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
-/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
-/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
-/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
-/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+#[doc = include_str!("../../doctest/two_cubes.txt")]
 /// let definition = ImageSpaceDefinition { views: Views::Along(Vec3::Y), ..ImageSpaceDefinition::new(0.002) };
 /// let mut space = ImageSpace::new(&definition, &[&cube, &cube])?;
 /// assert!(!space.detect(&bodies)?.inside[0].points.is_empty());
@@ -38,14 +31,7 @@ pub enum Views {
 /// How an image is made.
 ///
 /// ```
-/// # use glam::Vec3;
-/// # use sinew::detection::image_space::*;
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
-/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
-/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
-/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
-/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+#[doc = include_str!("../../doctest/two_cubes.txt")]
 /// let definition = ImageSpaceDefinition { form: Form::Counted, ..ImageSpaceDefinition::new(0.002) };
 /// let mut space = ImageSpace::new(&definition, &[&cube, &cube])?;
 /// // The counted form measures no volume.
@@ -65,14 +51,7 @@ pub enum Form {
 /// How bodies are compared. Plain data, used only during [`ImageSpace::new`].
 ///
 /// ```
-/// # use glam::Vec3;
-/// # use sinew::detection::image_space::*;
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
-/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
-/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
-/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
-/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+#[doc = include_str!("../../doctest/two_cubes.txt")]
 /// let definition = ImageSpaceDefinition { pixels: 1 << 16, ..ImageSpaceDefinition::new(0.002) };
 /// let mut space = ImageSpace::new(&definition, &[&cube, &cube])?;
 /// assert_eq!(space.detect(&bodies)?.pixel, 0.002);
@@ -113,14 +92,7 @@ impl ImageSpaceDefinition {
 /// between two detections is not seen.
 ///
 /// ```
-/// # use glam::Vec3;
-/// # use sinew::detection::image_space::*;
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
-/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
-/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
-/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
-/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+#[doc = include_str!("../../doctest/two_cubes.txt")]
 /// let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
 /// // Cubes of 10 cm, one 8 cm beside the other.
 /// let overlap = space.detect(&bodies)?;

@@ -8,14 +8,7 @@ use crate::base::{Result, memory};
 /// What two surfaces have in common. Index 0 belongs to the first, 1 to the second.
 ///
 /// ```
-/// # use glam::Vec3;
-/// # use sinew::detection::image_space::*;
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
-/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
-/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
-/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
-/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+#[doc = include_str!("../../doctest/two_cubes.txt")]
 /// # let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
 /// # let overlap = space.detect(&bodies)?;
 /// // The second cube is 8 cm along x: the first moves back.
@@ -44,14 +37,7 @@ pub struct Overlap {
 /// What of a surface lies inside another.
 ///
 /// ```
-/// # use glam::Vec3;
-/// # use sinew::detection::image_space::*;
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
-/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
-/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
-/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
-/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+#[doc = include_str!("../../doctest/two_cubes.txt")]
 /// # let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
 /// # let overlap = space.detect(&bodies)?;
 /// let [first, second] = &overlap.inside;
@@ -72,14 +58,7 @@ pub struct Inside {
 /// A node inside a surface.
 ///
 /// ```
-/// # use glam::Vec3;
-/// # use sinew::detection::image_space::*;
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
-/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
-/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
-/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
-/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+#[doc = include_str!("../../doctest/two_cubes.txt")]
 /// # let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
 /// # let overlap = space.detect(&bodies)?;
 /// # assert!(!overlap.inside[0].points.is_empty());
@@ -102,14 +81,7 @@ pub struct PointInside {
 /// A part of an edge inside a surface.
 ///
 /// ```
-/// # use glam::Vec3;
-/// # use sinew::detection::image_space::*;
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
-/// # let moved: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.08 * Vec3::X).collect();
-/// # let cube = Surface::closed(mesh.positions.len(), &mesh.surface()?)?;
-/// # let place = |positions| Placed { surface: &cube, positions, thickness: 0.0 };
-/// # let bodies = [place(&mesh.positions[..]), place(&moved[..])];
+#[doc = include_str!("../../doctest/two_cubes.txt")]
 /// # let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
 /// # let overlap = space.detect(&bodies)?;
 /// # assert!(!overlap.inside[0].edges.is_empty());

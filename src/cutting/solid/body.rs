@@ -15,14 +15,7 @@ pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 
 /// A tetrahedron that is simulated.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSolid, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
-/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
-/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
-/// # let near = solid.near(&across, &mesh.positions)?;
+#[doc = include_str!("../../doctest/cut_solid.txt")]
 /// # solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// let volume: f64 = solid.cells().iter().map(|cell| cell.volume).sum();
 /// // A cut takes nothing away.
@@ -61,14 +54,7 @@ saved_enum!(Face { 0 => Whole, 1 => Severed, 2 => Opening });
 /// A tetrahedron of the material.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSolid, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
-/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
-/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
-/// # let near = solid.near(&across, &mesh.positions)?;
+#[doc = include_str!("../../doctest/cut_solid.txt")]
 /// # solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// for tetrahedron in solid.tetrahedra() {
 ///     assert!(tetrahedron.volume > 0.0);
@@ -101,14 +87,7 @@ saved! { SolidTetrahedron { corners, cell, volume, neighbours, faces, drawn, tur
 /// A triangle that is drawn and touched: a face of the material with nothing across.
 ///
 /// ```
-/// # use glam::vec3;
-/// # use sinew::cutting::{CutSolid, Limits, Sweep};
-/// # use sinew::mesh::Mesh;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let mut solid = CutSolid::new(&mesh.positions, &mesh.tetrahedra, &mesh.surface()?)?;
-/// # let edge = |z| [vec3(0.003, -0.03, z), vec3(0.003, 0.03, z)];
-/// # let across = Sweep { start: edge(-0.03), end: edge(0.03) };
-/// # let near = solid.near(&across, &mesh.positions)?;
+#[doc = include_str!("../../doctest/cut_solid.txt")]
 /// # let changes = solid.cut(&across, &mesh.positions, &near, Limits::NONE)?;
 /// let inner = solid.triangles().iter().filter(|triangle| triangle.is_inner);
 /// assert_eq!(inner.count(), 2 * changes.faces.len());

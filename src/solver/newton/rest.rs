@@ -25,11 +25,8 @@ const SADDLES: u32 = 50;
 ///
 /// ```
 /// # use glam::vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&block)?;
 /// # world.body_mut(body)?.pin_box(vec3(-1.0, 0.019, -1.0), vec3(1.0, 1.0, 1.0))?;
 /// // The block hangs from its upper side.
@@ -50,11 +47,8 @@ pub struct RestStateDefinition {
 ///
 /// ```
 /// # use glam::vec3;
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::block([0.04, 0.04, 0.04], [2, 2, 2])?;
-/// # let material = Some(Material { model: Model::Tetrahedra, young_modulus: 5e3, poisson_ratio: 0.45, density: 1e3, thickness: 0.0 });
-/// # let block = BodyDefinition { material, ..BodyDefinition::of(&mesh) };
 /// # let body = world.create_body(&block)?;
 /// # world.body_mut(body)?.pin_box(vec3(-1.0, 0.019, -1.0), vec3(1.0, 1.0, 1.0))?;
 /// let report = world.rest_state(body, &RestStateDefinition::default())?;

@@ -13,11 +13,8 @@ use crate::codec::seal;
 /// What came of a replay.
 ///
 /// ```
-/// # use sinew::{mesh::Mesh, *};
+#[doc = include_str!("../../doctest/cloth.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
-/// # let mesh = Mesh::cloth([0.1, 0.1], [4, 4])?;
-/// # let (masses, stiffnesses) = (Values::Uniform(1e-4), Values::Uniform(20.0));
-/// # let cloth = BodyDefinition { masses, stiffnesses, ..BodyDefinition::of(&mesh) };
 /// # world.create_body(&cloth)?;
 /// # let path = std::env::temp_dir().join(format!("sinew_replay_report_{}", std::process::id()));
 /// world.start_recording(&path)?;
