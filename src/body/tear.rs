@@ -129,14 +129,29 @@ impl Body {
         }
     }
 
+    /// Tears at the first of some places where that can be done; else says why it cannot.
     fn tear_with(&mut self, cuttable: &mut Cuttable, spring: [u32; 2], mut skin: Option<&mut Skin>) -> Result<Torn> {
-        if cuttable.material.solid().is_some() {
-            return self.tear_solid(cuttable, spring, skin);
+        let is_solid = cuttable.material.solid().is_some();
+        let places = if is_solid {
+            self.stretched_at(cuttable, spring)?
+        } else {
+            self.torn_apart(cuttable, spring)?
+        };
+        let mut why = Withheld::NoWay;
+        for (place, load) in places {
+            let skin = skin.as_deref_mut();
+            let torn = if is_solid {
+                self.tear_node(cuttable, place, &load, skin)?
+            } else {
+                self.tear_through(cuttable, place, &load, skin)?
+            };
+            match torn {
+                Torn::Made => return Ok(Torn::Made),
+                Torn::Not(Withheld::NoWay) => {}
+                Torn::Not(other) => why = other,
+            }
         }
-        let places = self.torn_apart(cuttable, spring)?;
-        first_made(places, |vertex, load| {
-            self.tear_through(cuttable, vertex, load, skin.as_deref_mut())
-        })
+        Ok(Torn::Not(why))
     }
 
     /// Where a spring may tear the surface, what is to be tried first before the others.
@@ -262,22 +277,6 @@ impl Body {
         let [pulled, pushed] = [0, 1].map(|kind| tensors[kind] - along_itself(sums[kind]));
         0.5 * (pulled - pushed)
     }
-}
-
-/// Tears at the first of some places where that can be done; else says why it cannot.
-pub(super) fn first_made(
-    places: Vec<(u32, VertexLoad)>,
-    mut tear: impl FnMut(u32, &VertexLoad) -> Result<Torn>,
-) -> Result<Torn> {
-    let mut why = Withheld::NoWay;
-    for (place, load) in places {
-        match tear(place, &load)? {
-            Torn::Made => return Ok(Torn::Made),
-            Torn::Not(Withheld::NoWay) => {}
-            Torn::Not(other) => why = other,
-        }
-    }
-    Ok(Torn::Not(why))
 }
 
 /// The matrix with the vector as its eigenvector, and the vector's length as its value; nothing across it.

@@ -2,28 +2,16 @@
 
 use super::Body;
 use super::cuttable::Cuttable;
-use super::tear::{Torn, first_made};
+use super::tear::Torn;
 use crate::base::{Result, memory};
 use crate::cutting::{CutMaterial, Divided, VertexLoad};
 use crate::def::Withheld;
 use crate::tissue::Skin;
 
 impl Body {
-    /// Tears a solid at a spring, or an edge of elements: through that of its nodes which is stretched more, else the other, or else one beside it.
-    pub(super) fn tear_solid(
-        &mut self,
-        cuttable: &mut Cuttable,
-        spring: [u32; 2],
-        mut skin: Option<&mut Skin>,
-    ) -> Result<Torn> {
-        let places = self.stretched_at(cuttable, spring)?;
-        first_made(places, |node, load| {
-            self.tear_node(cuttable, node, load, skin.as_deref_mut())
-        })
-    }
-
-    /// The nodes at which a spring may tear its solid, in the order in which they are to be tried.
-    fn stretched_at(&self, cuttable: &Cuttable, spring: [u32; 2]) -> Result<Vec<(u32, VertexLoad)>> {
+    /// The nodes at which a spring, or an edge of elements, may tear its solid, in the order in which they are to be tried: that of its own nodes
+    /// which is stretched more, the other, and those beside it.
+    pub(super) fn stretched_at(&self, cuttable: &Cuttable, spring: [u32; 2]) -> Result<Vec<(u32, VertexLoad)>> {
         let Some(solid) = cuttable.material.solid() else {
             return Ok(Vec::new());
         };
@@ -47,7 +35,7 @@ impl Body {
         Ok(found)
     }
 
-    fn tear_node(
+    pub(super) fn tear_node(
         &mut self,
         cuttable: &mut Cuttable,
         node: u32,
