@@ -105,8 +105,13 @@ pub(crate) fn opened(bytes: &[u8], shape: u64) -> Result<&[u8]> {
     Ok(&bytes[HEADER..])
 }
 
-/// The content of the section that comes next, which must have this tag, and what is behind it.
-pub(crate) fn section<'a>(bytes: &mut &'a [u8], tag: [u8; 4], kernel: ChosenKernel) -> Result<Reader<'a>> {
+/// Reads the section that comes next, which must have this tag and hold nothing else.
+pub(crate) fn read_section<T>(
+    bytes: &mut &[u8],
+    tag: [u8; 4],
+    kernel: ChosenKernel,
+    content: impl FnOnce(&mut Reader) -> Result<T>,
+) -> Result<T> {
     let refusal = |why: &str| {
         let name = String::from_utf8_lossy(&tag);
         Error::invalid(format!("bytes are no world: section {name} {why}"))
@@ -115,17 +120,14 @@ pub(crate) fn section<'a>(bytes: &mut &'a [u8], tag: [u8; 4], kernel: ChosenKern
     ensure!(*found == tag, refusal("is missing"));
     let (size, rest) = rest.split_first_chunk().ok_or_else(|| refusal("ends early"))?;
     let size = usize::try_from(u64::from_le_bytes(*size)).map_err(|_| refusal("ends early"))?;
-    let (content, rest) = rest.split_at_checked(size).ok_or_else(|| refusal("ends early"))?;
+    let (section, rest) = rest.split_at_checked(size).ok_or_else(|| refusal("ends early"))?;
     *bytes = rest;
-    Ok(Reader::new(content, kernel))
-}
-
-/// Refuses what is left of a section.
-pub(crate) fn at_end(from: &Reader) -> Result<()> {
+    let mut from = Reader::new(section, kernel);
+    let value = content(&mut from)?;
     if from.left() > 0 {
         return Err(from.refusal("something is behind what a section holds"));
     }
-    Ok(())
+    Ok(value)
 }
 
 #[cfg(test)]
@@ -148,7 +150,8 @@ mod tests {
             assert!(room(beside).is_too_large());
         }
         let kernel = Kernel::Portable.choose().expect("a kernel for every processor");
-        let mut from = section(&mut &b"ROOM\0\0\0\0\0\0\0\0"[..], *b"ROOM", kernel).expect("a section");
-        assert!(from.will_take(Some(2 << 30)).is_err());
+        let mut bytes = &b"ROOM\0\0\0\0\0\0\0\0"[..];
+        let refused = read_section(&mut bytes, *b"ROOM", kernel, |from| from.will_take(Some(2 << 30)));
+        assert!(refused.is_err());
     }
 }

@@ -3,7 +3,7 @@
 use super::{World, WorldDefinition};
 use crate::base::{Error, Result, WorldTag, ensure, memory};
 use crate::body::Body;
-use crate::codec::{Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section};
+use crate::codec::{Saved, Writer, begin, opened, read_section, saved, seal, shape_with, write_section};
 use crate::contact::Tool;
 use crate::simd::Kernel;
 use crate::slots::Slots;
@@ -158,47 +158,41 @@ impl World {
     pub fn load(bytes: &[u8], thread_count: u32, tasks: Option<RunTasks>) -> Result<Self> {
         let portable = Kernel::Portable.choose()?;
         let mut bytes = opened(bytes, SHAPE)?;
-        let mut from = section(&mut bytes, *b"WRLD", portable)?;
-        let definition = WorldDefinition {
-            thread_count,
-            tasks,
-            ..Saved::load(&mut from)?
-        };
-        let tag = WorldTag::of(Saved::load(&mut from)?).ok_or_else(|| from.refusal("ids of no world"))?;
-        let kernel = match Kernel::load(&mut from)?.choose() {
-            Err(_) if definition.kernel == Kernel::Best => Kernel::Best.choose(),
-            chosen => chosen,
-        }?;
-        let of_this_kernel = WorldDefinition {
-            kernel: kernel.kernel(),
-            ..definition
-        };
-        let mut world = Self::with_tag(of_this_kernel, tag)?;
-        world.definition.kernel = definition.kernel;
-        let walk_count = usize::load(&mut from)?;
-        world.slipped = Saved::load(&mut from)?;
-        world.holds_made = Saved::load(&mut from)?;
-        world.clock = Saved::load(&mut from)?;
-        world.lag = Saved::load(&mut from)?;
-        if !(world.lag >= 0.0 && world.lag.is_finite()) {
-            return Err(from.refusal("a lag that is none"));
-        }
-        at_end(&from)?;
-        let mut from = section(&mut bytes, *b"BODY", kernel)?;
-        world.bodies = Slots::load("body", tag, &mut from)?;
-        at_end(&from)?;
-        let mut from = section(&mut bytes, *b"TOOL", kernel)?;
-        world.tools = Slots::load("tool", tag, &mut from)?;
-        at_end(&from)?;
-        let mut from = section(&mut bytes, *b"ATTA", kernel)?;
-        world.attachments = Slots::load("attachment", tag, &mut from)?;
-        at_end(&from)?;
-        let mut from = section(&mut bytes, *b"BLAD", kernel)?;
-        world.blades = Slots::load("blade", tag, &mut from)?;
-        at_end(&from)?;
-        let mut from = section(&mut bytes, *b"TISS", kernel)?;
-        world.tissue = Saved::load(&mut from)?;
-        at_end(&from)?;
+        let (mut world, walk_count) = read_section(&mut bytes, *b"WRLD", portable, |from| {
+            let definition = WorldDefinition {
+                thread_count,
+                tasks,
+                ..Saved::load(from)?
+            };
+            let tag = WorldTag::of(Saved::load(from)?).ok_or_else(|| from.refusal("ids of no world"))?;
+            let kernel = match Kernel::load(from)?.choose() {
+                Err(_) if definition.kernel == Kernel::Best => Kernel::Best.choose(),
+                chosen => chosen,
+            }?;
+            let of_this_kernel = WorldDefinition {
+                kernel: kernel.kernel(),
+                ..definition
+            };
+            let mut world = Self::with_tag(of_this_kernel, tag)?;
+            world.definition.kernel = definition.kernel;
+            let walk_count = usize::load(from)?;
+            world.slipped = Saved::load(from)?;
+            world.holds_made = Saved::load(from)?;
+            world.clock = Saved::load(from)?;
+            world.lag = Saved::load(from)?;
+            if !(world.lag >= 0.0 && world.lag.is_finite()) {
+                return Err(from.refusal("a lag that is none"));
+            }
+            Ok((world, walk_count))
+        })?;
+        let (kernel, tag) = (world.kernel, world.tag);
+        world.bodies = read_section(&mut bytes, *b"BODY", kernel, |from| Slots::load("body", tag, from))?;
+        world.tools = read_section(&mut bytes, *b"TOOL", kernel, |from| Slots::load("tool", tag, from))?;
+        world.attachments = read_section(&mut bytes, *b"ATTA", kernel, |from| {
+            Slots::load("attachment", tag, from)
+        })?;
+        world.blades = read_section(&mut bytes, *b"BLAD", kernel, |from| Slots::load("blade", tag, from))?;
+        world.tissue = read_section(&mut bytes, *b"TISS", kernel, Saved::load)?;
         ensure!(
             bytes.is_empty(),
             "bytes are no world: something is behind its last section"
