@@ -12,4 +12,4 @@ pub(crate) use rates::{Masses, Rates};
 pub(crate) use records::{Records, WriteRecords};
 pub(crate) use region::{Region, Scale};
 pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
-pub(crate) use vectors::{MARGIN, Places, Vectors, View};
+pub(crate) use vectors::{MARGIN, Places, Vectors, View, copy_axes};

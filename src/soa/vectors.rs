@@ -282,9 +282,7 @@ impl Vectors {
 
     /// Copies all of `other`, which has as many.
     pub fn copy_from(&mut self, other: &Self) {
-        for (to, from) in self.axes_mut().into_iter().zip(other.axes()) {
-            to.copy_from_slice(from);
-        }
+        copy_axes(&mut self.axes_mut(), other.axes());
     }
 
     /// Sets every vector to zero.
@@ -314,6 +312,13 @@ fn largest(squares: impl Iterator<Item = f32>) -> f32 {
         largest.sqrt()
     } else {
         f32::INFINITY
+    }
+}
+
+/// Copies the coordinates along each axis.
+pub(crate) fn copy_axes(to: &mut [&mut [f32]; 3], from: [&[f32]; 3]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        to.copy_from_slice(from);
     }
 }
 

@@ -16,7 +16,7 @@ use crate::codec::saved;
 use crate::forces::Sum;
 use crate::nodes::{NodeDamping, Pin};
 use crate::simd::ChosenKernel;
-use crate::soa::{TILE, TileForces, Vectors, tile_count, tile_nodes};
+use crate::soa::{TILE, TileForces, Vectors, copy_axes, tile_count, tile_nodes};
 use crate::springs::Motion;
 use crate::threads::{Items, Team};
 
@@ -88,9 +88,7 @@ impl Closed<'_> {
         let motion = Motion::at(self.positions, damped);
         self.forces.write(tile, nodes.clone(), &motion, forces);
         let velocities = self.velocities.slices(nodes.clone());
-        for (closed, velocities) in closed.iter_mut().zip(velocities) {
-            closed.copy_from_slice(velocities);
-        }
+        copy_axes(closed, velocities);
         let first = nodes.start;
         self.kernel.run(TileKick {
             kick: &self.kick,

@@ -520,9 +520,6 @@ impl System {
 
     /// Adds up what holds what tools hold, after a substep that is not current yet.
     pub(crate) fn feel_grasps(&mut self, tools: &[ToolPath], lapse: Lapse) {
-        let Some(grasps) = &mut self.grasps else {
-            return;
-        };
         let rates = self.damping.as_ref().map(|damping| damping.rates());
         let state = self.state.substep();
         let positions = if lapse.is_next {
@@ -531,7 +528,7 @@ impl System {
             state.positions
         };
         let mut frames = Frames::new(tools, [lapse.at], self.origin);
-        for held in &mut grasps.nodes {
+        for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {
             let (Some([frame]), Some(pin)) = (frames.of(held.tool), self.pins.get(held.node)) else {
                 continue;
             };

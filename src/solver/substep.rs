@@ -11,7 +11,7 @@ use super::step_request::StepRequest;
 use crate::forces::Sum;
 use crate::nodes::{NodeDamping, Pin};
 use crate::simd::ChosenKernel;
-use crate::soa::{TileForces, Vectors, View, tile_count, tile_nodes};
+use crate::soa::{TileForces, Vectors, View, copy_axes, tile_count, tile_nodes};
 use crate::springs::Motion;
 use crate::threads::{Items, Team};
 
@@ -267,13 +267,13 @@ impl Pass<'_> {
             self.forces.write(tile, nodes.clone(), &motion, forces);
         }
         if let Some(first_velocities) = self.first_velocities {
-            copy(&mut written.velocities, first_velocities.slices(nodes.clone()));
+            copy_axes(&mut written.velocities, first_velocities.slices(nodes.clone()));
         }
         if let (Some(first), Some(remainders)) = (self.first_remainders, &mut written.remainders) {
-            copy(remainders, first.slices(nodes.clone()));
+            copy_axes(remainders, first.slices(nodes.clone()));
         }
         if !self.part.drifts {
-            copy(&mut written.forces, forces.axes().map(|axis| &axis[..nodes.len()]));
+            copy_axes(&mut written.forces, forces.axes().map(|axis| &axis[..nodes.len()]));
         }
         self.feel_pins(&nodes, forces, written.pins);
         self.kernel.run(TileKick {
@@ -324,11 +324,5 @@ impl Pass<'_> {
                 }
             }
         }
-    }
-}
-
-fn copy(to: &mut [&mut [f32]; 3], from: [&[f32]; 3]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        to.copy_from_slice(from);
     }
 }

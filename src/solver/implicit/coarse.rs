@@ -277,11 +277,7 @@ impl Coarse {
 
     /// Adds a spring between two nodes.
     fn add(&mut self, a: usize, b: usize, matrix: &Mat3) {
-        let functions = |node: usize| {
-            let place = self.places.get(node);
-            [self.free[node], place.x, place.y, place.z]
-        };
-        let [of_a, of_b] = [functions(a), functions(b)];
+        let [of_a, of_b] = [self.part(a), self.part(b)];
         let [cluster_a, cluster_b] = [a, b].map(|node| usize::from(self.clusters[node / BLOCK]));
         let rows = if cluster_a == cluster_b {
             [
@@ -339,8 +335,7 @@ impl Coarse {
         let size = self.size();
         self.inverse.copy_from_slice(&self.stiffness);
         for (node, &inertia) in inertia.iter().enumerate() {
-            let place = self.places.get(node);
-            let values = [self.free[node], place.x, place.y, place.z];
+            let values = self.part(node);
             let first = usize::from(self.clusters[node / BLOCK]) * MOTIONS;
             let held = pins.partial_axes_of(node as u32);
             for row in 0..FUNCTIONS {

@@ -231,25 +231,12 @@ impl Substep<'_> {
         let held = |contacts: &Contacts| contacts.holds.work(|node| ways.get(node) - mean.as_vec3());
         let mut work = body.contacts.as_deref().map_or(0.0, held);
         for (axis, ways) in ways.axes().into_iter().enumerate() {
-            let about = mean[axis];
             let gravity = f64::from(self.request.gravity[axis]);
             if gravity != 0.0 {
-                work += gravity
-                    * body.kernel.run(Weighted {
-                        weights: &body.masses,
-                        values: ways,
-                        about,
-                        free: &body.inverse_masses,
-                    });
+                work += gravity * weighted(body, &body.masses, ways, mean[axis]);
             }
             for applied in applied.into_iter().chain(pressed) {
-                let free = &body.inverse_masses;
-                work += body.kernel.run(Weighted {
-                    weights: applied.axes()[axis],
-                    values: ways,
-                    about,
-                    free,
-                });
+                work += weighted(body, applied.axes()[axis], ways, mean[axis]);
             }
         }
         // The way that a node is led is none of theirs.
@@ -261,11 +248,19 @@ impl Substep<'_> {
     }
 }
 
-/// The sum of products over the nodes that are free to move: those that are not 0.
+/// The sum of products over the nodes that are free to move, with `about` taken off each value.
+fn weighted(body: &System, weights: &[f32], values: &[f32], about: f64) -> f64 {
+    body.kernel.run(Weighted {
+        weights,
+        values,
+        about,
+        free: &body.inverse_masses,
+    })
+}
+
 struct Weighted<'a> {
     weights: &'a [f32],
     values: &'a [f32],
-    /// What is taken off each value.
     about: f64,
     free: &'a [f32],
 }
@@ -335,15 +330,8 @@ fn mean(body: &System, vectors: &Vectors) -> DVec3 {
     if held == BVec3::TRUE || body.damping.is_some() {
         return DVec3::ZERO;
     }
-    let sum = |values: &[f32]| {
-        body.kernel.run(Weighted {
-            weights: &body.masses,
-            values,
-            about: 0.0,
-            free: &body.inverse_masses,
-        })
-    };
-    let mean = DVec3::from(vectors.axes().map(sum)) / total_mass(body);
+    let sums = vectors.axes().map(|values| weighted(body, &body.masses, values, 0.0));
+    let mean = DVec3::from(sums) / total_mass(body);
     if mean.is_finite() {
         DVec3::select(held, DVec3::ZERO, mean)
     } else {

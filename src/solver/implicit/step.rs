@@ -7,7 +7,7 @@ use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit};
 use crate::base::{Stage, Stopwatch};
 use crate::codec::saved;
-use crate::soa::{Records, Vectors, WriteRecords, tile_count, tile_nodes};
+use crate::soa::{Records, Vectors, WriteRecords, copy_axes, tile_count, tile_nodes};
 use crate::solver::System;
 use crate::solver::kick::{Survey, look};
 use crate::solver::newton::{Aimed, Newton};
@@ -222,9 +222,7 @@ impl Substep<'_> {
             .pass(tile_count(node_count), written, |tile, (mut velocities, pins)| {
                 let nodes = tile_nodes(tile, node_count);
                 if let Some(first) = first {
-                    for (to, from) in velocities.iter_mut().zip(first.slices(nodes.clone())) {
-                        to.copy_from_slice(from);
-                    }
+                    copy_axes(&mut velocities, first.slices(nodes.clone()));
                 }
                 kernel.run(Add {
                     factor: carried,
@@ -408,12 +406,8 @@ impl Substep<'_> {
             |tile, (mut velocities, mut ways, mut gains, remainders, pins, survey)| {
                 let nodes = tile_nodes(tile, node_count);
                 if let Some(from) = from {
-                    for (to, from) in ways.iter_mut().zip(from.ways.slices(nodes.clone())) {
-                        to.copy_from_slice(from);
-                    }
-                    for (to, from) in gains.iter_mut().zip(from.gains.slices(nodes.clone())) {
-                        to.copy_from_slice(from);
-                    }
+                    copy_axes(&mut ways, from.ways.slices(nodes.clone()));
+                    copy_axes(&mut gains, from.gains.slices(nodes.clone()));
                 }
                 kernel.run(Finish {
                     carried,
@@ -429,9 +423,7 @@ impl Substep<'_> {
                 }
                 if let Some(mut remainders) = remainders {
                     if let Some(from) = from {
-                        for (to, from) in remainders.iter_mut().zip(from.remainders.slices(nodes.clone())) {
-                            to.copy_from_slice(from);
-                        }
+                        copy_axes(&mut remainders, from.remainders.slices(nodes.clone()));
                     }
                     kernel.run(Remain {
                         ways: ways.each_ref().map(|axis| &**axis),
