@@ -2,12 +2,13 @@
 
 use std::collections::HashMap;
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::Body;
 use crate::base::{BodyId, ToolId};
 use crate::contact::{Pose, Shape, SurfaceChange, ToolDefinition};
 use crate::def::{BodyDefinition, Solver, Storage, Values};
+use crate::mesh::Mesh;
 use crate::nodes::{Bound, NewNode};
 use crate::springs::Rewiring;
 use crate::world::{World, WorldDefinition};
@@ -33,35 +34,29 @@ fn sphere(world: &mut World, radius: f32, position: Vec3, friction: f32) -> Tool
         friction,
         pose: Pose {
             position,
-            orientation: Quat::IDENTITY,
+            ..Pose::IDENTITY
         },
         ..ToolDefinition::new(Shape::Sphere { radius })
     };
     world.create_tool(&definition).expect("a tool")
 }
 
-/// A square in y = 0 about the origin, of `count` by `count` squares of two triangles each, outward along y.
-fn square(side: f32, count: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let mut positions = Vec::new();
-    let mut triangles = Vec::new();
-    let at = |place: u32| side * (place as f32 / count as f32 - 0.5);
-    for row in 0..=count {
-        positions.extend((0..=count).map(|column| Vec3::new(at(column), 0.0, at(row))));
-    }
-    for row in 0..count {
-        for column in 0..count {
-            let a = row * (count + 1) + column;
-            let (b, c, d) = (a + 1, a + count + 1, a + count + 2);
-            triangles.extend([[a, c, b], [b, c, d]]);
-        }
-    }
-    (positions, triangles)
+/// Takes a step in which a tool moves.
+fn step_to(world: &mut World, tool: ToolId, place: Vec3, dt: f32) {
+    world.set_pose(tool, place, None).expect("a tool");
+    world.step(dt).expect("a step");
 }
 
-/// The nodes at the rim of such a square.
-fn rim(count: u32) -> impl Iterator<Item = u32> {
-    let is_rim = move |place: u32| place == 0 || place == count;
-    (0..(count + 1) * (count + 1)).filter(move |node| is_rim(node / (count + 1)) || is_rim(node % (count + 1)))
+/// A square in y = 0 about the origin, of `count` by `count` squares of two triangles each, outward along y.
+fn square(count: u32) -> Mesh {
+    Mesh::cloth([0.2; 2], [count; 2]).expect("a mesh")
+}
+
+/// Where the middle of the first edge is of such a square of four by four.
+fn middle_of_first_edge() -> Vec3 {
+    let square = square(4);
+    let [a, b, _] = square.triangles[0].map(|node| square.positions[node as usize]);
+    a.midpoint(b)
 }
 
 /// How a sheet is drawn.
@@ -79,20 +74,31 @@ const NODE_MASS: f32 = 0.001;
 
 fn sheet(world: &mut World, solver: Solver, storage: Storage, count: u32, drag: f32) -> BodyId {
     let exact = if drag == 0.0 { 1e-6 } else { 0.0 };
-    let (positions, triangles) = square(0.2, count);
+    let square = square(count);
     let definition = BodyDefinition {
-        positions: &positions,
+        positions: &square.positions,
         masses: Values::Uniform(NODE_MASS),
         node_dampings: Values::Uniform(drag * NODE_MASS),
         stiffnesses: Values::Uniform(20.0),
         spring_dampings: Values::Uniform(0.02),
-        triangles: &triangles,
+        triangles: &square.triangles,
         solver,
         accuracy: exact,
         storage,
         ..Default::default()
     };
     world.create_body(&definition).expect("a body")
+}
+
+/// A sheet of eight by eight squares that is held at its rim.
+fn held_sheet(world: &mut World, solver: Solver) -> BodyId {
+    let id = sheet(world, solver, Storage::Packed, 8, 40.0);
+    let body = world.body_mut(id).expect("a body");
+    let is_rim = |place: u32| place == 0 || place == 8;
+    for node in (0..81).filter(|node| is_rim(node / 9) || is_rim(node % 9)) {
+        body.pin(node).expect("a node");
+    }
+    id
 }
 
 /// Adds bound points, and has the surface change.
@@ -237,8 +243,7 @@ fn what_a_tool_gives_to_bound_points_is_the_momentum_of_nodes() {
                 let dt = 1e-3_f32;
                 for step in 1..=30 {
                     let place = start + Vec3::new(0.1, 0.4, 0.05) * (dt * step as f32);
-                    world.set_pose(tool, place, None).expect("a tool");
-                    world.step(dt).expect("a step");
+                    step_to(&mut world, tool, place, dt);
                     given -= world.wrench(tool).expect("a tool").0.as_dvec3() * f64::from(dt);
                 }
                 let gained = momentum(body(&world, id));
@@ -315,10 +320,7 @@ fn nodes_receive_what_weights_say() {
         let start = (point - normal * f64::from(radius)).as_vec3();
         let tool = sphere(&mut world, radius, start, 0.0);
         let way = normal * speed * f64::from(dt);
-        world
-            .set_pose(tool, (start.as_dvec3() + way).as_vec3(), None)
-            .expect("a tool");
-        world.step(dt).expect("a step");
+        step_to(&mut world, tool, (start.as_dvec3() + way).as_vec3(), dt);
         let shares = [0, 1, 2, 3].map(|node| {
             (0..3)
                 .map(|corner| met[corner] * f64::from(parts[corner][node]))
@@ -352,15 +354,14 @@ fn what_nobody_draws_is_not_touched() {
     let plane = ToolDefinition {
         pose: Pose {
             position: Vec3::NEG_Y * 0.07,
-            orientation: Quat::IDENTITY,
+            ..Pose::IDENTITY
         },
         ..ToolDefinition::new(Shape::Plane)
     };
     let tool = world.create_tool(&plane).expect("a tool");
     // The lowest node is at -0.08, the lowest corner that is drawn at -0.025.
     for (height, touches) in [(-0.06, false), (-0.04, false), (-0.02, true)] {
-        world.set_pose(tool, Vec3::Y * height, None).expect("a tool");
-        world.step(1e-3).expect("a step");
+        step_to(&mut world, tool, Vec3::Y * height, 1e-3);
         let force = world.wrench(tool).expect("a tool").0;
         assert_eq!(force != Vec3::ZERO, touches, "{height}: {force}");
     }
@@ -386,8 +387,7 @@ fn what_holds_a_node_takes_its_share() {
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
         let start = point - normal * 0.004;
         let tool = sphere(&mut world, 0.004, start, 0.0);
-        world.set_pose(tool, start + normal * 1e-6, None).expect("a tool");
-        world.step(1e-4).expect("a step");
+        step_to(&mut world, tool, start + normal * 1e-6, 1e-4);
         let force = world.wrench(tool).expect("a tool").0;
         let share: f32 = (0..3).map(|corner| met[corner] * parts[corner][0]).sum();
         let expected = Vec3::from(axes.map(|held| f32::from(u8::from(held)))) * force * share;
@@ -403,18 +403,14 @@ fn what_holds_a_node_takes_its_share() {
 /// Presses a ball into a sheet that is held at its rim, along it, and lets it settle: the force on it, and whatever `see` is shown.
 fn press(drawn: Refinement, solver: Solver, threads: u32, mut see: impl FnMut(&World, BodyId, Vec3)) -> (World, Vec3) {
     let mut world = world(Vec3::ZERO, 0, threads);
-    let id = sheet(&mut world, solver, Storage::Packed, 8, 40.0);
-    for node in rim(8) {
-        world.body_mut(id).expect("a body").pin(node).expect("a node");
-    }
+    let id = held_sheet(&mut world, solver);
     let start = Vec3::new(0.004, 0.0255, -0.013);
     let tool = sphere(&mut world, 0.025, start, 0.0);
     draw(&mut world, id, drawn);
     for step in 1..=150 {
         let part = (step as f32 / 100.0).min(1.0);
         let place = start + Vec3::new(0.01, -0.03, 0.005) * part;
-        world.set_pose(tool, place, None).expect("a tool");
-        world.step(2e-3).expect("a step");
+        step_to(&mut world, tool, place, 2e-3);
         see(&world, id, place);
     }
     let force = world.wrench(tool).expect("a tool").0;
@@ -464,17 +460,13 @@ fn a_surface_that_changes_under_a_tool_is_met_as_it_is_then() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let [kept, anew] = [false, true].map(|anew| {
             let mut world = world(Vec3::ZERO, 0, 1);
-            let id = sheet(&mut world, solver, Storage::Packed, 8, 40.0);
-            for node in rim(8) {
-                world.body_mut(id).expect("a body").pin(node).expect("a node");
-            }
+            let id = held_sheet(&mut world, solver);
             let start = Vec3::new(0.004, 0.0252, -0.013);
             let tool = sphere(&mut world, 0.025, start, 0.3);
             let mut drawn = 0;
             for step in 1..=60 {
                 let place = start + Vec3::new(0.2, -0.2, 0.1) * (step as f32 * 6e-4);
-                world.set_pose(tool, place, None).expect("a tool");
-                world.step(2e-3).expect("a step");
+                step_to(&mut world, tool, place, 2e-3);
                 let body = world.body_mut(id).expect("a body");
                 if step % 4 == 0 && drawn < 120 {
                     // Whole squares, so that what is beside them may have gaps, but no two see the same edge divided twice.
@@ -521,7 +513,7 @@ fn forces_at_a_bound_point_are_those_of_its_nodes() {
     };
     let (bound, nodes) = (run(true), run(false));
     assert_eq!(bound, nodes);
-    assert!(bound[0].distance(square(0.2, 4).0[0]) > 1e-3);
+    assert!(bound[0].distance(square(4).positions[0]) > 1e-3);
 }
 
 #[test]
@@ -556,14 +548,11 @@ fn a_tool_that_holds_a_bound_point_holds_its_nodes() {
         let tool = sphere(&mut world, 0.01, Vec3::Y * 0.02, 0.0);
         let middle = body(&world, id).surface()[0][1];
         let attachment = world.attach_node(id, middle, tool, 0.0).expect("an attachment");
-        let start = square(0.2, 4).0;
-        let plain = square(0.2, 4).1[0];
-        let before = start[plain[0] as usize].midpoint(start[plain[1] as usize]);
+        let before = middle_of_first_edge();
         for step in 1..=400 {
             let part = (step as f32 / 50.0).min(1.0);
             let place = Vec3::new(0.03, 0.02, 0.0) * part + Vec3::Y * 0.02 * (1.0 - part);
-            world.set_pose(tool, place, None).expect("a tool");
-            world.step(0.005).expect("a step");
+            step_to(&mut world, tool, place, 0.005);
         }
         let after = body(&world, id).positions()[middle as usize];
         let way = after - before;
@@ -594,8 +583,7 @@ fn what_a_tool_holds_at_a_bound_point_it_does_not_touch() {
         let mut world = world(Vec3::NEG_Y * 9.81, 0, 1);
         let id = sheet(&mut world, Solver::Verlet, Storage::Packed, 4, 20.0);
         draw(&mut world, id, drawn);
-        let (start, triangles) = square(0.2, 4);
-        let middle = start[triangles[0][0] as usize].midpoint(start[triangles[0][1] as usize]);
+        let middle = middle_of_first_edge();
         // Beside it, where faces are met that are bound to what it holds.
         let tool = sphere(&mut world, 0.012, middle + Vec3::new(0.006, -0.008, 0.002), 0.5);
         if drawn == Refinement::Plainly {

@@ -80,3 +80,14 @@ pub struct Fragment {
     /// Whether the vertices appear counter-clockwise to the viewer; true for a line.
     pub front: bool,
 }
+
+/// For tests: in an orthographic view, 1 m away.
+#[cfg(test)]
+pub(super) fn vertex(x: f64, y: f64) -> PixelVertex {
+    PixelVertex {
+        x,
+        y,
+        depth: 1.0,
+        reciprocal: 1.0,
+    }
+}

@@ -69,14 +69,10 @@ pub fn rasterise_line(window: &Window, vertices: &[PixelVertex; 2], mut sink: im
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::fragment::vertex;
 
     fn pixels(points: [(f64, f64); 2]) -> Vec<(u32, u32)> {
-        let vertices = points.map(|(x, y)| PixelVertex {
-            x,
-            y,
-            depth: 1.0,
-            reciprocal: 1.0,
-        });
+        let vertices = points.map(|(x, y)| vertex(x, y));
         let mut found = Vec::new();
         rasterise_line(&Window::new(8, 8), &vertices, |f| found.push((f.x, f.y)));
         found

@@ -61,15 +61,7 @@ pub fn traverse_line(window: &Window, vertices: &[PixelVertex; 2], mut sink: imp
 mod tests {
     use super::*;
     use crate::random::Random;
-
-    fn vertex(x: f64, y: f64) -> PixelVertex {
-        PixelVertex {
-            x,
-            y,
-            depth: 1.0,
-            reciprocal: 1.0,
-        }
-    }
+    use crate::raster::fragment::vertex;
 
     #[test]
     fn each_point_of_a_line_lies_in_the_pixel_that_has_its_share() {

@@ -145,15 +145,7 @@ fn last_centre(fixed: i64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn vertex(x: f64, y: f64) -> PixelVertex {
-        PixelVertex {
-            x,
-            y,
-            depth: 1.0,
-            reciprocal: 1.0,
-        }
-    }
+    use crate::raster::fragment::vertex;
 
     fn covered(size: u32, vertices: [PixelVertex; 3]) -> Vec<(u32, u32)> {
         let mut pixels = Vec::new();

@@ -15,16 +15,19 @@ const KERNELS: [Kernel; 4] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512, Ke
 /// Springs between nodes, by their lower and their higher node.
 type TestPairs = BTreeMap<[u32; 2], Spring>;
 
-fn join(pairs: &mut TestPairs, a: usize, b: usize, [stiffness, rest_length, damping]: [f32; 3]) {
+fn spring(nodes: [u32; 2], [stiffness, rest_length, damping]: [f32; 3]) -> Spring {
+    Spring {
+        nodes,
+        stiffness,
+        rest_length,
+        damping,
+    }
+}
+
+fn join(pairs: &mut TestPairs, a: usize, b: usize, parameters: [f32; 3]) {
     if a != b {
         let nodes = [a.min(b) as u32, a.max(b) as u32];
-        let spring = Spring {
-            nodes,
-            stiffness,
-            rest_length,
-            damping,
-        };
-        pairs.entry(nodes).or_insert(spring);
+        pairs.entry(nodes).or_insert(spring(nodes, parameters));
     }
 }
 
@@ -306,20 +309,13 @@ fn links(packed: &dyn Springs, count: usize) -> TestPairs {
             ends.entry(pair).or_default().push(link);
         });
     }
-    let spring = |(nodes, ends): ([u32; 2], Vec<Link>)| {
+    let joined = |(nodes, ends): ([u32; 2], Vec<Link>)| {
         assert_eq!(ends.len(), 2, "{nodes:?}");
-        let of = |link: &Link| (link.stiffness, link.rest_length, link.damping);
+        let of = |link: &Link| [link.stiffness, link.rest_length, link.damping];
         assert_eq!(of(&ends[0]), of(&ends[1]));
-        let (stiffness, rest_length, damping) = of(&ends[0]);
-        let spring = Spring {
-            nodes,
-            stiffness,
-            rest_length,
-            damping,
-        };
-        (nodes, spring)
+        (nodes, spring(nodes, of(&ends[0])))
     };
-    ends.into_iter().map(spring).collect()
+    ends.into_iter().map(joined).collect()
 }
 
 #[test]
@@ -335,12 +331,7 @@ fn any_change_of_springs_is_kept() {
             let nodes = [a.min(b), a.max(b)];
             // Springs of a kind that the body has many of, and others.
             let stiffness = if random.below(2) == 0 { 10.0 } else { random.unit() };
-            let spring = Spring {
-                nodes,
-                stiffness,
-                rest_length: 0.1,
-                damping: 0.0,
-            };
+            let spring = spring(nodes, [stiffness, 0.1, 0.0]);
             if a == b {
                 continue;
             }
@@ -381,12 +372,7 @@ fn rest_lengths_that_differ_by_rounding_are_one() {
         .map(|node| {
             // As a caller gets them from positions.
             let rest_length = node as f32 * spacing - (node - 1) as f32 * spacing;
-            Spring {
-                nodes: [node - 1, node],
-                stiffness: 1.0,
-                rest_length,
-                damping: 0.0,
-            }
+            spring([node - 1, node], [1.0, rest_length, 0.0])
         })
         .collect();
     let lengths: std::collections::BTreeSet<u32> = springs.iter().map(|spring| spring.rest_length.to_bits()).collect();
@@ -457,12 +443,9 @@ fn nodes_that_come_later_have_their_springs() {
                     // To one that was there, and to one that came too.
                     for other in [random.below(count), count + random.below(node + 1 - count)] {
                         let nodes = [other as u32, node as u32];
-                        let spring = Spring {
-                            nodes,
-                            stiffness: random.unit(),
-                            rest_length: 0.1,
-                            damping: if packed.damped() { random.unit() } else { 0.0 },
-                        };
+                        let stiffness = random.unit();
+                        let damping = if packed.damped() { random.unit() } else { 0.0 };
+                        let spring = spring(nodes, [stiffness, 0.1, damping]);
                         if other != node && pairs.insert(nodes, spring).is_none() {
                             rewiring.added.push(spring);
                         }
