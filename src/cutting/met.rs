@@ -109,8 +109,9 @@ fn weights_of(end: SegmentEnd, numbers: [u32; 3]) -> [f64; 3] {
     }
 }
 
-fn weighed(weights: [f64; 3], places: [DVec3; 3]) -> DVec3 {
-    (0..3).map(|k| weights[k] * places[k]).sum()
+/// The place between others that has these weights of them.
+pub(crate) fn weighed<const N: usize>(weights: [f64; N], places: [DVec3; N]) -> DVec3 {
+    (0..N).map(|k| weights[k] * places[k]).sum()
 }
 
 /// What part of its way the blade has gone where it passes a place, of the first or the last triangle that it sweeps.

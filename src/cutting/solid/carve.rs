@@ -6,7 +6,7 @@ use super::crossing::Swept;
 use super::cut::SolidCut;
 use super::sever::Plane;
 use crate::base::{Result, memory};
-use crate::cutting::divided::NONE;
+use crate::cutting::divided::Divided;
 
 /// An edge that is crossed.
 struct CrossedEdge {
@@ -80,8 +80,7 @@ impl SolidCut<'_> {
     fn crossed(&self, swept: &Swept, sign: f64, positions: &[Vec3], cells: &[u32]) -> Result<Vec<CrossedEdge>> {
         let mut crossed = Vec::new();
         for &cell in cells {
-            let mut tetrahedron = self.solid.cells[cell].first;
-            while tetrahedron != NONE {
+            for tetrahedron in self.solid.simplices_in(cell) {
                 let it = self.solid.tetrahedra[tetrahedron];
                 let places = it.corners.map(|corner| self.solid.place(corner, positions).as_dvec3());
                 let heights = places.map(|place| swept.height(place));
@@ -106,7 +105,6 @@ impl SolidCut<'_> {
                         )?;
                     }
                 }
-                tetrahedron = it.next;
             }
         }
         crossed.sort_unstable_by_key(|crossed| (crossed.edge, crossed.tetrahedron));

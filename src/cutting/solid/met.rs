@@ -6,8 +6,8 @@ use super::body::{CutSolid, Face};
 use super::reach::Band;
 use crate::base::{Result, memory};
 use crate::cutting::cut::Sweep;
-use crate::cutting::divided::{NONE, SNAP};
-use crate::cutting::met::Met;
+use crate::cutting::divided::{Divided, NONE, SNAP};
+use crate::cutting::met::{Met, weighed};
 
 /// A triangle that is cut by the four sides of a tetrahedron has no more corners.
 const MOST_CORNERS: usize = 7;
@@ -39,10 +39,8 @@ impl CutSolid {
         for (swept, times) in sweep.triangles().into_iter().zip(times) {
             let swept = swept.map(|corner| corner.as_dvec3());
             for &cell in candidates {
-                let mut tetrahedron = self.cells[cell].first;
-                while tetrahedron != NONE {
+                for tetrahedron in self.simplices_in(cell) {
                     self.meet_tetrahedron(tetrahedron, (swept, times, band.as_ref()), positions, met)?;
-                    tetrahedron = self.tetrahedra[tetrahedron].next;
                 }
             }
         }
@@ -195,8 +193,4 @@ impl SweptCorner {
             time: self.time + part * (other.time - self.time),
         }
     }
-}
-
-fn weighed(weights: [f64; 4], places: [DVec3; 4]) -> DVec3 {
-    (0..4).map(|k| weights[k] * places[k]).sum()
 }
