@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 
 use super::body::sinew_body_id;
 use super::guard::{destroy, guard, sinew_world, with_world_mut};
-use super::memory::{self, Versioned, versioned};
+use super::memory::{self, told, versioned};
 use super::status::sinew_status;
 use super::tool::sinew_tool_id;
 use crate::base::ToolId;
@@ -104,24 +104,12 @@ pub struct sinew_haptic_contact {
 
 versioned! { sinew_haptic_def, sinew_haptic_report }
 
-impl sinew_haptic_def {
-    fn defaults() -> Self {
-        let defaults = HapticDefinition::new(ToolId::default());
-        Self {
-            stiffness: defaults.stiffness,
-            angular_stiffness: defaults.angular_stiffness,
-            damping_ratio: defaults.damping_ratio,
-            device_mass: defaults.device_mass,
-            force_limit: defaults.force_limit,
-            torque_limit: defaults.torque_limit,
-            force_rate_limit: defaults.force_rate_limit,
-            torque_rate_limit: defaults.torque_rate_limit,
-            stale_after: defaults.stale_after,
-            ramp: defaults.ramp,
-            ..Self::empty()
-        }
-    }
+told! { HapticDefinition => sinew_haptic_def {
+    tool, stiffness, angular_stiffness, damping_ratio, device_mass, force_limit, torque_limit, force_rate_limit,
+    torque_rate_limit, stale_after, ramp
+} }
 
+impl sinew_haptic_def {
     fn definition(&self) -> HapticDefinition {
         HapticDefinition {
             tool: self.tool.id(),
@@ -172,7 +160,7 @@ impl From<&HapticContact> for sinew_haptic_contact {
 /// Fills a haptic definition with its defaults; `struct_size` is sizeof(sinew_haptic_def).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_haptic_def_init(def: *mut sinew_haptic_def, struct_size: usize) -> sinew_status {
-    guard(|| memory::initialise(def, struct_size, sinew_haptic_def::defaults()))
+    guard(|| memory::initialise(def, struct_size, HapticDefinition::new(ToolId::default()).into()))
 }
 
 /// Creates a haptic handle that drives a tool; destroy it with sinew_haptic_destroy.
@@ -189,7 +177,7 @@ pub unsafe extern "C" fn sinew_haptic_create(
 ) -> sinew_status {
     with_world_mut(world, |world| {
         let out = memory::output("out", out)?;
-        let def = memory::definition("def", def, sinew_haptic_def::defaults())?;
+        let def = memory::definition("def", def, HapticDefinition::new(ToolId::default()).into())?;
         let orientation = world.pose(def.tool.id())?.orientation;
         let handle = world.create_haptic(&def.definition())?;
         *out = Box::into_raw(crate::base::memory::boxed(sinew_haptic { handle, orientation })?);
@@ -224,10 +212,9 @@ pub unsafe extern "C" fn sinew_haptic_tick(
         let haptic = memory::output("haptic", haptic)?;
         let out = memory::report("out", out)?;
         let position = memory::vector("position", position)?;
-        let given = memory::optional_array("orientation", orientation.cast::<[f32; 4]>(), 1)?;
+        let orientation = memory::optional_orientation("orientation", orientation)?.unwrap_or(haptic.orientation);
         let along = memory::optional_array("velocity", velocity.cast::<[f32; 3]>(), 1)?;
         let about = memory::optional_array("angular_velocity", angular_velocity.cast::<[f32; 3]>(), 1)?;
-        let orientation = given.map_or(haptic.orientation, |given| Quat::from_array(given[0]));
         let pose = Pose { position, orientation };
         let [along, about] = [along, about].map(|given| given.map(|given| Vec3::from_array(given[0])));
         let tick = haptic.handle.tick(pose, along, about, dt)?;

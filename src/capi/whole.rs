@@ -92,9 +92,8 @@ pub unsafe extern "C" fn sinew_body_transform(
 ) -> sinew_status {
     with_body_mut(world, body, |body| {
         let translation = memory::optional_array("translation", translation.cast::<Vec3>(), 1)?;
-        let rotation = memory::optional_array("rotation", rotation.cast::<[f32; 4]>(), 1)?;
+        let rotation = memory::optional_orientation("rotation", rotation)?.unwrap_or(Quat::IDENTITY);
         let pivot = memory::optional_array("pivot", pivot.cast::<Vec3>(), 1)?;
-        let rotation = rotation.map_or(Quat::IDENTITY, |rotation| Quat::from_array(rotation[0]));
         let translation = translation.map_or(Vec3::ZERO, |translation| translation[0]);
         body.transform(translation, rotation, pivot.map(|pivot| pivot[0]))
     })
