@@ -225,13 +225,10 @@ impl Body {
         self.check_not_bound(&"a", a)?;
         self.check_not_bound(&"b", b)?;
         not_negative("stiffness", stiffness)?;
-        let rest_length = match rest_length {
-            Some(length) => length,
-            None => {
-                let [a, b] = nodes.map(|node| self.system.state.positions().get(node as usize));
-                distance(a, b)
-            }
-        };
+        let rest_length = rest_length.unwrap_or_else(|| {
+            let [a, b] = nodes.map(|node| self.system.state.positions().get(node as usize));
+            distance(a, b)
+        });
         not_negative("rest_length", rest_length)?;
         if let Some(scaling) = &mut self.system.scaling {
             scaling.reserve(nodes.len())?;
@@ -365,11 +362,8 @@ impl Body {
         self.forget_velocities();
         for (node, link) in [(b.neighbour, a), (a.neighbour, b)] {
             let [here, there] = [node, link.neighbour].map(|node| self.system.state.positions().get(node as usize));
-            make_up_for(
-                &mut self.system,
-                node,
-                pull(node as usize, &link, there - here, None) * sign,
-            );
+            let missing = pull(node as usize, &link, there - here, None) * sign;
+            make_up_for(&mut self.system, node, missing);
         }
     }
 
