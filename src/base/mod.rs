@@ -1,9 +1,10 @@
-//! What every other module stands on: errors, ids, memory that may run out, a hash of state, exact signs, disjoint sets, times of stages.
+//! What every other module stands on: errors, ids, memory that may run out, a hash of state, exact signs, matrices of vectors, disjoint sets, times of stages.
 
 mod disjoint_sets;
 mod error;
 mod hash;
 mod ids;
+mod matrices;
 pub(crate) mod memory;
 mod profile;
 mod ranges;
@@ -16,6 +17,7 @@ pub use error::{Error, Result};
 pub(crate) use hash::StateHasher;
 pub use ids::{AttachmentId, BladeId, BodyId, ToolId};
 pub(crate) use ids::{SlotId, WorldTag};
+pub(crate) use matrices::{cross_matrix, outer, trace};
 pub(crate) use profile::{Count, Profile, Stage, Stopwatch, check_clock};
 pub(crate) use ranges::{above_zero, all_finite, finite, not_negative};
 pub use step_report::{LimitKind, StepLimit, StepReport, SubstepLimit};

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::cuttable::Cuttable;
 use super::{Body, CutReport};
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, memory, outer};
 use crate::cutting::{CutSurface, Divided, VertexLoad};
 use crate::def::{TearReport, Values, Withheld, check_given};
 use crate::springs::{Link, pull};
@@ -283,7 +283,7 @@ impl Body {
 fn along_itself(vector: DVec3) -> DMat3 {
     let length = vector.length();
     if length > 0.0 {
-        DMat3::from_cols(vector * vector.x, vector * vector.y, vector * vector.z) * (1.0 / length)
+        outer(vector, vector) * (1.0 / length)
     } else {
         DMat3::ZERO
     }

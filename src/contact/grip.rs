@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::base::{Result, StateHasher, memory};
+use crate::base::{Result, StateHasher, memory, outer};
 use crate::codec::saved;
 
 /// A node sticks where friction does less than this part of what it may.
@@ -376,13 +376,7 @@ impl NodeFriction {
                 ..Drag::default()
             };
         }
-        let along = |direction: DVec3| {
-            DMat3::from_cols(
-                direction * direction.x,
-                direction * direction.y,
-                direction * direction.z,
-            )
-        };
+        let along = |direction: DVec3| outer(direction, direction);
         let (wanted, sticks) = self.wanted(slip);
         let across = DMat3::IDENTITY - along(self.normal);
         if sticks {

@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 
 use super::contacts::ToolLoad;
 use super::tool::{Form, Pose};
-use crate::base::{Error, Result, StateHasher, above_zero, all_finite, ensure};
+use crate::base::{Error, Result, StateHasher, above_zero, all_finite, ensure, outer, trace};
 use crate::codec::saved;
 use crate::def::finite_vector;
 use crate::geometry::rotation::turned;
@@ -175,17 +175,13 @@ fn enclosed(positions: &[Vec3], triangles: &[[u32; 3]]) -> (f64, DVec3, DMat3) {
         let sum = a + b + c;
         volume += sixfold / 6.0;
         first += sum * (sixfold / 24.0);
-        let outer = |v: DVec3| DMat3::from_cols(v * v.x, v * v.y, v * v.z);
-        second += (outer(a) + outer(b) + outer(c) + outer(sum)) * (sixfold / 120.0);
+        let [of_a, of_b, of_c, of_sum] = [a, b, c, sum].map(|v| outer(v, v));
+        second += (of_a + of_b + of_c + of_sum) * (sixfold / 120.0);
     }
     let center = first / volume;
-    let about = second - DMat3::from_cols(center * center.x, center * center.y, center * center.z) * volume;
+    let about = second - outer(center, center) * volume;
     let inertia = DMat3::from_diagonal(DVec3::splat(trace(&about))) - about;
     (volume, origin + center, inertia)
-}
-
-fn trace(matrix: &DMat3) -> f64 {
-    matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z
 }
 
 /// Whether all eigenvalues of a symmetric matrix are above this (Sylvester).

@@ -1,6 +1,7 @@
 //! The law of a tetrahedron, one at a time and in `f64`: what kernels work out for many, and second derivatives.
 
 use super::rates::LEAST_SHEAR;
+use crate::base::{cross_matrix, outer, trace};
 use crate::codec::saved;
 use crate::def::ElementLaw;
 use glam::{DMat3, DVec3};
@@ -82,7 +83,7 @@ impl Law {
         let (lambda, mu, kappa) = (f64::from(self.lambda), f64::from(self.mu), f64::from(self.kappa));
         let mut energy = 0.0;
         if mu > 0.0 {
-            let trace = stress.x_axis.x + stress.y_axis.y + stress.z_axis.z;
+            let trace = trace(&stress);
             energy += (product(&stress, &stress) - lambda / (3.0 * lambda + 2.0 * mu) * trace * trace) / (4.0 * mu);
         }
         if kappa > 0.0 && !self.rings {
@@ -252,7 +253,7 @@ impl Deformed {
     }
 
     fn trace(&self) -> f64 {
-        self.strain.x_axis.x + self.strain.y_axis.y + self.strain.z_axis.z
+        trace(&self.strain)
     }
 
     /// The stress S, Pa.
@@ -288,7 +289,7 @@ impl Deformed {
         let cofactors = DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b));
         let half = self.gradient.transpose() * more;
         let strain = (half + half.transpose() + more.transpose() * more) * 0.5;
-        let trace = strain.x_axis.x + strain.y_axis.y + strain.z_axis.z;
+        let trace = trace(&strain);
         let growth = product(&self.cofactors, &more) + product(&self.gradient, &cofactors) + more.determinant();
         let both = self.strain * 2.0 + strain;
         let swollen = 0.5 * self.kappa * growth * (2.0 * self.growth + growth);
@@ -346,12 +347,7 @@ impl Deformed {
         if let Some(strained) = self.strained() {
             return self.stiffness_of(&strained, 0.0, [a, b]);
         }
-        let v = self.gradient * a.cross(b);
-        let turned = DMat3::from_cols(
-            DVec3::new(0.0, -v.z, v.y),
-            DVec3::new(v.z, 0.0, -v.x),
-            DVec3::new(-v.y, v.x, 0.0),
-        );
+        let turned = cross_matrix(-(self.gradient * a.cross(b)));
         self.stiffness_under(self.stress(), a, b) + turned * (self.volume * self.pressure)
     }
 
@@ -409,10 +405,6 @@ fn largest_row(matrix: &DMat3, on: impl Fn(f64) -> f64) -> f64 {
         on(z.z) + x.z.abs() + y.z.abs(),
     ];
     rows.into_iter().fold(f64::NEG_INFINITY, f64::max)
-}
-
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
 fn columns(matrix: &DMat3) -> MatrixColumns<f64> {

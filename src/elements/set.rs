@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 
 use super::law::Law;
 use super::tetrahedra::{GROUP, Stresses};
-use crate::base::{Result, memory};
+use crate::base::{Result, memory, trace};
 use crate::codec::saved;
 use crate::def::Yielding;
 use crate::simd::{ChosenKernel, Loops};
@@ -74,7 +74,7 @@ impl PlasticSet {
         shapes(&self.stresses[group].0, &mut left);
         let [xx, xy, xz, yy, yz, zz] = left.map(|entries| f64::from(entries[lane]));
         let left = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
-        let mean = (elastic.x_axis.x + elastic.y_axis.y + elastic.z_axis.z) / 3.0;
+        let mean = trace(&elastic) / 3.0;
         let whole = elastic + left - DMat3::from_diagonal(DVec3::splat(mean));
         let square: f64 = whole.to_cols_array().iter().map(|entry| entry * entry).sum();
         square.sqrt() > f64::from(bounds.yields) * (1.0 + ROUNDING)

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::{Cavity, Enclosed, pressure_of};
+use crate::base::{cross_matrix, outer};
 use crate::def::EnclosedReport;
 
 /// Where each node is, or how far it goes.
@@ -124,11 +125,7 @@ impl Enclosed {
                     let [from, to, beside] = [a, b, c].map(|node| at(node as usize));
                     // The middle of the edge is the same for the triangle at its other side, and falls out.
                     let arm = (beside - (from + to) * 0.5) * (pressure / 6.0);
-                    let block = DMat3::from_cols(
-                        DVec3::new(0.0, arm.z, -arm.y),
-                        DVec3::new(-arm.z, 0.0, arm.x),
-                        DVec3::new(arm.y, -arm.x, 0.0),
-                    );
+                    let block = cross_matrix(arm);
                     see([a, b], block);
                 }
             }
@@ -157,7 +154,7 @@ impl Enclosed {
             if !cavity.is_open {
                 let g = self.surface.gradient(triangles, at);
                 let scaled = g * self.stiffness_of(cavity);
-                see(node, DMat3::from_cols(scaled * g.x, scaled * g.y, scaled * g.z));
+                see(node, outer(scaled, g));
             }
         });
     }

@@ -4,6 +4,7 @@ use glam::{BVec3, DMat3, DVec3, Vec3};
 
 use super::System;
 use super::energy_account::EnergyAccount;
+use crate::base::{outer, trace};
 use crate::soa::Vectors;
 
 /// Takes this much kinetic energy off the newest velocities, J, or all there is that nothing conserves: how much it was. A body that nothing
@@ -93,12 +94,10 @@ impl RigidMotion {
             for node in nodes() {
                 let arm = positions.get(node).as_dvec3() - centre;
                 angular += mass_of(node) * arm.cross(velocities.get(node).as_dvec3());
-                inertia += (DMat3::from_diagonal(DVec3::splat(arm.length_squared()))
-                    - DMat3::from_cols(arm * arm.x, arm * arm.y, arm * arm.z))
-                    * mass_of(node);
+                inertia += (DMat3::from_diagonal(DVec3::splat(arm.length_squared())) - outer(arm, arm)) * mass_of(node);
             }
             // A row of nodes has no inertia about its axis, and does not turn about it.
-            let trace = inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z;
+            let trace = trace(&inertia);
             let inertia = DMat3::from_diagonal(turns) * inertia * DMat3::from_diagonal(turns);
             let rest = DMat3::from_diagonal(DVec3::ONE - turns + 1e-9);
             spin = (inertia + rest * trace).inverse() * (angular * turns);

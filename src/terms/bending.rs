@@ -20,7 +20,7 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::parting::Parting;
 use super::stencils::{SeePart, Stencil, StencilLaw, Stencils};
-use crate::base::{Error, Result, ensure, memory, not_negative};
+use crate::base::{Error, Result, cross_matrix, ensure, memory, not_negative};
 use crate::codec::saved;
 use crate::def::BodyDefinition;
 use crate::soa::NodeOrder;
@@ -225,15 +225,6 @@ impl Bent {
     }
 }
 
-/// The matrix whose product with a vector is the cross product with it.
-fn cross(vector: DVec3) -> DMat3 {
-    DMat3::from_cols(
-        DVec3::new(0.0, vector.z, -vector.y),
-        DVec3::new(-vector.z, 0.0, vector.x),
-        DVec3::new(vector.y, -vector.x, 0.0),
-    )
-}
-
 /// The share of the places in the edge.
 const EDGE: [f64; 4] = [-1.0, 1.0, 0.0, 0.0];
 
@@ -290,7 +281,7 @@ impl StencilLaw<4> for Hinges {
         let bent = shape.bent(places);
         let (cosine, sine) = (f64::from(shape.cosine), f64::from(shape.sine));
         let [first, second] = shape.shares();
-        let (edge, across, turn) = (cross(bent.edge), cross(bent.across), cross(bent.turn));
+        let [edge, across, turn] = [bent.edge, bent.across, bent.turn].map(cross_matrix);
         let difference = [0, 1, 2, 3].map(|node| first[node] - second[node]);
         let rates = [0, 1, 2, 3].map(|node| {
             DMat3::from_diagonal(DVec3::splat(cosine * (first[node] + second[node]))) + across * (sine * EDGE[node])

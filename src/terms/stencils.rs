@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3, Vec3};
 use super::parting::Parting;
 use super::strings::{OfTile, Tension};
 use super::{Event, Term};
-use crate::base::{Result, StateHasher, memory};
+use crate::base::{Result, StateHasher, memory, outer};
 use crate::codec::{Saved, saved};
 use crate::def::{RelaxationStep, Spring};
 use crate::soa::{NodeOrder, Region, Scale, TILE, TileForces, View, tile_count};
@@ -379,9 +379,7 @@ pub(super) fn direction(way: DVec3) -> DVec3 {
 
 /// The matrix that has `along` in a direction, and `across` at right angles to it.
 pub(super) fn directed(direction: DVec3, along: f64, across: f64) -> DMat3 {
-    let scaled = direction * (along - across);
-    DMat3::from_cols(scaled * direction.x, scaled * direction.y, scaled * direction.z)
-        + DMat3::from_diagonal(DVec3::splat(across))
+    outer(direction * (along - across), direction) + DMat3::from_diagonal(DVec3::splat(across))
 }
 
 /// The places from one tile's start to that of the next; none of a tile without a start.

@@ -6,6 +6,7 @@ use glam::{BVec3, DMat3, DVec3};
 
 use super::Implicit;
 use super::step::Substep;
+use crate::base::outer;
 use crate::soa::Vectors;
 use crate::solver::System;
 
@@ -131,7 +132,7 @@ fn moments(nodes: impl Iterator<Item = (f64, DVec3)>) -> DMat3 {
 
 /// The matrix that takes `w` to `a x (w x b)`.
 fn moment(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_diagonal(DVec3::splat(a.dot(b))) - DMat3::from_cols(b * a.x, b * a.y, b * a.z)
+    DMat3::from_diagonal(DVec3::splat(a.dot(b))) - outer(b, a)
 }
 
 /// How a body with these moments turns by this torque or angular momentum, about what axes these that are held leave it.

@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 
 use super::matrix::Matrix;
 use super::network::{Element, Network, PAIRS, Tetrahedron};
-use crate::base::{Result, memory};
+use crate::base::{Result, memory, outer, trace};
 use crate::codec::saved;
 use crate::contact::Holds;
 use crate::elements::Deformed;
@@ -252,7 +252,7 @@ impl Equation {
         for pin in self.pins.partial() {
             let block = &mut matrix.diagonal[pin.node as usize];
             *block = without_held(*block, [pin.axes; 2]);
-            let size = block.x_axis.x + block.y_axis.y + block.z_axis.z;
+            let size = trace(block);
             let size = if size > 0.0 { size } else { 1.0 };
             *block += DMat3::from_diagonal(DVec3::select(pin.axes, DVec3::splat(size), DVec3::ZERO));
         }
@@ -432,12 +432,7 @@ impl Equation {
             across = across.max(0.0);
         }
         let along = stiffness + damping(link) * self.rate - across;
-        let outer = DMat3::from_cols(
-            direction * direction.x,
-            direction * direction.y,
-            direction * direction.z,
-        );
-        outer * along + DMat3::from_diagonal(DVec3::splat(across))
+        outer(direction, direction) * along + DMat3::from_diagonal(DVec3::splat(across))
     }
 
     /// The energy of springs, elements, terms, cavities and loads, J, with the origin of coordinates at `origin`.
