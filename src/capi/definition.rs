@@ -1,9 +1,7 @@
 //! What a body is made of.
 
-use std::mem::offset_of;
-
 use super::guard::guard;
-use super::memory::{self, Versioned};
+use super::memory::{self, versioned};
 use super::status::sinew_status;
 
 /// Layout optimized for the processor; default.
@@ -270,10 +268,7 @@ pub struct sinew_body_def {
     pub damping_rate: f32,
 }
 
-// SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
-unsafe impl Versioned for sinew_body_def {
-    const SIZES: &'static [usize] = &[offset_of!(Self, order), size_of::<Self>()];
-}
+versioned! { sinew_body_def { order } }
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
 #[unsafe(no_mangle)]

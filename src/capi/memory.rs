@@ -19,7 +19,7 @@ use crate::base::{Error, Result, ensure, memory};
 /// bits is a value of it.
 pub(super) unsafe trait Versioned: Copy {
     /// The sizes that earlier headers gave it, and today's last.
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize];
 
     /// What is 0, NULL or none throughout, but for its size.
     fn empty() -> Self {
@@ -31,16 +31,18 @@ pub(super) unsafe trait Versioned: Copy {
     }
 }
 
-/// Makes structs [`Versioned`] that have the size that they had at first.
+/// Makes structs [`Versioned`], each with the fields at which an earlier header ended, if any.
 ///
 /// Who lists a struct vouches that it is `repr(C)` and has numbers and pointers alone. A function among them is what the caller
 /// says it is.
 macro_rules! versioned {
-    ($($name:ident),+) => { $(
+    ($($name:ident $({ $($later:ident),+ })?),+) => { $(
         const _: () = assert!(std::mem::offset_of!($name, struct_size) == 0);
 
         // SAFETY: as vouched for, with `struct_size` first.
-        unsafe impl $crate::capi::memory::Versioned for $name {}
+        unsafe impl $crate::capi::memory::Versioned for $name {
+            const SIZES: &'static [usize] = &[$($(std::mem::offset_of!(Self, $later),)+)? size_of::<Self>()];
+        }
     )+ };
 }
 pub(super) use versioned;

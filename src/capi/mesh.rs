@@ -1,11 +1,9 @@
 //! Meshes: from files, and shapes that need none.
 
-use std::mem::offset_of;
-
 use std::ffi::c_char;
 
 use super::guard::{destroy, guard};
-use super::memory::{self, Versioned};
+use super::memory::{self, versioned};
 use super::status::sinew_status;
 use crate::base::{Error, Result};
 use crate::mesh::{self, LoadedMesh, Mesh, MeshFormat, is_closed};
@@ -80,10 +78,7 @@ pub struct sinew_mesh_view {
     pub cell_count: usize,
 }
 
-// SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
-unsafe impl Versioned for sinew_mesh_view {
-    const SIZES: &'static [usize] = &[offset_of!(Self, cells), size_of::<Self>()];
-}
+versioned! { sinew_mesh_view { cells } }
 
 impl sinew_mesh {
     /// Its surface as a mesh of its own.

@@ -1,11 +1,9 @@
 //! What a body tells of itself: energy, memory, its solver.
 
-use std::mem::offset_of;
-
 use super::body::{sinew_body_id, with_body};
 use super::definition::{SINEW_SOLVER_IMPLICIT, SINEW_SOLVER_NEWTON, SINEW_SOLVER_VERLET};
 use super::guard::{sinew_world, with_world};
-use super::memory::{self, Versioned, told, versioned};
+use super::memory::{self, told, versioned};
 use super::status::sinew_status;
 use crate::def::{EnclosedReport, Energy, Solver, StorageReport};
 
@@ -81,22 +79,13 @@ pub struct sinew_enclosed_report {
     pub pressure: f64,
 }
 
-versioned! { sinew_energy, sinew_storage_report, sinew_enclosed_report }
+versioned! { sinew_energy, sinew_storage_report, sinew_enclosed_report, sinew_solver_report { added_mass, solver } }
 
 told! { EnclosedReport => sinew_enclosed_report { cavity_count, volume, rest_volume, pressure } }
 
 told! { StorageReport => sinew_storage_report { node_count, spring_count, bytes_used, bytes_reserved } }
 
 told! { Energy => sinew_energy { kinetic, elastic, gravitational } }
-
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_solver_report {
-    const SIZES: &'static [usize] = &[
-        offset_of!(Self, added_mass),
-        offset_of!(Self, solver),
-        size_of::<Self>(),
-    ];
-}
 
 /// Writes the energy of a body.
 #[unsafe(no_mangle)]

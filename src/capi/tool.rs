@@ -1,12 +1,10 @@
 //! Tools.
 
-use std::mem::offset_of;
-
 use glam::{Quat, Vec3};
 
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::id::converts;
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, versioned};
 use super::status::sinew_status;
 use crate::base::{Error, Result, ToolId};
 use crate::contact::{Pose, Shape, ToolDefinition};
@@ -96,14 +94,7 @@ pub struct sinew_tool_def {
     pub half_extents: [f32; 3],
 }
 
-// SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
-unsafe impl Versioned for sinew_tool_def {
-    const SIZES: &'static [usize] = &[
-        offset_of!(Self, resolution),
-        offset_of!(Self, half_extents),
-        size_of::<Self>(),
-    ];
-}
+versioned! { sinew_tool_def { resolution, half_extents } }
 
 /// The way of detection of this number.
 pub(super) fn detection(name: &str, number: u32) -> Result<Detection> {

@@ -1,7 +1,5 @@
 //! Worlds.
 
-use std::mem::offset_of;
-
 use glam::Vec3;
 use std::ffi::c_void;
 
@@ -9,7 +7,7 @@ use super::body::sinew_body_id;
 use super::guard::{destroy, guard, with_world, with_world_mut};
 use super::limit::{SINEW_LIMIT_NONE, limit_of};
 use super::log::{self, SINEW_LOG_WARNING};
-use super::memory::{self, Versioned};
+use super::memory::{self, Versioned, versioned};
 use super::status::sinew_status;
 use crate::base::{Error, Result, StepReport};
 use crate::simd::Kernel;
@@ -119,20 +117,7 @@ pub struct sinew_step_report {
     pub crossing_body: sinew_body_id,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers and pointers alone; what is no function is the caller's breach.
-unsafe impl Versioned for sinew_world_def {
-    const SIZES: &'static [usize] = &[offset_of!(Self, run_tasks), size_of::<Self>()];
-}
-
-// SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_step_report {
-    const SIZES: &'static [usize] = &[
-        offset_of!(Self, crossings),
-        offset_of!(Self, limit_body),
-        offset_of!(Self, substeps_body),
-        size_of::<Self>(),
-    ];
-}
+versioned! { sinew_world_def { run_tasks }, sinew_step_report { crossings, limit_body, substeps_body } }
 
 impl sinew_world_def {
     fn defaults() -> Self {
