@@ -8,4 +8,4 @@ mod state;
 pub(crate) use bindings::{Bindings, Bound, NewNode, parts, vector};
 pub(crate) use damping::{Mobility, NodeDamping};
 pub(crate) use pins::{Pin, Pins};
-pub(crate) use state::State;
+pub(crate) use state::{State, current_and_next};

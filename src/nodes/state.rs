@@ -259,7 +259,8 @@ impl State {
     }
 }
 
-fn current_and_next(pair: &mut [Vectors; 2], current: usize) -> [&mut Vectors; 2] {
+/// Of a pair that takes turns the one that is current, and the other.
+pub(crate) fn current_and_next<T>(pair: &mut [T; 2], current: usize) -> [&mut T; 2] {
     let [a, b] = pair;
     if current == 0 { [a, b] } else { [b, a] }
 }

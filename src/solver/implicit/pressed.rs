@@ -9,6 +9,7 @@ use glam::Vec3;
 
 use super::{History, Implicit};
 use crate::codec::saved;
+use crate::nodes::current_and_next;
 use crate::soa::Vectors;
 
 /// The forces on the nodes of a body.
@@ -69,8 +70,7 @@ impl Implicit {
 
     /// Has the next equation know what pressed before it; nothing does where the body goes alone.
     pub(super) fn recall_pressed(&mut self, is_first: bool, is_together: bool) {
-        let [one, other] = &mut self.histories;
-        let (settled, next) = if self.settled == 0 { (one, other) } else { (other, one) };
+        let [settled, next] = current_and_next(&mut self.histories, self.settled);
         let Some(pressed) = &mut next.pressed else {
             return;
         };

@@ -7,6 +7,7 @@ use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit};
 use crate::base::{Stage, Stopwatch};
 use crate::codec::saved;
+use crate::nodes::current_and_next;
 use crate::soa::{Records, Vectors, WriteRecords, copy_axes, tile_count, tile_nodes};
 use crate::solver::System;
 use crate::solver::kick::{Survey, look};
@@ -379,13 +380,8 @@ impl Substep<'_> {
         let (kernel, dt, part) = (body.kernel, self.request.dt, (self.end - self.start) as f32);
         let time = self.formula.time as f32;
         let carried = self.formula.carried as f32;
-        let [settled, other] = &mut implicit.histories;
-        let (settled, next) = if implicit.settled == 0 {
-            (&*settled, other)
-        } else {
-            (&*other, settled)
-        };
-        let from = self.is_first.then_some(settled);
+        let [settled, next] = current_and_next(&mut implicit.histories, implicit.settled);
+        let from = self.is_first.then_some(&*settled);
         next.step = self.step as f32;
         let state = body.state.substep();
         let (starts, positions) = (state.positions, &*state.next_positions);
