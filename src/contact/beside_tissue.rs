@@ -2,7 +2,7 @@
 //!
 //! The contacts of a body with tools have been found and have acted before those of tissue are known. They go on from there.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::contacts::Contacts;
 use super::impulses::Sweep;
@@ -28,7 +28,7 @@ impl Contacts {
     }
 
     /// One sweep over the contacts, on the velocities of the substep: the most that one of them changed, m/s.
-    pub(crate) fn sweep(&mut self, velocities: &mut Vectors, sweep: Sweep) -> f32 {
+    pub(crate) fn sweep(&mut self, velocities: &mut [Vec3A], sweep: Sweep) -> f32 {
         let of_nodes = self.nodes.sweep(velocities, sweep);
         if self.constraints.is_empty() {
             of_nodes
@@ -38,7 +38,7 @@ impl Contacts {
     }
 
     /// Adds what the sweeps gave to the loads of tools, and shows it, N s, with the nodes that received it. `velocities` are those that they led to.
-    pub fn end_sweeps(&mut self, velocities: &Vectors, mut give: impl FnMut(usize, Vec3)) {
+    pub fn end_sweeps(&mut self, velocities: &[Vec3A], mut give: impl FnMut(usize, Vec3)) {
         if !self.constraints.is_empty() {
             self.presses.hand_over(&mut self.constraints);
         }
@@ -47,7 +47,7 @@ impl Contacts {
             let impulse = contact.given() - contact.counted;
             if impulse != Vec3::ZERO {
                 self.loads[contact.tool].add(-impulse.as_dvec3(), contact.arm);
-                given = given.with(velocities.get(contact.node as usize));
+                given = given.with(velocities[contact.node as usize].into());
                 give(contact.node as usize, impulse);
             }
         }
@@ -56,7 +56,7 @@ impl Contacts {
             if impulse != Vec3::ZERO {
                 self.loads[constraint.tool].add(-impulse.as_dvec3(), constraint.arm);
                 for (&node, share) in constraint.nodes().iter().zip(constraint.shares) {
-                    given = given.with(velocities.get(node as usize));
+                    given = given.with(velocities[node as usize].into());
                     give(node as usize, impulse * share);
                 }
             }

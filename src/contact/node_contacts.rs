@@ -380,14 +380,14 @@ impl NodeContacts {
     }
 
     /// One sweep on velocities that something else has changed: the most that a contact changed, m/s.
-    pub fn sweep(&mut self, velocities: &mut Vectors, sweep: Sweep) -> f32 {
+    pub fn sweep(&mut self, velocities: &mut [Vec3A], sweep: Sweep) -> f32 {
         let pressing = self.0.iter_mut();
         let pressing = pressing.filter(|contact| sweep == Sweep::All || contact.impulse > 0.0);
         let changes = pressing.map(|contact| {
             let node = contact.node as usize;
-            let mut velocity = velocities.get(node);
+            let mut velocity = velocities[node].into();
             let change = contact.press(&mut velocity);
-            velocities.set(node, velocity);
+            velocities[node] = velocity.into();
             change
         });
         changes.fold(0.0, f32::max)

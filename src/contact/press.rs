@@ -185,23 +185,27 @@ impl Presses {
                 .map(|constraint| constraint.press(place, &self.yielding)),
         );
 
-        self.read(velocities);
+        self.read(|node| velocities.get(node).into());
         let effort = Effort::of(sweeps);
         let first = relax(effort, None, |sweep| self.sweep_own(sweep));
         if !self.yielding.is_empty() && self.find_backs() {
             relax(effort, Some(first), |sweep| self.sweep_backed(sweep));
         }
-        self.write(velocities);
+        for (&node, &velocity) in self.nodes.iter().zip(&self.velocities) {
+            velocities.set(node as usize, velocity.into());
+        }
         self.hand_over(constraints);
         first
     }
 
     /// One sweep over the contacts that [`Presses::solve`] has gathered, on velocities that something else has changed since: the most that one
     /// of them changed, m/s.
-    pub fn sweep(&mut self, velocities: &mut Vectors, sweep: Sweep) -> f32 {
-        self.read(velocities);
+    pub fn sweep(&mut self, velocities: &mut [Vec3A], sweep: Sweep) -> f32 {
+        self.read(|node| velocities[node]);
         let largest = self.sweep_own(sweep);
-        self.write(velocities);
+        for (&node, &velocity) in self.nodes.iter().zip(&self.velocities) {
+            velocities[node as usize] = velocity;
+        }
         largest
     }
 
@@ -212,19 +216,10 @@ impl Presses {
         }
     }
 
-    fn read(&mut self, velocities: &Vectors) {
+    fn read(&mut self, velocity_of: impl Fn(usize) -> Vec3A) {
         self.velocities.clear();
-        let of_nodes = self
-            .nodes
-            .iter()
-            .map(|&node| Vec3A::from(velocities.get(node as usize)));
-        self.velocities.extend(of_nodes);
-    }
-
-    fn write(&self, velocities: &mut Vectors) {
-        for (&node, &velocity) in self.nodes.iter().zip(&self.velocities) {
-            velocities.set(node as usize, velocity.into());
-        }
+        self.velocities
+            .extend(self.nodes.iter().map(|&node| velocity_of(node as usize)));
     }
 
     /// Finds the nodes that are held between a tool that is led and a dynamic one, and has the contacts of the dynamic one know: whether there

@@ -1,6 +1,6 @@
 //! A skin that follows its body as that is cut: what a change costs does not depend on the rest of it.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::skin::{ELSEWHERE, NONE, NodeWay, Skin, number_of};
 use super::wound::Wound;
@@ -266,20 +266,13 @@ impl Skin {
             return;
         };
         changing.roles.resize(change.node_count, 0);
-        for vectors in [
-            Some(&mut self.velocities),
-            Some(&mut self.expected),
-            Some(&mut self.changes),
-            self.firsts.as_mut(),
-        ]
-        .into_iter()
-        .flatten()
-        {
-            vectors.grow(change.node_count);
+        for values in [&mut self.velocities, &mut self.expected, &mut self.changes] {
+            values.resize(change.node_count, Vec3A::ZERO);
         }
         self.strays.resize(change.node_count, 0.0);
         self.ways.resize(change.node_count, NodeWay::default());
         if let Some(firsts) = &mut self.firsts {
+            firsts.grow(change.node_count);
             let first = change.node_count - change.firsts.len();
             for (number, &place) in (first..).zip(&change.firsts) {
                 firsts.set(number, place);

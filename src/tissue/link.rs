@@ -1,12 +1,11 @@
 //! One contact of tissue with tissue.
 
-use glam::{BVec3, Vec3};
+use glam::{BVec3, Vec3, Vec3A};
 
 use super::skin::Skin;
 use crate::codec::saved;
 use crate::contact::impulses::LEVERAGE;
 use crate::contact::supports::MOST;
-use crate::soa::Vectors;
 use crate::solver::System;
 
 /// A node, edge or face of a body, and a point of it.
@@ -66,7 +65,7 @@ struct Mover {
     /// Its part of the side.
     part: f32,
     /// How much faster it becomes for an impulse on the side, 1/kg.
-    answer: Vec3,
+    answer: Vec3A,
 }
 
 saved! { Mover { node, part, answer } }
@@ -139,7 +138,11 @@ impl Link {
                 let mobility = body.inverse_masses[node as usize] * part;
                 let held: BVec3 = body.pins.partial_axes_of(node);
                 let answer = Vec3::select(held, Vec3::ZERO, Vec3::splat(mobility));
-                *mover = Mover { node, part, answer };
+                *mover = Mover {
+                    node,
+                    part,
+                    answer: answer.into(),
+                };
                 whole += part * (answer * normal).dot(normal);
                 leverage = leverage.max(mobility / LEVERAGE);
                 counts[side] += 1;
@@ -205,13 +208,14 @@ impl Link {
     }
 
     /// Adds what its nodes get for an impulse to their values.
-    fn give(&self, impulse: Vec3, skins: &mut [Option<Skin>], values: impl Fn(&mut Skin) -> &mut Vectors) {
+    #[inline]
+    fn give(&self, impulse: Vec3, skins: &mut [Option<Skin>], values: impl Fn(&mut Skin) -> &mut Vec<Vec3A>) {
+        let impulse = Vec3A::from(impulse);
         for (index, impulse) in [impulse, -impulse].into_iter().enumerate() {
             if let Some(skin) = &mut skins[self.sides[index].body] {
                 let values = values(skin);
                 for mover in self.movers_of(index) {
-                    let node = mover.node as usize;
-                    values.set(node, values.get(node) + impulse * mover.answer);
+                    values[mover.node as usize] += impulse * mover.answer;
                 }
             }
         }
@@ -259,17 +263,21 @@ impl Link {
     }
 
     /// Of the first side against the second, m/s.
+    #[inline]
     fn velocity(&self, skins: &[Option<Skin>]) -> Vec3 {
         self.against(skins, |skin| &skin.velocities)
     }
 
     /// What the first side has more of these values than the second.
-    fn against(&self, skins: &[Option<Skin>], values: impl Fn(&Skin) -> &Vectors) -> Vec3 {
-        let [first, second] = [0, 1].map(|side| match &skins[self.sides[side].body] {
-            Some(skin) => weighted(self.movers(side), |node| values(skin).get(node)),
-            None => Vec3::ZERO,
+    #[inline]
+    fn against(&self, skins: &[Option<Skin>], values: impl Fn(&Skin) -> &[Vec3A]) -> Vec3 {
+        let [first, second] = [0, 1].map(|side| {
+            skins[self.sides[side].body].as_ref().map_or(Vec3A::ZERO, |skin| {
+                let (values, movers) = (values(skin), self.movers_of(side).iter());
+                movers.map(|mover| values[mover.node as usize] * mover.part).sum()
+            })
         });
-        first - second
+        (first - second).into()
     }
 
     /// The nodes that move both sides, with the places of their bodies.

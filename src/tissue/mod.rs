@@ -41,7 +41,7 @@ use self::touches::Touches;
 use self::touching::TouchingPairs;
 use self::warm_start::{Pushes, give_again};
 
-use glam::Vec3;
+use glam::Vec3A;
 
 use crate::base::{Count, Result, Stage, Stopwatch, memory};
 use crate::codec::saved;
@@ -286,7 +286,7 @@ impl Tissue {
                 if let (Some(skin), Some(body)) = (&mut self.skins[side.body], bodies.at_mut(side.body)) {
                     for (node, part) in link.movers(index) {
                         let node = node as usize;
-                        let velocity = skin.velocities.get(node);
+                        let velocity = skin.velocities[node].into();
                         skin.given = skin.given.with(velocity);
                         let impulse = link.given() * (sign * part);
                         body.nudge(node, velocity, impulse, moment);
@@ -343,7 +343,7 @@ impl Tissue {
         each_pressed(members, &mut self.skins, bodies, moment, |skin, body, contacts| {
             let Skin { velocities, given, .. } = skin;
             contacts.end_sweeps(velocities, |node, impulse| {
-                let velocity = velocities.get(node);
+                let velocity = velocities[node].into();
                 *given = given.with(velocity);
                 body.nudge(node, velocity, impulse, moment);
             });
@@ -385,7 +385,7 @@ impl Tissue {
             if !has_begun {
                 // Contacts with tools go on from what they have done in the substep.
                 each_pressed(members, skins, bodies, moment, |skin, body, contacts| {
-                    contacts.begin_sweeps(|node| skin.velocities.set(node, body.mean_velocity(node)));
+                    contacts.begin_sweeps(|node| skin.velocities[node] = body.mean_velocity(node).into());
                 });
             }
             has_begun = true;
@@ -431,7 +431,7 @@ impl Tissue {
         for link in links.iter() {
             for (place, node) in link.all_movers() {
                 if let Some(skin) = &mut skins[place] {
-                    skin.expected.set(node, Vec3::ZERO);
+                    skin.expected[node] = Vec3A::ZERO;
                 }
             }
         }
@@ -446,10 +446,9 @@ impl Tissue {
         }
         for (place, node) in links.iter().flat_map(Link::all_movers) {
             if let (Some(skin), Some(body)) = (&mut skins[place], bodies.at_mut(place)) {
-                let way = skin.expected.get(node);
-                if way != Vec3::ZERO {
-                    body.part_substep(node, way);
-                    skin.expected.set(node, Vec3::ZERO);
+                let way = std::mem::take(&mut skin.expected[node]);
+                if way != Vec3A::ZERO {
+                    body.part_substep(node, way.into());
                 }
             }
         }

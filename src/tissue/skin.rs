@@ -46,11 +46,11 @@ pub(crate) struct Skin {
     /// Where nodes are as a step or substep begins, in the body's coordinates, and how far they go in it, seen from what goes with the drift, m.
     pub(super) ways: Vec<NodeWay>,
     /// How fast they go through it, m/s.
-    pub velocities: Vectors,
+    pub velocities: Vec<Vec3A>,
     /// How fast they are expected to go once contacts have acted, m/s: where they meet is searched for with these velocities.
-    pub expected: Vectors,
+    pub expected: Vec<Vec3A>,
     /// How much faster contacts made them in the last substep of the same step, m/s.
-    pub(super) changes: Vectors,
+    pub(super) changes: Vec<Vec3A>,
     /// The middle of the expected velocities, m/s, and how far any node leaves that, m.
     pub drift: Vec3,
     pub spread: f32,
@@ -218,9 +218,9 @@ impl Skin {
             crossings: 0,
             origin: body.origin,
             ways: memory::filled(NodeWay::default(), body.node_count())?,
-            velocities: body.zeros()?,
-            expected: body.zeros()?,
-            changes: body.zeros()?,
+            velocities: memory::filled(Vec3A::ZERO, body.node_count())?,
+            expected: memory::filled(Vec3A::ZERO, body.node_count())?,
+            changes: memory::filled(Vec3A::ZERO, body.node_count())?,
             drift: Vec3::ZERO,
             spread: 0.0,
             moved: Bounds::EMPTY,
@@ -234,6 +234,9 @@ impl Skin {
         skin.nodes.try_reserve_exact(spare)?;
         skin.strays.try_reserve_exact(spare)?;
         skin.ways.try_reserve_exact(spare)?;
+        for values in [&mut skin.velocities, &mut skin.expected, &mut skin.changes] {
+            values.try_reserve_exact(spare)?;
+        }
         for values in [&mut skin.triangles, &mut skin.sides] {
             values.try_reserve_exact(2 * spare)?;
         }
@@ -356,7 +359,7 @@ impl Skin {
     /// Takes a substep of `duration` seconds, the first one of a step or not, as it is to be.
     pub fn follow(&mut self, body: &mut System, duration: f32, begins: bool) {
         if begins {
-            self.changes.clear();
+            self.changes.fill(Vec3A::ZERO);
         }
         let origin = body.origin;
         self.is_closed &= !body.is_cut_open;
@@ -422,19 +425,19 @@ impl Skin {
             .into_iter()
             .flat_map(|bindings| self.nodes.iter().filter_map(|&node| bindings.get(node)))
         {
-            let velocity = bound.of(|node| self.velocities.get(node));
-            self.velocities.set(bound.node as usize, velocity);
+            let velocity = bound.of(|node| self.velocities[node].into());
+            self.velocities[bound.node as usize] = velocity.into();
         }
         let mut all = Bounds::EMPTY;
+        let drift = Vec3A::from(self.drift);
         for &node in &self.nodes {
             let node = node as usize;
-            let velocity = self.velocities.get(node);
-            self.strays[node] += duration * velocity.distance(self.expected.get(node));
+            let velocity = self.velocities[node];
+            self.strays[node] += duration * velocity.distance(self.expected[node]);
             self.strayed = self.strayed.max(self.strays[node]);
-            self.expected.set(node, velocity);
-            let left = velocity - self.drift;
-            self.ways[node].step = (left * duration).into();
-            all = all.with(left);
+            self.expected[node] = velocity;
+            self.ways[node].step = (velocity - drift) * duration;
+            all = all.with((velocity - drift).into());
         }
         self.spread = self.spread.max(duration * all.magnitudes().length());
     }
@@ -446,8 +449,7 @@ impl Skin {
             let bindings = body.bindings.as_ref().filter(|_| self.changing.is_some());
             if bindings.is_none_or(|bindings| bindings.get(node).is_none()) {
                 let node = node as usize;
-                let change = self.velocities.get(node) - body.mean_velocity(node);
-                self.changes.set(node, change);
+                self.changes[node] = self.velocities[node] - Vec3A::from(body.mean_velocity(node));
             }
         }
     }
@@ -490,32 +492,32 @@ impl Skin {
             let (start, velocity) = motion_of(node as usize);
             moved = moved.with(start - self.start(node));
             self.ways[node as usize].start = start.into();
-            self.velocities.set(node as usize, velocity);
+            self.velocities[node as usize] = velocity.into();
         }
         let changes = &self.changes;
         let bindings = bindings.filter(|_| self.changing.is_some());
         let bound = |node: u32| bindings.and_then(|bindings| bindings.get(node));
         for &node in &self.nodes {
             let ((start, velocity), change) = match bound(node) {
-                None => (motion_of(node as usize), changes.get(node as usize)),
+                None => (motion_of(node as usize), changes[node as usize].into()),
                 Some(bound) => (
                     (bound.of(|node| motion_of(node).0), bound.of(|node| motion_of(node).1)),
-                    bound.of(|node| changes.get(node)),
+                    bound.of(|node| changes[node].into()),
                 ),
             };
             let expected = velocity + change;
             moved = moved.with(start - self.start(node));
             self.ways[node as usize].start = start.into();
-            self.velocities.set(node as usize, velocity);
-            self.expected.set(node as usize, expected);
+            self.velocities[node as usize] = velocity.into();
+            self.expected[node as usize] = expected.into();
             self.strays[node as usize] = 0.0;
             all = all.with(expected);
         }
         self.moved = moved;
         self.drift = 0.5 * (all.min + all.max);
+        let drift = Vec3A::from(self.drift);
         for &node in &self.nodes {
-            let left = self.expected.get(node as usize) - self.drift;
-            self.ways[node as usize].step = (left * duration).into();
+            self.ways[node as usize].step = (self.expected[node as usize] - drift) * duration;
         }
         self.travel = duration * all.magnitudes().length();
         self.spread = 0.5 * duration * (all.max - all.min).length();

@@ -313,7 +313,7 @@ impl Bond {
 impl BondEnd {
     fn velocity(&self, skins: &[Option<Skin>]) -> Vec3 {
         match skins.get(self.body) {
-            Some(Some(skin)) if self.is_on_skin => skin.velocities.get(self.node as usize),
+            Some(Some(skin)) if self.is_on_skin => skin.velocities[self.node as usize].into(),
             _ => self.velocity,
         }
     }
@@ -321,7 +321,7 @@ impl BondEnd {
     fn quicken(&mut self, impulse: Vec3, skins: &mut [Option<Skin>]) {
         let velocity = self.velocity(skins) + impulse * self.answer;
         match skins.get_mut(self.body) {
-            Some(Some(skin)) if self.is_on_skin => skin.velocities.set(self.node as usize, velocity),
+            Some(Some(skin)) if self.is_on_skin => skin.velocities[self.node as usize] = velocity.into(),
             _ => self.velocity = velocity,
         }
     }
