@@ -254,7 +254,7 @@ impl Tissue {
                 skin.follow(body, moment.duration, moment.begins);
             }
         }
-        self.pairs.advance(self.islands.searches(island), &self.skins);
+        self.pairs.advance(self.islands.searches(island), &self.skins, true);
         self.bonds.follow(bodies, &self.skins, moment);
         self.draw(island, bodies, moment);
         watch.stop(moment.profile, Stage::BroadPhase);
@@ -419,6 +419,7 @@ impl Tissue {
                 skin.go_on(body, moment.duration);
             }
         }
+        self.pairs.advance(self.islands.searches(island), &self.skins, false);
     }
 
     /// Moves what began too close apart, without giving it speed, and nothing past what is beside it.

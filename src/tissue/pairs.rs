@@ -127,16 +127,18 @@ impl Pairs {
         (self.is_known, self.room) = (false, 1.0);
     }
 
-    /// Takes into account how far bodies went since they were looked at last, and which have bent.
-    pub fn advance(&mut self, pairs: impl Iterator<Item = [usize; 2]>, skins: &[Option<Skin>]) {
+    /// Takes into account how far bodies went since they were looked at last, and which have bent; within a substep the latter alone.
+    pub fn advance(&mut self, pairs: impl Iterator<Item = [usize; 2]>, skins: &[Option<Skin>], have_moved: bool) {
         if !self.is_known {
             return;
         }
         for (list, [a, b]) in self.lists.iter_mut().zip(pairs) {
             if let (Some(Some(first)), Some(Some(second))) = (skins.get(a), skins.get(b)) {
-                let (a, b) = (&first.moved, &second.moved);
-                let most = (a.max - b.min).abs().max((b.max - a.min).abs()).length();
-                list.moved += most * (1.0 + ROUNDING);
+                if have_moved {
+                    let (a, b) = (&first.moved, &second.moved);
+                    let most = (a.max - b.min).abs().max((b.max - a.min).abs()).length();
+                    list.moved += most * (1.0 + ROUNDING);
+                }
                 if first.has_bent || second.has_bent {
                     let edges = &mut self.runs[list.ends[1] as usize..list.ends[2] as usize];
                     for run in edges {

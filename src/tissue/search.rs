@@ -130,7 +130,7 @@ impl PairSearch<'_> {
                 let near = run.of(features);
                 let ends = &first.skin.edges[edge];
                 let other = |near: &Near| &second.skin.edges[near.feature as usize];
-                if !near.iter().any(|near| self.may_find(self.parties, ends, other(near))) {
+                if !self.have_bent() && !near.iter().any(|near| self.may_find(self.parties, ends, other(near))) {
                     continue;
                 }
                 let from = From::Known(near, [moved, reach]);
@@ -155,7 +155,12 @@ impl PairSearch<'_> {
     pub fn has_foreseen(&self) -> bool {
         let strayed: f32 = self.parties.iter().map(|party| party.skin.strayed).sum();
         let is_open = self.is_of_one() && self.parties[0].skin.wound().is_some_and(Wound::is_open);
-        !is_open && strayed <= self.ahead
+        !is_open && !self.have_bent() && strayed <= self.ahead
+    }
+
+    /// Whether edges that met nothing, as they were flat, may meet now.
+    fn have_bent(&self) -> bool {
+        self.parties.iter().any(|party| party.skin.has_bent)
     }
 
     /// Whether two features of these nodes may meet where the searches before it in the substep have not found that they do: impulses have led them
@@ -422,7 +427,7 @@ impl PairSearch<'_> {
             let from_start = corners.separation(&segment, 0.0);
             let start = from_start.offset.length();
             nearest = nearest.min(start);
-            if !meets || start > far || !self.may_find(self.parties, &edge, &other) {
+            if !meets || start > far || !self.have_bent() && !self.may_find(self.parties, &edge, &other) {
                 return start;
             }
             // At an end of either it is a corner that meets.

@@ -369,18 +369,20 @@ impl Skin {
             let ways = &self.ways;
             wound.turn(&self.triangles, |node| ways[node as usize].start());
         }
-        // Edges that were flat let others in by up to half of this: they are not passed over once that is a quarter of what is kept apart.
-        self.bent += (self.moved.max - self.moved.min).length();
-        let thickness = body.contact.thickness.min(0.5 * WITH_ITSELF * self.short);
-        self.has_bent = self.bent > thickness.max(self.least_thickness());
-        if begins || self.has_bent {
-            self.measure_flatness();
-            self.bent = 0.0;
-        }
+        self.bend(self.moved, &body.contact, begins);
     }
 
-    /// As the substep begins and as it ends: what bends the other way in it may be flat then or now.
-    fn measure_flatness(&mut self) {
+    /// Measures where it is flat once nodes have gone far against each other, of ways in this box, or as a step begins. As the substep begins and as it
+    /// ends: what bends the other way in it may be flat then or now.
+    fn bend(&mut self, ways: Bounds, contact: &BodyContact, begins: bool) {
+        // Edges that were flat let others in by up to half of this: they are not passed over once that is a quarter of what is kept apart.
+        self.bent += (ways.max - ways.min).length();
+        let thickness = contact.thickness.min(0.5 * WITH_ITSELF * self.short);
+        self.has_bent = self.bent > thickness.max(self.least_thickness());
+        if !begins && !self.has_bent {
+            return;
+        }
+        self.bent = 0.0;
         self.flatness.clear();
         for time in [0.0, 1.0] {
             let ways = &self.ways;
@@ -428,18 +430,21 @@ impl Skin {
             let velocity = bound.of(|node| self.velocities[node].into());
             self.velocities[bound.node as usize] = velocity.into();
         }
-        let mut all = Bounds::EMPTY;
+        let (mut all, mut strays) = (Bounds::EMPTY, Bounds::EMPTY);
         let drift = Vec3A::from(self.drift);
         for &node in &self.nodes {
             let node = node as usize;
             let velocity = self.velocities[node];
-            self.strays[node] += duration * velocity.distance(self.expected[node]);
+            let stray = (velocity - self.expected[node]) * duration;
+            self.strays[node] += stray.length();
             self.strayed = self.strayed.max(self.strays[node]);
+            strays = strays.with(stray.into());
             self.expected[node] = velocity;
             self.ways[node].step = (velocity - drift) * duration;
             all = all.with((velocity - drift).into());
         }
         self.spread = self.spread.max(duration * all.magnitudes().length());
+        self.bend(strays, &body.contact, false);
     }
 
     /// Remembers what contacts have changed in a substep, before the body knows of it.
