@@ -23,9 +23,6 @@ const ALIKE: f32 = 0.05;
 /// there. With a quarter what lies on a tip trembles.
 const NEAR_END: f32 = 0.05;
 
-/// A corner lies over a face that it is seen from this squarely, as a cosine.
-const SQUARELY: f32 = 0.7;
-
 /// A corner meets so many faces at most. With the closest alone, a corner in a fold would be pushed out of one face into the next, and tremble; with
 /// three, so would a tip in a hole of its shape, where eight triangles meet.
 const FACES: usize = 8;
@@ -309,20 +306,6 @@ impl PairSearch<'_> {
             }
             distance
         });
-        // Where solids are crushed their surface folds through itself: a face over which it lies tells better.
-        if let Some((_, inner)) = &behind
-            && self.measures != Measure::Reductions
-        {
-            let lies_over = |(is_ahead, _, face, (found, _)): &FeatureMet<usize>| {
-                let corners = self.corners(of_faces, &of_faces.skin.triangles[*face]);
-                let squarely = SQUARELY * found.offset.length();
-                let is_alike = found.offset.dot(inner.offset) >= squarely * inner.offset.length();
-                !is_ahead && is_alike && height(&corners, found) >= squarely
-            };
-            if touched.iter().flatten().any(lies_over) {
-                behind = None;
-            }
-        }
         // What was made within another is led out as far as its thickness asks for; what lies flush on it by rounding touches it.
         let nearest_there = match behind {
             Some(_) if self.measures == Measure::Reductions && nearest.0 > flush => f32::INFINITY,
