@@ -167,18 +167,24 @@ impl Separation {
 }
 
 impl Corners {
-    /// Of what stays where it is.
-    pub fn still(points: impl Iterator<Item = Vec3A>) -> Self {
+    /// Of what begins at these places and goes so far, three at most.
+    #[inline]
+    pub fn of(ways: impl Iterator<Item = (Vec3A, Vec3A)>) -> Self {
         let mut corners = Self {
             points: [Vec3A::ZERO; 3],
             steps: [Vec3A::ZERO; 3],
             count: 0,
         };
-        for point in points.take(3) {
-            corners.points[corners.count] = point;
+        for (point, step) in ways.take(3) {
+            (corners.points[corners.count], corners.steps[corners.count]) = (point, step);
             corners.count += 1;
         }
         corners
+    }
+
+    /// Of what stays where it is.
+    pub fn still(points: impl Iterator<Item = Vec3A>) -> Self {
+        Self::of(points.map(|point| (point, Vec3A::ZERO)))
     }
 
     /// The box about them as the substep begins.

@@ -116,14 +116,14 @@ impl ContactSide {
     }
 
     /// The point's part of what nodes have.
-    pub fn weighted(&self, vector_of: impl Fn(usize) -> Vec3) -> Vec3 {
-        weighted(self.nodes.into_iter().zip(self.weights), vector_of)
+    pub fn weighted(&self, vector_of: impl Fn(u32) -> Vec3) -> Vec3 {
+        let used = self
+            .nodes
+            .into_iter()
+            .zip(self.weights)
+            .filter(|(_, weight)| *weight > 0.0);
+        used.map(|(node, weight)| vector_of(node) * weight).sum()
     }
-}
-
-fn weighted(parts: impl Iterator<Item = (u32, f32)>, vector_of: impl Fn(usize) -> Vec3) -> Vec3 {
-    let used = parts.filter(|(_, weight)| *weight > 0.0);
-    used.map(|(node, weight)| vector_of(node as usize) * weight).sum()
 }
 
 impl Link {

@@ -9,7 +9,7 @@ use super::Tissue;
 use super::link::Link;
 use super::search::shift;
 use super::skin::Skin;
-use crate::contact::sweep::{Corners, Segment};
+use crate::contact::sweep::Segment;
 use crate::solver::Span;
 
 /// Sides that end nearer than this part of what they keep off are looked after. What is inside a closed body is known to be, and led out.
@@ -55,13 +55,8 @@ impl SidesEnd {
             steps: ways.map(|way| way.step),
             radius: 0.0,
         };
-        let ways = second.nodes.map(|node| others.own_way(node));
         let is_edge = second.nodes[1] == second.nodes[2];
-        let corners = Corners {
-            points: ways.map(|way| way.start),
-            steps: ways.map(|way| way.step),
-            count: if is_edge { 2 } else { 3 },
-        };
+        let corners = others.corners(&second.nodes[..if is_edge { 2 } else { 3 }]);
         // As the contact takes them: its points of both, along its normal.
         let [began, ended] = [0.0, 1.0].map(|time| {
             let [from, to] = segment.at(first.weights[1]);

@@ -127,7 +127,7 @@ impl PairSearch<'_> {
                 let near = run.of(features);
                 let ends = &first.skin.edges[edge];
                 let other = |near: &Near| &second.skin.edges[near.feature as usize];
-                if !self.have_bent() && !near.iter().any(|near| self.may_find(self.parties, ends, other(near))) {
+                if !near.iter().any(|near| self.may_find_edges(ends, other(near))) {
                     continue;
                 }
                 let from = From::Known(near, [moved, reach]);
@@ -158,6 +158,11 @@ impl PairSearch<'_> {
     /// Whether edges that met nothing, as they were flat, may meet now.
     fn have_bent(&self) -> bool {
         self.parties.iter().any(|party| party.skin.has_bent)
+    }
+
+    /// The same of two edges as [`Self::may_find`].
+    fn may_find_edges(&self, edge: &[u32], other: &[u32]) -> bool {
+        self.have_bent() || self.may_find(self.parties, edge, other)
     }
 
     /// Whether two features of these nodes may meet where the searches before it in the substep have not found that they do: impulses have led them
@@ -242,7 +247,7 @@ impl PairSearch<'_> {
     ) -> (f32, bool) {
         let shift = shift(of_nodes.skin, of_faces.skin);
         let node = of_nodes.skin.nodes[corner];
-        let NodeWay { start: place, step } = self.way(of_nodes, node, shift, of_faces.skin.drift);
+        let NodeWay { start: place, step } = of_nodes.skin.way(node, (shift, of_faces.skin.drift), self.dt);
         let radius = self.radius_of(kept.as_deref(), SurfaceFeature::Corner(corner));
         let segment = Segment {
             ends: [place; 2],
@@ -265,20 +270,18 @@ impl PairSearch<'_> {
             From::Search => self.reach(),
             From::Known(_, [_, reach]) => reach,
         };
-        let (within, around_it) = self.worth_comparing([place; 2], [step; 2], far);
+        let near_it = self.worth_comparing(&segment, far);
         let anywhere = |_: &Separation| true;
         let least = self.near_corner(from, of_faces.skin, &around, reach, |triangle| {
             let nodes = of_faces.skin.triangles[triangle];
             if self.is_of_one() && (nodes.contains(&node) || of_faces.skin.are_of_wound([node; 2], &nodes)) {
                 return f32::INFINITY;
             }
-            let corners = self.corners(of_faces, &nodes);
-            let apart = self.apart_at_least(&around_it, &corners);
-            if apart > within * within {
-                return apart.sqrt();
-            }
-            let start = corners.separation(&segment, 0.0);
-            let distance = start.offset.length();
+            let corners = of_faces.skin.corners(&nodes);
+            let (start, distance) = match self.separation(&corners, &segment, &near_it) {
+                Ok(found) => found,
+                Err(apart) => return apart,
+            };
             if distance > far {
                 return distance;
             }
@@ -325,7 +328,7 @@ impl PairSearch<'_> {
             nodes: of_faces.skin.triangles[triangle],
             weights: found.weights,
         };
-        let place_of = |side: &ContactSide| side.weighted(|node| of_faces.skin.start(node as u32));
+        let place_of = |side: &ContactSide| side.weighted(|node| of_faces.skin.start(node));
         let alike = if self.is_of_one() { SAME } else { ALIKE };
         for place in 0..FACES {
             let Some((is_ahead, _, triangle, (found, clearance))) = touched[place] else {
@@ -342,7 +345,7 @@ impl PairSearch<'_> {
             }
             let mut offset = Vec3::from(if is_behind { found.offset } else { -found.offset });
             if is_solid && offset == Vec3::ZERO {
-                offset = outwards(&self.corners(of_faces, &side.nodes)).into();
+                offset = outwards(&of_faces.skin.corners(&side.nodes)).into();
             }
             let sides = [ContactSide::of_node(of_nodes.place, node), side];
             self.show(sides, (offset, is_ahead), (clearance, shift), see);
@@ -366,7 +369,7 @@ impl PairSearch<'_> {
         }
         let ridge = first.skin.flatness.of(index);
         let is_measured = self.is_measured(kept.as_deref(), index);
-        let ways = edge.map(|node| self.way(first, node, shift, second.skin.drift));
+        let ways = edge.map(|node| first.skin.way(node, (shift, second.skin.drift), self.dt));
         let segment = Segment {
             ends: ways.map(|way| way.start),
             steps: ways.map(|way| way.step),
@@ -382,7 +385,7 @@ impl PairSearch<'_> {
             ways.into_iter()
                 .flat_map(|way| [way.start(), (way.start + way.step).into()]),
         );
-        let (within, around_it) = self.worth_comparing(segment.ends, segment.steps, far);
+        let near_it = self.worth_comparing(&segment, far);
         let mut least = f32::INFINITY;
         let mut nearest = f32::INFINITY;
         let mut touched: [Option<FeatureMet<[u32; 2]>>; EDGES] = [None; EDGES];
@@ -402,15 +405,13 @@ impl PairSearch<'_> {
             {
                 return f32::INFINITY;
             }
-            let corners = self.corners(second, &other);
-            let apart = self.apart_at_least(&around_it, &corners);
-            if apart > within * within {
-                return apart.sqrt();
-            }
-            let from_start = corners.separation(&segment, 0.0);
-            let start = from_start.offset.length();
+            let corners = second.skin.corners(&other);
+            let (from_start, start) = match self.separation(&corners, &segment, &near_it) {
+                Ok(found) => found,
+                Err(apart) => return apart,
+            };
             nearest = nearest.min(start);
-            if !meets || start > far || !self.have_bent() && !self.may_find(self.parties, &edge, &other) {
+            if !meets || start > far || !self.may_find_edges(&edge, &other) {
                 return start;
             }
             // At an end of either it is a corner that meets.
@@ -475,22 +476,36 @@ impl PairSearch<'_> {
 
     /// How near the box about a part of a surface others are to be compared with it, m, and that box. Of other bodies how far they are is remembered for
     /// the next substeps, so that it is worth knowing; of the same surface most moves too much for that, and only what its way leads near is compared.
-    fn worth_comparing(&self, ends: [Vec3A; 2], steps: [Vec3A; 2], far: f32) -> (f32, Extent) {
+    fn worth_comparing(&self, segment: &Segment, far: f32) -> (f32, Extent) {
+        let Segment { ends, steps, .. } = segment;
         if self.is_of_one() {
             let way = [ends[0], ends[1], ends[0] + steps[0], ends[1] + steps[1]];
             (self.radius + self.ahead, Extent::of(way.into_iter()))
         } else {
-            (far, Extent::of(ends.into_iter()))
+            (far, Extent::of(ends.iter().copied()))
         }
     }
 
-    /// The square of how far a feature is from such a box, m, at least.
-    fn apart_at_least(&self, around: &Extent, corners: &Corners) -> f32 {
-        around.distance_squared(&if self.is_of_one() {
+    /// Where a feature and a segment are closest as the substep begins, and how far apart, m; `Err`: how far at least, where their boxes are further apart
+    /// than is worth comparing.
+    #[inline]
+    fn separation(
+        &self,
+        corners: &Corners,
+        segment: &Segment,
+        (within, around): &(f32, Extent),
+    ) -> Result<(Separation, f32), f32> {
+        let others = if self.is_of_one() {
             corners.way()
         } else {
             corners.bounds()
-        })
+        };
+        let apart = around.distance_squared(&others);
+        if apart > within * within {
+            return Err(apart.sqrt());
+        }
+        let start = corners.separation(segment, 0.0);
+        Ok((start, start.offset.length()))
     }
 
     /// Whether it counts how near others are to an edge that it does not meet.
@@ -513,9 +528,9 @@ impl PairSearch<'_> {
         counts: impl Fn(&Separation) -> bool,
     ) -> Option<((Separation, Clearance), bool)> {
         let (found, is_ahead) = corners.meet(start, segment, self.ahead)?;
-        let whole = Clearance::of(segment.radius);
+        let (whole, is_counted) = (Clearance::of(segment.radius), counts(&found));
         // What a cut has parted may keep less apart, and so count.
-        if !skin.may_be_parted() && !counts(&found) {
+        if !is_counted && !skin.may_be_parted() {
             return None;
         }
         let clearance = if self.is_of_one() {
@@ -525,7 +540,7 @@ impl PairSearch<'_> {
         };
         // Without a thickness what a cut has parted keeps as far apart as all else does.
         if clearance == whole {
-            return counts(&found).then_some(((found, clearance), is_ahead));
+            return is_counted.then_some(((found, clearance), is_ahead));
         }
         // What was one place has no side yet.
         let radius = clearance.radius;
@@ -565,28 +580,9 @@ impl PairSearch<'_> {
             } else {
                 self.parties[1]
             };
-            sides[index].weighted(|node| party.skin.start(node as u32))
+            sides[index].weighted(|node| party.skin.start(node))
         });
         first + shift - second
-    }
-
-    /// Where a node begins and how far it goes, as seen from the other body, which goes with `drift`.
-    pub(super) fn way(&self, party: Party, node: u32, shift: Vec3, drift: Vec3) -> NodeWay {
-        party.skin.way(node, (shift, drift), self.dt)
-    }
-
-    /// The corners of an edge or a face in its own body's coordinates, and how far they leave its drift.
-    pub(super) fn corners(&self, party: Party, nodes: &[u32]) -> Corners {
-        let mut corners = Corners {
-            points: [Vec3A::ZERO; 3],
-            steps: [Vec3A::ZERO; 3],
-            count: nodes.len(),
-        };
-        for (corner, &node) in nodes.iter().enumerate() {
-            let NodeWay { start, step } = party.skin.own_way(node);
-            (corners.points[corner], corners.steps[corner]) = (start, step);
-        }
-        corners
     }
 }
 

@@ -407,6 +407,13 @@ impl Skin {
         self.ways[node as usize]
     }
 
+    /// The corners of an edge or a face so.
+    #[inline]
+    pub fn corners(&self, nodes: &[u32]) -> Corners {
+        let ways = nodes.iter().map(|&node| self.own_way(node));
+        Corners::of(ways.map(|way| (way.start, way.step)))
+    }
+
     /// Where a node begins, in the body's coordinates.
     #[inline]
     pub fn start(&self, node: u32) -> Vec3 {

@@ -157,7 +157,7 @@ impl PairSearch<'_> {
                 if !wound.is_bared(triangle) || nodes.contains(&node) {
                     return further(reach);
                 }
-                let places = self.corners(party, &nodes).at(1.0).map(Vec3::from);
+                let places = skin.corners(&nodes).at(1.0).map(Vec3::from);
                 let across = normal(places);
                 let height = across.dot(end - places[0]);
                 let is_far = height * height > reach * reach * across.length_squared();
@@ -226,7 +226,7 @@ impl PairSearch<'_> {
                     if !(is_other && wound.has(other.into_iter())) {
                         continue;
                     }
-                    let mut corners = self.corners(party, &other);
+                    let mut corners = skin.corners(&other);
                     corners.points = corners.at(1.0);
                     corners.steps = [Vec3A::ZERO; 3];
                     // Most of what is near a long edge's box is not near the edge: what is easily told is told first.
