@@ -6,6 +6,7 @@ use glam::DVec3;
 const ROUNDING: f64 = 1e-15;
 
 /// `a . (b x c)`, of which the sign is exact; of coordinates rounded to `f32` differences are exact too.
+#[inline]
 pub(crate) fn triple(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let rounded = a.dot(b.cross(c));
     let (x, y, z) = (b.abs(), c.abs(), a.abs());
@@ -13,6 +14,11 @@ pub(crate) fn triple(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     if rounded.abs() > ROUNDING * size {
         return rounded;
     }
+    exact_triple(a, b, c)
+}
+
+#[cold]
+fn exact_triple(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let mut terms = [0.0; 24];
     let products = [
         (a.x, b.y, c.z),

@@ -100,6 +100,9 @@ const BESIDE: f32 = 1e-3;
 /// The least that a normal looks across a face which it leads out, as a cosine.
 const ACROSS: f32 = 0.2;
 
+/// A normal that looks across a face so much tells its side alone.
+const SURELY_ACROSS: f32 = 0.9;
+
 /// What rounding may take from a distance to the box, as a part of the largest coordinate.
 const ROUNDING: f32 = 1e-6;
 
@@ -268,12 +271,19 @@ impl MeshSolid {
                 .cross(corners[2] - corners[0])
                 .normalize_or_zero();
             // What looks across the face the most tells its side; where nothing does, that is not where it came in.
+            let look = closest.normal.dot(across);
+            if look.abs() > SURELY_ACROSS {
+                return Closest {
+                    normal: across * look.signum(),
+                    ..closest
+                };
+            }
             let u = (corners[1] - corners[0]).normalize_or_zero();
             let v = across.cross(u);
             let ways = [u, u + v, v, v - u, -u, -u - v, -v, u - v];
             let looks = ways.map(|way| normal_beside(way.normalize_or_zero()).dot(across));
             let further = |most: f32, look: f32| if look.abs() > most.abs() { look } else { most };
-            let most = looks.into_iter().fold(closest.normal.dot(across), further);
+            let most = looks.into_iter().fold(look, further);
             if most.abs() < ACROSS {
                 // All sides of a thin wall look along a face that is flat on its end.
                 return match *corners {

@@ -64,7 +64,8 @@ impl Press {
         let impulse = (self.impulse * (1.0 - self.give) + missing * self.effective_mass).max(0.0);
         let change = impulse - self.impulse;
         self.impulse = impulse;
-        if change == 0.0 && self.friction == 0.0 {
+        let is_idle = impulse == 0.0 && self.friction_impulse == Vec3A::ZERO;
+        if change == 0.0 && (self.friction == 0.0 || is_idle) {
             return 0.0;
         }
         let mut given = self.normal * change;

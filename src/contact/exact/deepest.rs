@@ -35,14 +35,13 @@ pub(super) fn deepest(
     mut measure: impl FnMut(Vec3) -> Option<Signed>,
 ) -> Option<Deepest> {
     let count = corners.len();
-    let mut cuts = [[0.0; 3]; CUTS];
+    let mut cuts = Cuts::none(count);
     let mut best: Option<Deepest> = None;
     // The deepest between the ends, for where the planes prove wrong.
     let mut inner: Option<Deepest> = None;
     let mut is_convex = true;
-    let mut bound = f64::NEG_INFINITY;
     let mut weights = start;
-    for looks in 0..CUTS {
+    while cuts.count < CUTS {
         let point: DVec3 = corners
             .iter()
             .zip(weights)
@@ -57,17 +56,16 @@ pub(super) fn deepest(
         if signed.distance < inner.map_or(0.0, |inner| inner.signed.distance) && lies_between(&weights[..count]) {
             inner = Some(Deepest { weights, signed });
         }
-        is_convex &= signed.distance >= bound - CLOSE * bound.abs();
-        for (cut, corner) in cuts[looks].iter_mut().zip(corners) {
-            *cut = signed.distance + signed.normal.dot(corner.as_dvec3() - point);
-        }
-        let (next, least) = lowest(&cuts[..=looks], count);
-        bound = least;
+        is_convex &= signed.distance >= cuts.bound - CLOSE * cuts.bound.abs();
+        let heights = corners
+            .iter()
+            .map(|corner| signed.distance + signed.normal.dot(corner.as_dvec3() - point));
+        cuts.add(heights);
         let found = best.map_or(0.0, |best| best.signed.distance);
-        if bound >= found - CLOSE * found.abs() {
+        if cuts.bound >= found - CLOSE * found.abs() {
             break;
         }
-        weights = next;
+        weights = cuts.lowest;
     }
     let at_border = best.is_some_and(|best| !lies_between(&best.weights[..count]));
     if at_border && !is_convex { inner.or(best) } else { best }
@@ -78,50 +76,76 @@ pub(super) fn lies_between(weights: &[f64]) -> bool {
     weights.iter().all(|&weight| weight > BORDER)
 }
 
-/// Where the highest of some planes, given by their heights at the corners, is lowest, and how high it is there: a corner, or where
-/// two meet over an edge, or three.
-fn lowest(planes: &[[f64; 3]], count: usize) -> ([f64; 3], f64) {
-    let height = |weights: [f64; 3]| {
-        let over = |plane: &[f64; 3]| plane[0] * weights[0] + plane[1] * weights[1] + plane[2] * weights[2];
-        planes.iter().map(over).fold(f64::NEG_INFINITY, f64::max)
-    };
-    let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
-    let mut look = |weights: [f64; 3]| {
-        if weights.iter().all(|&weight| weight >= 0.0) {
-            let here = height(weights);
-            if here < best.1 {
-                best = (weights, here);
-            }
+/// Planes above which the distance from a convex solid lies, and where the highest of them is lowest.
+struct Cuts {
+    /// Their heights at the feature's corners.
+    planes: [[f64; 3]; CUTS],
+    count: usize,
+    corners: usize,
+    lowest: [f64; 3],
+    bound: f64,
+}
+
+impl Cuts {
+    fn none(corners: usize) -> Self {
+        Self {
+            planes: [[0.0; 3]; CUTS],
+            count: 0,
+            corners,
+            lowest: [0.0; 3],
+            bound: f64::NEG_INFINITY,
         }
-    };
-    for corner in 0..count {
-        let mut weights = [0.0; 3];
-        weights[corner] = 1.0;
-        look(weights);
     }
-    for (index, a) in planes.iter().enumerate() {
-        for (other, b) in planes[..index].iter().enumerate() {
-            let apart: [f64; 3] = std::array::from_fn(|corner| a[corner] - b[corner]);
+
+    /// Adds one with these heights. Where it is above what was lowest, that is on it now: at a corner, or where it meets another over an edge, or
+    /// two others.
+    fn add(&mut self, heights: impl Iterator<Item = f64>) {
+        let (others, free) = self.planes.split_at_mut(self.count);
+        let plane = &mut free[0];
+        plane.iter_mut().zip(heights).for_each(|(to, height)| *to = height);
+        let (plane, corners) = (*plane, self.corners);
+        let over = |plane: &[f64; 3], at: [f64; 3]| plane[0] * at[0] + plane[1] * at[1] + plane[2] * at[2];
+        self.count += 1;
+        if over(&plane, self.lowest) <= self.bound {
+            return;
+        }
+        let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
+        let mut look = |weights: [f64; 3]| {
+            if weights.iter().all(|&weight| weight >= 0.0) {
+                let heights = others.iter().map(|plane| over(plane, weights));
+                let here = heights.fold(over(&plane, weights), f64::max);
+                if here < best.1 {
+                    best = (weights, here);
+                }
+            }
+        };
+        for corner in 0..corners {
+            let mut weights = [0.0; 3];
+            weights[corner] = 1.0;
+            look(weights);
+        }
+        let apart = |other: &[f64; 3]| DVec3::from_array(plane) - DVec3::from_array(*other);
+        for (index, other) in others.iter().enumerate() {
+            let first = apart(other);
             for [i, j] in [[0, 1], [1, 2], [2, 0]] {
-                if i.max(j) < count && apart[i] * apart[j] < 0.0 {
+                if i.max(j) < corners && first[i] * first[j] < 0.0 {
                     let mut weights = [0.0; 3];
-                    weights[i] = apart[j] / (apart[j] - apart[i]);
+                    weights[i] = first[j] / (first[j] - first[i]);
                     weights[j] = 1.0 - weights[i];
                     look(weights);
                 }
             }
-            if count < 3 {
+            if corners < 3 {
                 continue;
             }
-            for c in &planes[..other] {
-                let other = DVec3::from_array(std::array::from_fn(|corner| a[corner] - c[corner]));
-                let weights = DVec3::from_array(apart).cross(other);
+            for second in &others[..index] {
+                let weights = first.cross(apart(second));
                 let sum = weights.element_sum();
                 if sum != 0.0 {
                     look((weights / sum).to_array());
                 }
             }
         }
+        (self.lowest, self.bound) = best;
     }
-    best
 }

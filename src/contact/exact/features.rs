@@ -4,12 +4,12 @@ use glam::{DVec3, Vec3};
 
 use super::coarse::Between;
 use super::deepest::{Deepest, deepest, lies_between};
+use super::separating_planes::SeparatingPlanes;
 use super::{ExactSolid, ROUNDING, TOUCHING};
 use crate::contact::closest::Closest;
 use crate::geometry::Bounds;
 use crate::geometry::nearest::{Spot, nearest_of_segments, nearest_on_triangle, weighted};
 use crate::geometry::predicates::pierce;
-use crate::geometry::tree::PlacedTriangle;
 
 /// Where a way that begins on the surface is on it no more.
 const BEGUN: f64 = 1e-6;
@@ -84,12 +84,15 @@ impl ExactSolid {
         let mut count = 0;
         let bounds = Bounds::of(corners.into_iter());
         let mut distance = within;
+        let planes = SeparatingPlanes::edge(corners);
         self.tree.near(&bounds, pairs.limit as f32, |place| {
-            if self.tree.placed(place).is_beside(&corners, distance) {
+            let placed = self.tree.placed(place);
+            if placed.is_beside(&corners, distance) || planes.is_beyond(&placed.corners, distance) {
                 return pairs.limit as f32;
             }
-            if let Some(crossing) = self.crossing(ends, place)
-                && count < CROSSINGS
+            if count < CROSSINGS
+                && !placed.is_beside(&corners, 0.0)
+                && let Some(crossing) = self.crossing(ends, place)
             {
                 crossings[count] = crossing;
                 count += 1;
@@ -143,12 +146,13 @@ impl ExactSolid {
         let mut crossed = [None; STARTS];
         let mut count = 0;
         let bounds = Bounds::of(corners.into_iter());
-        let plane = PlacedTriangle::new(corners);
+        let planes = SeparatingPlanes::face(corners);
         self.tree.near(&bounds, pairs.limit as f32, |place| {
-            if plane.is_beside(&self.tree.placed(place).corners, within) {
+            let placed = self.tree.placed(place);
+            if planes.is_beyond(&placed.corners, within) {
                 return pairs.limit as f32;
             }
-            if count < STARTS {
+            if count < STARTS && !placed.is_beside(&corners, 0.0) && !planes.is_beyond(&placed.corners, 0.0) {
                 crossed[count] = self.crossed(face, place);
                 count += usize::from(crossed[count].is_some());
             }

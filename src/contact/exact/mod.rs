@@ -9,6 +9,7 @@ mod facets;
 mod features;
 pub(crate) mod overlap;
 pub(super) mod pierced;
+mod separating_planes;
 #[cfg(test)]
 pub(super) mod tests;
 
