@@ -683,6 +683,7 @@ public:
     auto out = sized<sinew_step_report>();
     return check(sinew_world_step_within(get(), dt, seconds, &out)), out;
   }
+  void drop_lag() { check(sinew_world_drop_lag(get())); }
   void set_substeps(std::uint32_t substeps, std::uint32_t most) { check(sinew_world_set_substeps(get(), substeps, most)); }
   std::array<std::uint32_t, 2> substeps() const {
     std::array<std::uint32_t, 2> out{};

@@ -1064,6 +1064,9 @@ public static unsafe class Sinew
     public static extern int sinew_world_step_within(IntPtr world, float dt, double seconds, sinew_step_report* report);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_drop_lag(IntPtr world);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_tool_get_force_error(IntPtr world, sinew_tool_id tool, float* @out);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]

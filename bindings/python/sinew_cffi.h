@@ -780,6 +780,7 @@ sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t
     sinew_step_report *report);
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
     sinew_step_report *report);
+sinew_status sinew_world_drop_lag(sinew_world *world);
 sinew_status sinew_tool_get_force_error(const sinew_world *world, sinew_tool_id tool, float *out);
 uint32_t sinew_body_is_valid(const sinew_world *world, sinew_body_id body);
 uint32_t sinew_tool_is_valid(const sinew_world *world, sinew_tool_id tool);

@@ -283,14 +283,12 @@ sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or its mass is 0.
 sinew_status sinew_body_unpin(sinew_world *world, sinew_body_id body, uint32_t node);
 
-/// Moves a pinned node along a line to a position [m], 3 floats, during the next step.
-/// Free axes do not follow.
+/// Moves the pinned axes of a node along a line to a position [m], 3 floats, in the next step.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_move_pin(sinew_world *world, sinew_body_id body, uint32_t node,
     const float *position);
 
-/// Writes the reaction force [N] on a pinned node, 3 floats, averaged over the last step.
-/// It is 0 along free axes.
+/// Writes the reaction force [N] on a pinned node, 3 floats: mean of the last step, 0 on free axes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_get_pin_force(const sinew_world *world, sinew_body_id body, uint32_t node,
     float *force);

@@ -83,9 +83,8 @@ sinew_status sinew_world_debug_draw(const sinew_world *world, const sinew_debug_
 // ---- Recording ----------------------------------------------------------------------------------
 
 /// Records all steps from the next one on into a file, for sinew_replay.
-/// It holds the snapshot at the first step, the changes before each step and a state hash after
-/// each. A file that exists is replaced. `path` is UTF-8. A recorded step may allocate; a full disk
-/// ends the recording, not the step.
+/// It holds the snapshot at the first step, the changes before each and a state hash after each. A
+/// file that exists is replaced. `path` is UTF-8. Recorded steps may allocate; a full disk ends it.
 /// Errors: SINEW_STATUS_IO.
 sinew_status sinew_world_start_recording(sinew_world *world, const char *path);
 

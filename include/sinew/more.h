@@ -196,6 +196,9 @@ sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
     sinew_step_report *report);
 
+/// Gives up the lag: the time that steps with a budget have not reached is not simulated.
+sinew_status sinew_world_drop_lag(sinew_world *world);
+
 /// Writes how far the force on a tool is at most from what the equations of the last step ask for.
 /// `out` [N]; 0 if only VERLET bodies press it. Mesh and time step have errors of their own.
 sinew_status sinew_tool_get_force_error(const sinew_world *world, sinew_tool_id tool, float *out);

@@ -640,14 +640,12 @@ sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or its mass is 0.
 sinew_status sinew_body_unpin(sinew_world *world, sinew_body_id body, uint32_t node);
 
-/// Moves a pinned node along a line to a position [m], 3 floats, during the next step.
-/// Free axes do not follow.
+/// Moves the pinned axes of a node along a line to a position [m], 3 floats, in the next step.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_move_pin(sinew_world *world, sinew_body_id body, uint32_t node,
     const float *position);
 
-/// Writes the reaction force [N] on a pinned node, 3 floats, averaged over the last step.
-/// It is 0 along free axes.
+/// Writes the reaction force [N] on a pinned node, 3 floats: mean of the last step, 0 on free axes.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_get_pin_force(const sinew_world *world, sinew_body_id body, uint32_t node,
     float *force);
@@ -1726,6 +1724,9 @@ sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t
 sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
     sinew_step_report *report);
 
+/// Gives up the lag: the time that steps with a budget have not reached is not simulated.
+sinew_status sinew_world_drop_lag(sinew_world *world);
+
 /// Writes how far the force on a tool is at most from what the equations of the last step ask for.
 /// `out` [N]; 0 if only VERLET bodies press it. Mesh and time step have errors of their own.
 sinew_status sinew_tool_get_force_error(const sinew_world *world, sinew_tool_id tool, float *out);
@@ -1998,9 +1999,8 @@ sinew_status sinew_world_debug_draw(const sinew_world *world, const sinew_debug_
 // ---- Recording ----------------------------------------------------------------------------------
 
 /// Records all steps from the next one on into a file, for sinew_replay.
-/// It holds the snapshot at the first step, the changes before each step and a state hash after
-/// each. A file that exists is replaced. `path` is UTF-8. A recorded step may allocate; a full disk
-/// ends the recording, not the step.
+/// It holds the snapshot at the first step, the changes before each and a state hash after each. A
+/// file that exists is replaced. `path` is UTF-8. Recorded steps may allocate; a full disk ends it.
 /// Errors: SINEW_STATUS_IO.
 sinew_status sinew_world_start_recording(sinew_world *world, const char *path);
 

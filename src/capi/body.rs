@@ -268,9 +268,7 @@ pub unsafe extern "C" fn sinew_body_unpin(world: *mut sinew_world, body: sinew_b
     with_body_mut(world, body, |body| body.unpin(node))
 }
 
-/// Moves a pinned node along a line to a position [m], 3 floats, during the next step.
-///
-/// Free axes do not follow.
+/// Moves the pinned axes of a node along a line to a position [m], 3 floats, in the next step.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 #[unsafe(no_mangle)]
@@ -285,9 +283,7 @@ pub unsafe extern "C" fn sinew_body_move_pin(
     })
 }
 
-/// Writes the reaction force [N] on a pinned node, 3 floats, averaged over the last step.
-///
-/// It is 0 along free axes.
+/// Writes the reaction force [N] on a pinned node, 3 floats: mean of the last step, 0 on free axes.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 #[unsafe(no_mangle)]

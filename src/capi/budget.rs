@@ -1,6 +1,6 @@
 //! Steps of bounded work and time.
 
-use super::guard::{sinew_world, with_world};
+use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
 use super::tool::sinew_tool_id;
@@ -48,6 +48,15 @@ pub unsafe extern "C" fn sinew_world_step_within(
     report: *mut sinew_step_report,
 ) -> sinew_status {
     step_and_report(world, report, |world| world.step_within(dt, seconds))
+}
+
+/// Gives up the lag: the time that steps with a budget have not reached is not simulated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_drop_lag(world: *mut sinew_world) -> sinew_status {
+    with_world_mut(world, |world| {
+        world.drop_lag();
+        Ok(())
+    })
 }
 
 /// Writes how far the force on a tool is at most from what the equations of the last step ask for.

@@ -45,8 +45,8 @@ impl From<ReplayReport> for sinew_replay_report {
 
 /// Records all steps from the next one on into a file, for sinew_replay.
 ///
-/// It holds the snapshot at the first step, the changes before each step and a state hash after each. A file that
-/// exists is replaced. `path` is UTF-8. A recorded step may allocate; a full disk ends the recording, not the step.
+/// It holds the snapshot at the first step, the changes before each and a state hash after each. A file that
+/// exists is replaced. `path` is UTF-8. Recorded steps may allocate; a full disk ends it.
 ///
 /// Errors: SINEW_STATUS_IO.
 #[unsafe(no_mangle)]

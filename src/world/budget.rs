@@ -152,6 +152,11 @@ impl World {
         self.lag
     }
 
+    /// Gives up what steps with a budget have left: that time is not simulated, and the next step covers its own alone.
+    pub fn drop_lag(&mut self) {
+        self.lag = 0.0;
+    }
+
     /// Steps by `dt` seconds with so much work.
     pub(super) fn step_of(&mut self, dt: f32, work: u32) -> Result<StepReport> {
         self.allow(work);

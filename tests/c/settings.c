@@ -113,6 +113,7 @@ static void work_is_bounded(void)
     REFUSED(INVALID_ARGUMENT, "dt", sinew_world_step_within(world, NAN, 1, NULL));
     REFUSED(INVALID_ARGUMENT, "world", sinew_world_step_with_budget(NULL, 0.1f, 1, NULL));
     REFUSED(INVALID_ARGUMENT, "world", sinew_world_step_within(NULL, 0.1f, 1, NULL));
+    REFUSED(INVALID_ARGUMENT, "world", sinew_world_drop_lag(NULL));
     MUST(sinew_world_set_substeps(world, 9, 9));
     REFUSED(UNSUPPORTED, "fixed substeps", sinew_world_step_with_budget(world, 0.1f, 1, NULL));
     MUST(sinew_world_set_substeps(world, 0, 1000));

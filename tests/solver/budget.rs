@@ -74,6 +74,25 @@ fn explicit_work_is_bounded_and_time_is_carried_on() {
     assert_eq!(scene.world.lag(), 0.0);
 }
 
+/// A lag that is given up is never made up for, and nothing else is changed by that.
+#[test]
+fn a_lag_is_given_up() {
+    let mut scene = scene(Solver::Verlet, 1);
+    while scene.world.lag() < 5.0 * f64::from(DT) {
+        scene.world.step_with_budget(DT, 7).expect("a step");
+    }
+    let mut plain = World::load(&scene.world.save().expect("a snapshot"), 1, None).expect("a world");
+    scene.world.drop_lag();
+    let time = scene.world.time();
+    scene.world.step_with_budget(DT, 1_000_000).expect("a step");
+    plain.step(DT).expect("a step");
+    assert_eq!(scene.world.lag(), 0.0);
+    assert!((scene.world.time() - time - f64::from(DT)).abs() < 1e-12);
+    assert!(plain.lag() >= 5.0 * f64::from(DT), "a plain step leaves it");
+    plain.drop_lag();
+    assert_eq!(scene.world.state_hash(), plain.state_hash());
+}
+
 #[test]
 fn an_equation_that_is_solved_in_part_gains_no_energy_and_says_what_is_off() {
     let mut scene = scene(Solver::Implicit, 1);
