@@ -358,7 +358,10 @@ impl System {
         self.scale_masses(0.0);
         self.pins.hold_all(&pins);
         for &node in &nodes {
-            let gain = self.implicit.as_ref().map(|implicit| implicit.gain_of(node as usize));
+            let gain = self
+                .implicit
+                .as_ref()
+                .map(|implicit| implicit.solution.gain_of(node as usize));
             held.push(HeldNode {
                 node,
                 tool,

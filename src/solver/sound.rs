@@ -13,7 +13,10 @@ impl System {
             && self.inverse_masses.len() == count
             && self.forces.are_sound(count)
             && self.order.is_sound(count)
-            && self.implicit.as_ref().is_none_or(|implicit| implicit.is_sound(count))
+            && self
+                .implicit
+                .as_ref()
+                .is_none_or(|implicit| implicit.solution.is_sound(count))
             && self.state.is_sound(count)
             && self.pins.are_sound(count)
             && self.early.iter().flatten().all(|early| early.velocities.len() == count)

@@ -61,7 +61,11 @@ impl System {
         let was = state.velocities.get(node);
         let now = match &mut self.implicit {
             None => velocity,
-            Some(implicit) => was + implicit.deflect(node, Vec3::select(held, implicit.mean(node), velocity)),
+            Some(implicit) => {
+                was + implicit
+                    .solution
+                    .deflect(node, Vec3::select(held, implicit.solution.mean(node), velocity))
+            }
         };
         state.velocities.set(node, Vec3::select(held, was, now));
         if moment.drifts {
@@ -83,7 +87,7 @@ impl System {
     pub fn attach(&mut self) {
         self.implicit
             .iter_mut()
-            .for_each(|implicit| implicit.is_attached = true);
+            .for_each(|implicit| implicit.solution.is_attached = true);
     }
 
     /// Goes on with nothing of the last step but positions and velocities, now that it is attached.
@@ -96,7 +100,7 @@ impl System {
     pub fn end_bonds(&mut self) {
         self.implicit
             .iter_mut()
-            .for_each(|implicit| implicit.is_attached = false);
+            .for_each(|implicit| implicit.solution.is_attached = false);
         self.changed(Changed::Course);
     }
 
@@ -126,7 +130,7 @@ impl System {
     pub fn mean_velocity(&mut self, node: usize) -> Vec3 {
         match &self.implicit {
             None => self.state.substep().velocities.get(node),
-            Some(implicit) => implicit.mean(node),
+            Some(implicit) => implicit.solution.mean(node),
         }
     }
 
@@ -134,7 +138,7 @@ impl System {
     pub fn motion(&mut self) -> (Option<&Bindings>, impl Fn(usize) -> (Vec3, Vec3)) {
         let (state, implicit) = (self.state.substep(), self.implicit.as_deref());
         let motion_of = move |node| {
-            let mean = implicit.map_or_else(|| state.velocities.get(node), |implicit| implicit.mean(node));
+            let mean = implicit.map_or_else(|| state.velocities.get(node), |implicit| implicit.solution.mean(node));
             (state.positions.get(node), mean)
         };
         (self.bindings.as_ref(), motion_of)
@@ -162,7 +166,7 @@ impl System {
             return;
         }
         if let Some(implicit) = &mut self.implicit {
-            implicit.draw(node, given, moment.duration);
+            implicit.solution.draw(node, given, moment.duration);
         }
         let state = self.state.substep();
         state.velocities.set(node, state.velocities.get(node) + given);
@@ -179,7 +183,7 @@ impl System {
         }
         let none = [self.zeros()?, self.zeros()?];
         if let Some(implicit) = &mut self.implicit {
-            implicit.add_pressed(none);
+            implicit.solution.add_pressed(none);
         }
         Ok(())
     }
@@ -191,11 +195,13 @@ impl System {
         };
         let state = self.state.substep();
         let rates = self.damping.as_ref().map(|damping| damping.rates());
-        implicit.release_pressed(&self.inverse_masses, rates, |node, given| {
-            state.velocities.set(node, state.velocities.get(node) - given);
-            let place = state.next_positions.get(node) - given * duration;
-            state.next_positions.set(node, place);
-        });
+        implicit
+            .solution
+            .release_pressed(&self.inverse_masses, rates, |node, given| {
+                state.velocities.set(node, state.velocities.get(node) - given);
+                let place = state.next_positions.get(node) - given * duration;
+                state.next_positions.set(node, place);
+            });
     }
 
     /// Has the next equation of an implicit body know what a contact gave to a node, N s.
@@ -204,7 +210,7 @@ impl System {
         if let Some(implicit) = &mut self.implicit {
             let impulse = Vec3::select(free, impulse, Vec3::ZERO);
             let rates = self.damping.as_ref().map(|damping| damping.rates());
-            implicit.press(node as usize, impulse, rates);
+            implicit.solution.press(node as usize, impulse, rates);
         }
     }
 
@@ -214,7 +220,7 @@ impl System {
         let place = next_positions.get(node) + way;
         next_positions.set(node, place);
         if let Some(implicit) = &mut self.implicit {
-            implicit.part();
+            implicit.solution.part();
         }
     }
 }

@@ -34,7 +34,7 @@ pub(super) fn may_be_long(body: &System, implicit: &Implicit, request: &StepRequ
     let is_bounded = || implicit.newton.is_none() && implicit.is_bounded();
     let too_little_work = COST_OF_A_PART.saturating_mul(parts_near(request.dt));
     let is_short_of_work = implicit.has_small_budget() || is_bounded() && implicit.allowed < too_little_work;
-    is_short_of_work && !implicit.is_attached && is_alone && body.contacts.is_some()
+    is_short_of_work && !implicit.solution.is_attached && is_alone && body.contacts.is_some()
 }
 
 /// How far an open contact may be to belong to an equation, as a part of the body's extent.
@@ -58,7 +58,6 @@ impl Substep<'_> {
             }
             return Some(*self);
         }
-        let place = implicit.place(self.is_first);
         let Some(means) = &mut implicit.means else {
             return Some(*self);
         };
@@ -72,7 +71,7 @@ impl Substep<'_> {
         let carried = self.carried() as f32;
         if carried != 0.0 && self.is_long() {
             // Where a formula of order 2 has nodes without a push, as velocities that lead there.
-            let history = &implicit.histories[place];
+            let history = implicit.solution.last(self.is_first);
             let [part, rate] = [self.time() / self.step, 1.0 / self.step].map(|factor| factor as f32);
             let of_history = history.ways.axes().into_iter().zip(history.gains.axes());
             for (means, (ways, gains)) in means.axes_mut().into_iter().zip(of_history) {
@@ -234,9 +233,8 @@ impl Substep<'_> {
         let Some(means) = &mut implicit.means else {
             return End::Fine;
         };
-        let next = 1 - implicit.settled;
         let (per_step, step) = ((1.0 / self.step) as f32, self.step as f32);
-        scaled(&implicit.histories[next].ways, per_step, means);
+        scaled(&implicit.solution.next().ways, per_step, means);
         let may_forgo = self.stands && self.is_long();
         self.contact(body, means, |contacts, meeting, _| {
             if may_forgo {
@@ -254,7 +252,7 @@ impl Substep<'_> {
         if self.is_long() && !self.stands && !is_foreseen() {
             return End::Near;
         }
-        let history = &mut implicit.histories[next];
+        let history = implicit.solution.next_mut();
         let axes = body
             .state
             .substep()
@@ -313,45 +311,6 @@ impl Implicit {
     /// Whether the caller allows less work than the definition.
     pub(super) fn is_bounded(&self) -> bool {
         self.allowed < self.budget
-    }
-
-    /// How fast a node goes on its way in the substep that was just solved, m/s.
-    pub fn mean(&self, node: usize) -> Vec3 {
-        let history = &self.histories[1 - self.settled];
-        history.ways.get(node) / self.latest
-    }
-
-    /// What it is attached to has a node go so much faster in a substep of `duration` seconds: no gain that will go on.
-    pub fn draw(&mut self, node: usize, given: Vec3, duration: f32) {
-        let history = &mut self.histories[1 - self.settled];
-        history.ways.set(node, history.ways.get(node) + given * duration);
-        history.energy = None;
-    }
-
-    /// Nodes were moved after the substep that was just solved: its energy is no longer known.
-    pub fn part(&mut self) {
-        self.histories[1 - self.settled].energy = None;
-    }
-
-    /// Other tissue has a node go with this mean velocity instead, m/s: by how much it becomes faster.
-    pub fn deflect(&mut self, node: usize, mean: Vec3) -> Vec3 {
-        let given = mean - self.mean(node);
-        let history = &mut self.histories[1 - self.settled];
-        if given != Vec3::ZERO {
-            history.ways.set(node, mean * self.latest);
-            // What it gives is no gain that will go on.
-            history.gains.set(node, Vec3::ZERO);
-            history.energy = None;
-            self.is_deflected = true;
-        }
-        given
-    }
-
-    /// After a part that ended otherwise than its equation did the next is one of order 1.
-    pub fn settle_deflection(&mut self) {
-        if std::mem::take(&mut self.is_deflected) {
-            self.histories[1 - self.settled].step = 0.0;
-        }
     }
 
     /// Makes the preconditioner what it is without contacts.

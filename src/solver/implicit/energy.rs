@@ -73,7 +73,7 @@ impl Total {
 impl Substep<'_> {
     /// The energy before the step.
     pub(super) fn energy_before(&self, body: &mut System, implicit: &mut Implicit) -> EnergyBefore {
-        let history = implicit.last(self.is_first);
+        let history = implicit.solution.last(self.is_first);
         let credit = history.credit;
         let travels = body.pins.iter().any(|pin| pin.travel != glam::Vec3::ZERO);
         if let Some(total) = history.energy
@@ -82,7 +82,7 @@ impl Substep<'_> {
             return EnergyBefore { total, credit };
         }
         let (kinetic, _) = kinetic(body, self.is_first);
-        let from = implicit.place(self.is_first);
+        let from = implicit.solution.place(self.is_first);
         let mut total = implicit.elastic(body, false, from, self.team);
         if travels {
             // With what viscous arms take up on that way.
@@ -107,9 +107,8 @@ impl Substep<'_> {
     /// Compares the energy after the step with what there was and what was put in.
     pub(super) fn account(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> End {
         let (kinetic, velocity) = kinetic(body, false);
-        let next = 1 - implicit.settled;
-        let elastic = implicit.elastic(body, true, next, self.team);
-        let (work, way) = self.work(body, &implicit.histories[next]);
+        let elastic = implicit.elastic(body, true, 1 - implicit.solution.settled, self.team);
+        let (work, way) = self.work(body, implicit.solution.next());
         let after = elastic.plus(kinetic);
         let has = before.total.energy + work;
         let mass = total_mass(body);
@@ -126,8 +125,8 @@ impl Substep<'_> {
         }
         let is_rounding = after.energy <= has + rounding && !self.may_be_of_order_1(implicit);
         // Attached bodies are never of order 2.
-        let most_credit = if implicit.is_attached { 0.0 } else { CREDIT };
-        let history = &mut implicit.histories[next];
+        let most_credit = if implicit.solution.is_attached { 0.0 } else { CREDIT };
+        let history = implicit.solution.next_mut();
         history.energy = Some(after);
         history.credit = (has + before.credit - after.energy).min(most_credit * size);
         if history.credit >= -(DEBT * size + rounding) || is_rounding {
@@ -139,16 +138,15 @@ impl Substep<'_> {
 
     /// Takes off what was gained: first of the velocities within the body, then of all; where that is not enough, nothing moves but the pins.
     pub(super) fn slow_down(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) {
-        let next = 1 - implicit.settled;
-        let known = implicit.histories[next].energy;
-        let (work, _) = self.work(body, &implicit.histories[next]);
+        let known = implicit.solution.next().energy;
+        let (work, _) = self.work(body, implicit.solution.next());
         let excess = known.map(|total| total.energy - before.total.energy - work);
         let taken = excess
             .filter(|excess| excess.is_finite())
             .map(|excess| slow_down(body, excess, true));
         let (kinetic, mean) = kinetic(body, false);
         let state = body.state.substep();
-        let history = &mut implicit.histories[next];
+        let history = implicit.solution.next_mut();
         if let (Some(total), Some(excess), Some(taken)) = (known, excess, taken)
             && excess - taken <= kinetic
         {
@@ -188,7 +186,7 @@ impl Substep<'_> {
                 contacts.forget_holds();
             }
         }
-        let history = &mut implicit.histories[next];
+        let history = implicit.solution.next_mut();
         history.gains.clear();
         history.remainders.clear();
         history.step = 0.0;

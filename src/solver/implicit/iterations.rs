@@ -50,7 +50,7 @@ impl Substep<'_> {
         let (positions, velocities) = (&*state.next_positions, &*state.velocities);
         let holds = body.contacts.as_ref().map(|contacts| &contacts.holds);
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
-        let pressed = implicit.histories[1 - implicit.settled].pressing();
+        let pressed = implicit.solution.next().pressing();
         let rates = body.damping.as_ref().map(|damping| damping.rates());
         let (masses, kernel) = (&body.masses, body.kernel);
         let motion = Motion {

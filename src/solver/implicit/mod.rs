@@ -19,12 +19,11 @@ mod loops;
 mod parts;
 mod pressed;
 mod rigid;
+mod solution;
 mod step;
 
 pub(super) use parts::run;
 pub(crate) use parts::{begin_parts, end_part, next_part, parts_near};
-
-use glam::Vec3;
 
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
@@ -35,35 +34,14 @@ use crate::solver::changed::Cached;
 use crate::solver::newton::Newton;
 use blocks::{Blocks, Noise};
 use coarse::Coarse;
-use energy::Total;
 use estimate::Spectrum;
 use gradient::Partial;
 use pressed::Pressed;
+use solution::{History, Solution};
 use step::Formula;
 
 /// What rounding makes of a coordinate, as a fraction of the body's extent.
 const ROUNDING: f64 = 1e-7;
-
-/// What the last step leaves to the next, for order 2.
-#[derive(Debug)]
-pub(crate) struct History {
-    /// How far each node went, m.
-    pub ways: Vectors,
-    /// How its velocity changed, m/s.
-    pub gains: Vectors,
-    /// What its position lacks of where it is, m: less than the last place of its coordinates (Kahan 1965). NEWTON keeps its own.
-    pub remainders: Vectors,
-    /// s; 0: there is none.
-    pub step: f32,
-    /// Kinetic and elastic energy at its end, J, where they are known.
-    energy: Option<Total>,
-    /// What was lost not long ago, and may come back: the energy of a step's formula is not quite this one.
-    pub credit: f64,
-    /// What other tissue presses it with, where it meets some.
-    pressed: Option<Pressed>,
-}
-
-saved! { History { ways, gains, remainders, step, energy, credit, pressed } }
 
 /// How a substep ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,21 +52,6 @@ enum End {
     /// So near a tool that it is to be taken in shorter parts.
     Near,
     NotFinite,
-}
-
-impl History {
-    /// For so many nodes, and those of them whose remainders are kept.
-    fn new(node_count: usize, solved_count: usize) -> Result<Self> {
-        Ok(Self {
-            ways: Vectors::zeros(node_count)?,
-            gains: Vectors::zeros(node_count)?,
-            remainders: Vectors::zeros(solved_count)?,
-            step: 0.0,
-            energy: None,
-            credit: 0.0,
-            pressed: None,
-        })
-    }
 }
 
 /// What is known of the preconditioner from the steps before.
@@ -116,17 +79,9 @@ pub(crate) struct Implicit {
     allowed: u32,
     /// The part of a step's correction that may be missing.
     accuracy: f32,
-    histories: [History; 2],
-    /// Whether other tissue changed what the last equation led to.
-    is_deflected: bool,
-    /// Which of them belongs to the current state.
-    settled: usize,
+    pub solution: Solution,
     /// How the last equation that was solved makes velocities of what forces do.
     taken: Formula,
-    /// Whether it is attached to a body in the step in progress: what that does is not carried on, and substeps are of order 1.
-    pub is_attached: bool,
-    /// How long the substep that was just solved is, s.
-    latest: f32,
     /// s: what forces do within the step, m.
     pushes: Vectors,
     /// Where there are tools: how fast nodes go on their way, m/s.
@@ -172,10 +127,9 @@ pub(crate) struct Implicit {
 }
 
 saved! { Implicit {
-    order, budget, left, accuracy, histories, is_deflected, settled, taken, is_attached, latest, pushes, means,
-    corrections, residuals, searches, changes, products, preconditioned, inertia, all_inertia, noise, prepared, blocks,
-    coarse, stiffened, loads, partials, spectrum, stale, was_stale, memory, kept, newton, report,
-    told } leaves { allowed: u32::MAX,
+    order, budget, left, accuracy, solution, taken, pushes, means, corrections, residuals, searches, changes, products,
+    preconditioned, inertia, all_inertia, noise, prepared, blocks, coarse, stiffened, loads, partials, spectrum, stale,
+    was_stale, memory, kept, newton, report, told } leaves { allowed: u32::MAX,
 } where Self::ends }
 
 impl Experience {
@@ -219,15 +173,8 @@ impl Implicit {
             left: 0,
             allowed: u32::MAX,
             accuracy: if given > 0.0 { given } else { accuracy },
-            is_deflected: false,
-            histories: [
-                History::new(node_count, solved_count)?,
-                History::new(node_count, solved_count)?,
-            ],
-            settled: 0,
+            solution: Solution::new(node_count, solved_count)?,
             taken: Formula::new(1, 0.0, 0.0),
-            is_attached: false,
-            latest: 0.0,
             pushes: Vectors::zeros(node_count)?,
             means: None,
             corrections: vectors()?,
@@ -271,11 +218,6 @@ impl Implicit {
         memory::reserve(&mut self.partials, tile_count(count))
     }
 
-    /// Whether what it keeps of the last step belongs to so many nodes.
-    pub fn is_sound(&self, count: usize) -> bool {
-        self.histories.iter().all(|history| history.is_sound(count))
-    }
-
     /// Adds nodes, for which there is room, up to so many in all; NEWTON has been made roomier.
     pub fn grow(&mut self, count: usize) {
         self.vectors_mut().for_each(|vectors| vectors.grow(count));
@@ -301,23 +243,21 @@ impl Implicit {
             &mut self.preconditioned,
         ];
         let solved = solved.into_iter().filter(move |_| !is_exact);
-        let histories = self
-            .histories
-            .iter_mut()
-            .flat_map(move |history| history.vectors_mut(is_exact));
+        let histories = self.solution.histories.iter_mut();
+        let histories = histories.flat_map(move |history| history.vectors_mut(is_exact));
         histories.chain([&mut self.pushes]).chain(&mut self.means).chain(solved)
     }
 
     /// Has a new node go on as another does.
     pub fn copy_motion(&mut self, source: usize, node: usize) {
-        let history = &mut self.histories[self.settled];
+        let history = self.solution.current_mut();
         for vectors in [&mut history.ways, &mut history.gains, &mut history.remainders] {
             if node < vectors.len() {
                 vectors.set(node, vectors.get(source));
             }
         }
         if let Some(newton) = &mut self.newton {
-            newton.copy_remainder(self.settled, source, node);
+            newton.copy_remainder(self.solution.settled, source, node);
         }
     }
 
@@ -356,7 +296,7 @@ impl Implicit {
 
     /// Makes what the step in progress leaves to the next that of the current state.
     pub fn commit(&mut self) {
-        self.settled = 1 - self.settled;
+        self.solution.settled = 1 - self.solution.settled;
         self.told = self.report;
         self.kept = self.memory;
         self.kept.smallest = self.spectrum.known_smallest();
@@ -400,14 +340,9 @@ impl Implicit {
         }
     }
 
-    /// How much faster a node became in the last step, m/s.
-    pub fn gain_of(&self, node: usize) -> Vec3 {
-        self.histories[self.settled].gains.get(node)
-    }
-
     /// What the next step depends on beside the state.
     pub fn hash(&self, hasher: &mut StateHasher) {
-        let history = &self.histories[self.settled];
+        let history = self.solution.current();
         let History {
             ways,
             gains,
@@ -426,7 +361,7 @@ impl Implicit {
         hasher.write_vectors(history.pressing().into_iter().flat_map(Vectors::iter));
         hasher.write_u64(u64::from(self.order) << 32 | u64::from(self.budget));
         if let Some(newton) = &self.newton {
-            newton.hash(self.settled, hasher);
+            newton.hash(self.solution.settled, hasher);
         }
         hasher.write_u64(u64::from(self.stale));
         if !self.stale {
@@ -439,7 +374,7 @@ impl Implicit {
 
     /// Forgets what a change has made invalid.
     pub(in crate::solver) fn forget(&mut self, known: Cached) {
-        let history = &mut self.histories[self.settled];
+        let history = self.solution.current_mut();
         match known {
             Cached::Energy | Cached::EquationEnergy => history.energy = None,
             Cached::Matrix => self.stale = true,
@@ -448,19 +383,10 @@ impl Implicit {
                 history.remainders.clear();
                 history.pressed.iter_mut().for_each(Pressed::forget);
                 if let Some(newton) = &mut self.newton {
-                    newton.forget_remainders(self.settled);
+                    newton.forget_remainders(self.solution.settled);
                 }
             }
             _ => {}
         }
-    }
-
-    /// What the step before the next substep left.
-    fn last(&self, is_first: bool) -> &History {
-        &self.histories[self.place(is_first)]
-    }
-
-    fn place(&self, is_first: bool) -> usize {
-        if is_first { self.settled } else { 1 - self.settled }
     }
 }

@@ -163,7 +163,11 @@ fn take_part(
     team: &Team,
 ) -> End {
     let step = f64::from(request.dt) / f64::from(substeps);
-    let order = if implicit.is_attached { 1 } else { implicit.order };
+    let order = if implicit.solution.is_attached {
+        1
+    } else {
+        implicit.order
+    };
     let substep = Substep {
         request,
         step,
@@ -172,12 +176,12 @@ fn take_part(
         is_first: index == 0,
         equations: substeps - index,
         stands,
-        formula: Formula::new(order, step, f64::from(implicit.last(index == 0).step)),
+        formula: Formula::new(order, step, f64::from(implicit.solution.last(index == 0).step)),
         team,
     };
     body.lead_grasps(request.tools, [substep.start, substep.end]);
     let is_together = request.neighbor_speed.is_some() && body.meets_tissue();
-    implicit.recall_pressed(substep.is_first, is_together);
+    implicit.solution.recall_pressed(substep.is_first, is_together);
     let end = substep.take_safely(body, implicit, is_last_resort);
     if end != End::Fine {
         return end;
@@ -235,7 +239,7 @@ pub(crate) fn next_part(
 /// Ends such a part, after which other tissue may have changed where it led.
 pub(crate) fn end_part(body: &mut System) {
     if let Some(implicit) = &mut body.implicit {
-        implicit.settle_deflection();
+        implicit.solution.settle_deflection();
     }
     body.state.advance();
 }

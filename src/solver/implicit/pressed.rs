@@ -7,9 +7,8 @@
 
 use glam::Vec3;
 
-use super::{History, Implicit};
+use super::solution::{History, Solution};
 use crate::codec::saved;
-use crate::nodes::current_and_next;
 use crate::soa::Vectors;
 
 /// The forces on the nodes of a body.
@@ -60,7 +59,7 @@ impl History {
     }
 }
 
-impl Implicit {
+impl Solution {
     /// From now on other tissue may press it; there are no forces yet.
     pub fn add_pressed(&mut self, none: [Vectors; 2]) {
         for (history, forces) in self.histories.iter_mut().zip(none) {
@@ -70,7 +69,7 @@ impl Implicit {
 
     /// Has the next equation know what pressed before it; nothing does where the body goes alone.
     pub(super) fn recall_pressed(&mut self, is_first: bool, is_together: bool) {
-        let [settled, next] = current_and_next(&mut self.histories, self.settled);
+        let [settled, next] = self.current_and_next();
         let Some(pressed) = &mut next.pressed else {
             return;
         };
@@ -115,7 +114,7 @@ impl Implicit {
     /// Contacts gave this to a node, N s, and press on.
     pub fn press(&mut self, node: usize, impulse: Vec3, rates: Option<&[f32]>) {
         let latest = self.latest;
-        if let Some(pressed) = &mut self.histories[1 - self.settled].pressed {
+        if let Some(pressed) = &mut self.next_mut().pressed {
             let undamped = undamped(rates, node, latest);
             let force = pressed.forces.get(node) + impulse * (undamped / latest);
             pressed.forces.set(node, force.clamp(Vec3::MIN, Vec3::MAX));

@@ -91,7 +91,7 @@ impl Substep<'_> {
         if held.all() {
             return None;
         }
-        let history = implicit.last(self.is_first);
+        let history = implicit.solution.last(self.is_first);
         let carried = self.carried();
         let carried = carried * (1.0 + carried);
         let state = body.state.substep();

@@ -7,7 +7,6 @@ use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit};
 use crate::base::{Stage, Stopwatch};
 use crate::codec::saved;
-use crate::nodes::current_and_next;
 use crate::soa::{Records, Vectors, WriteRecords, copy_axes, tile_count, tile_nodes};
 use crate::solver::System;
 use crate::solver::kick::{Survey, look};
@@ -96,7 +95,7 @@ impl Substep<'_> {
             body.forces.age(self.step, next, self.team);
             if body.forces.remember() {
                 // What was stored is lost by then.
-                implicit.histories[1 - implicit.settled].energy = None;
+                implicit.solution.part();
             }
         }
         watch.stop(self.request.profile, Stage::Solver);
@@ -214,7 +213,7 @@ impl Substep<'_> {
         let node_count = body.node_count();
         let state = body.state.substep();
         let first = self.is_first.then_some(state.first_velocities);
-        let gains = &implicit.histories[implicit.place(self.is_first)].gains;
+        let gains = &implicit.solution.last(self.is_first).gains;
         let carried = self.formula.carried as f32;
         implicit.pushes.clear();
         let written = (state.velocities.tiles_mut(), body.pins.tiles_mut());
@@ -241,7 +240,7 @@ impl Substep<'_> {
     pub(super) fn place(&self, body: &mut System, implicit: &Implicit) {
         let node_count = body.node_count();
         let state = body.state.substep();
-        let history = implicit.last(self.is_first);
+        let history = implicit.solution.last(self.is_first);
         let time = self.formula.time as f32;
         let carried = self.formula.carried as f32;
         let (positions, velocities) = (state.positions, &*state.velocities);
@@ -293,8 +292,7 @@ impl Substep<'_> {
         let node_count = body.node_count();
         let (positions, velocities) = body.state.newest();
         let next = body.state.next_positions();
-        let place = implicit.place(self.is_first);
-        let (history, pushes) = (&implicit.histories[place], &implicit.pushes);
+        let (history, pushes) = (implicit.solution.last(self.is_first), &implicit.pushes);
         let time = self.formula.time as f32;
         let carried = self.formula.carried as f32;
         let records = implicit.changes.records.as_mut().map(Records::tiles_mut);
@@ -348,14 +346,14 @@ impl Substep<'_> {
 
     /// The same, with the multipliers that contacts have.
     fn solve_pressed(&self, body: &mut System, implicit: &mut Implicit, newton: &mut Newton) {
-        let (from, to) = (implicit.place(self.is_first), 1 - implicit.settled);
+        let (from, to) = (implicit.solution.place(self.is_first), 1 - implicit.solution.settled);
         let aimed = Aimed {
             time: self.formula.time,
             carried: self.formula.carried,
             gravity: self.request.gravity,
             end: self.end,
-            ways: &implicit.histories[from].ways,
-            pressed: implicit.histories[to].pressing(),
+            ways: &implicit.solution.last(self.is_first).ways,
+            pressed: implicit.solution.next().pressing(),
             from,
             to,
             budget: self.budget(implicit),
@@ -374,13 +372,13 @@ impl Substep<'_> {
     /// Makes velocities and history of what was found; whether all is finite.
     fn finish(&self, body: &mut System, implicit: &mut Implicit) -> bool {
         implicit.taken = self.formula;
-        implicit.latest = self.step as f32;
+        implicit.solution.latest = self.step as f32;
         let node_count = body.node_count();
         let turn = self.lost_turn(body, implicit);
         let (kernel, dt, part) = (body.kernel, self.request.dt, (self.end - self.start) as f32);
         let time = self.formula.time as f32;
         let carried = self.formula.carried as f32;
-        let [settled, next] = current_and_next(&mut implicit.histories, implicit.settled);
+        let [settled, next] = implicit.solution.current_and_next();
         let from = self.is_first.then_some(&*settled);
         next.step = self.step as f32;
         let state = body.state.substep();
