@@ -7,7 +7,7 @@
 use super::{Body, Needs};
 use crate::base::Result;
 use crate::def::{BodyDefinition, ChoiceReason, Solver, SolverChoice};
-use crate::solver::{StepRequest, needed};
+use crate::solver::StepRequest;
 use crate::threads::Team;
 
 /// The most substeps of a step for which VERLET is chosen.
@@ -49,7 +49,10 @@ impl Body {
     /// How many substeps it would take with VERLET in a step, with its nodes where they are.
     fn substeps_for(&mut self, needs: &Needs) -> u32 {
         let request = StepRequest::alone(needs.steps.length, needs.steps.max_substeps);
-        let substeps = needed(&mut self.system, &request, &Team::alone()).substeps;
+        let substeps = self
+            .system
+            .lend(|integrator, body| integrator.need(body, &request, &Team::alone()))
+            .substeps;
         self.system.put_back();
         substeps
     }

@@ -11,7 +11,7 @@ use crate::cutting::{Changes, CutMaterial, PieceOfCell, PieceOfNode, PieceOfSpri
 impl Body {
     /// Shifts mass between the copies of each node, where they would have higher frequencies than there were.
     pub(super) fn share_by_stiffness(&self, material: &CutMaterial, changes: &mut Changes) -> Result<()> {
-        if !self.system.is_explicit() {
+        if !self.system.integrator.is_limited_by_stability() {
             return Ok(());
         }
         let Changes {

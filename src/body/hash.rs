@@ -72,7 +72,7 @@ impl Body {
         for sliver in system.scaling.iter().flat_map(|scaling| scaling.slivers()) {
             hasher.write_u64(u64::from(sliver.node));
         }
-        system.hash_solver(hasher);
+        system.integrator.hash(hasher);
         if let Some(sleeper) = &system.sleeper {
             sleeper.hash(hasher);
         }

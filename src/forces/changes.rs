@@ -23,19 +23,20 @@ pub(crate) struct Changes {
 saved! { Changes { records, elements, cavities } }
 
 impl Forces {
-    /// Room for what forces change by.
-    pub fn room_for_changes(&self) -> Result<Changes> {
+    /// Makes room for what forces change by.
+    pub fn make_room_for_changes(&mut self) -> Result<()> {
         let records = self.records.as_ref();
         let records = records.map(|records| Records::zeros(records.as_slice().len()));
         let cavities = self.beside.cavities.as_ref();
-        Ok(Changes {
+        self.changes = Changes {
             records: records.transpose()?,
             elements: self
                 .elements()
                 .map(|elements| elements.room_for_changes())
                 .transpose()?,
             cavities: cavities.map(|cavities| cavities.room_for_changes()).transpose()?,
-        })
+        };
+        Ok(())
     }
 
     /// Works out what is not made tile by tile of how forces change, to first order, where nodes go these ways; there are records of

@@ -35,9 +35,11 @@ pub(crate) struct Forces {
     kernel: ChosenKernel,
     /// The positions that forces are made of, for springs that gather them, elements and terms.
     pub records: Option<Records>,
+    /// For solvers of equations: room for how forces change.
+    pub changes: Changes,
 }
 
-saved! { Forces { springs, elements, beside, kernel, records } }
+saved! { Forces { springs, elements, beside, kernel, records, changes } }
 
 /// The sum of all that acts on nodes, tile by tile: of forces, or of how these change.
 #[derive(Clone, Copy)]
@@ -106,6 +108,7 @@ impl Forces {
             beside: Beside { terms, cavities },
             kernel,
             records: records.transpose()?,
+            changes: Changes::default(),
         })
     }
 

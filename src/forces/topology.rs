@@ -1,6 +1,6 @@
 //! What becomes of forces as nodes, springs and cells come, change and go.
 
-use super::{Changes, Forces};
+use super::Forces;
 use crate::base::Result;
 use crate::elements::PieceOfElement;
 use crate::soa::{Masses, Region, Scale};
@@ -17,10 +17,10 @@ pub(crate) struct Parts {
 }
 
 impl Forces {
-    /// Makes room for so many nodes in all, in `changes` too.
-    pub fn reserve_nodes(&mut self, count: usize, changes: Option<&mut Changes>) -> Result<()> {
+    /// Makes room for so many nodes in all.
+    pub fn reserve_nodes(&mut self, count: usize) -> Result<()> {
         self.springs.reserve_nodes(count)?;
-        if let Some(records) = &mut self.records {
+        for records in self.records.iter_mut().chain(&mut self.changes.records) {
             records.reserve(count)?;
         }
         if let Some(elements) = &mut self.elements {
@@ -29,33 +29,23 @@ impl Forces {
         if let Some(terms) = &mut self.beside.terms {
             terms.reserve_nodes(count)?;
         }
-        let Some(changes) = changes else {
-            return Ok(());
-        };
-        if let Some(records) = &mut changes.records {
-            records.reserve(count)?;
-        }
-        changes
-            .elements
-            .as_mut()
-            .map_or(Ok(()), |sums| sums.reserve_rings(count))
+        let sums = self.changes.elements.as_mut();
+        sums.map_or(Ok(()), |sums| sums.reserve_rings(count))
     }
 
-    /// Adds nodes, for which there is room, up to so many in all, to `changes` too. Changes nothing where it fails.
-    pub fn add_nodes(&mut self, count: usize, changes: Option<&mut Changes>) -> Result<()> {
+    /// Adds nodes, for which there is room, up to so many in all. Changes nothing where it fails.
+    pub fn add_nodes(&mut self, count: usize) -> Result<()> {
         self.springs.resize(count)?;
-        let of_changes = changes.and_then(|changes| changes.records.as_mut());
-        for records in self.records.iter_mut().chain(of_changes) {
+        for records in self.records.iter_mut().chain(&mut self.changes.records) {
             records.grow(count);
         }
         Ok(())
     }
 
-    /// Makes room for what a cut leaves in a body of so many nodes, in `changes` too.
-    pub fn prepare_parts(&mut self, parts: &Parts, node_count: usize, changes: Option<&mut Changes>) -> Result<()> {
+    /// Makes room for what a cut leaves in a body of so many nodes.
+    pub fn prepare_parts(&mut self, parts: &Parts, node_count: usize) -> Result<()> {
         if let Some(elements) = &mut self.elements {
-            let sums = changes.and_then(|changes| changes.elements.as_mut());
-            elements.reserve_pieces(&parts.elements, node_count, sums)?;
+            elements.reserve_pieces(&parts.elements, node_count, self.changes.elements.as_mut())?;
             elements.reserve_rings(parts.ring_count)?;
         }
         let terms = self.beside.terms.as_mut();
@@ -67,11 +57,10 @@ impl Forces {
         self.beside.laws_mut().for_each(|law| law.forget_parts());
     }
 
-    /// Becomes what a cut leaves, for which there is room, as `changes` do.
-    pub fn take_parts(&mut self, parts: &Parts, node_count: usize, changes: Option<&mut Changes>) {
+    /// Becomes what a cut leaves, for which there is room.
+    pub fn take_parts(&mut self, parts: &Parts, node_count: usize) {
         if let Some(elements) = &mut self.elements {
-            let sums = changes.and_then(|changes| changes.elements.as_mut());
-            elements.rewire(&parts.elements, node_count, sums);
+            elements.rewire(&parts.elements, node_count, self.changes.elements.as_mut());
         }
         self.beside
             .terms

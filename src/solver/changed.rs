@@ -33,7 +33,7 @@ pub(crate) enum Changed {
 
 /// What is known from the state or from earlier steps.
 #[derive(Clone, Copy)]
-pub(super) enum Cached {
+pub(crate) enum Cached {
     /// Which parts sleep.
     Sleep,
     /// The forces at the positions.
@@ -95,9 +95,7 @@ impl System {
     }
 
     fn forget(&mut self, known: Cached) {
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget(known);
-        }
+        self.integrator.forget(known);
         match known {
             Cached::Sleep => self.wake(),
             Cached::Forces => self.forces_current = false,

@@ -359,9 +359,9 @@ impl System {
         self.pins.hold_all(&pins);
         for &node in &nodes {
             let gain = self
-                .implicit
-                .as_ref()
-                .map(|implicit| implicit.solution.gain_of(node as usize));
+                .integrator
+                .solution()
+                .map(|solution| solution.gain_of(node as usize));
             held.push(HeldNode {
                 node,
                 tool,

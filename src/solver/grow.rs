@@ -15,8 +15,7 @@ impl System {
     pub fn reserve_nodes(&mut self, more: usize) -> Result<()> {
         let count = self.node_count().checked_add(more).ok_or(Error::OutOfMemory)?;
         self.order.reserve(count)?;
-        let changes = self.implicit.as_mut().map(|implicit| &mut implicit.changes);
-        self.forces.reserve_nodes(count, changes)?;
+        self.forces.reserve_nodes(count)?;
         for values in [&mut self.masses, &mut self.inverse_masses] {
             memory::reserve(values, count)?;
         }
@@ -34,9 +33,7 @@ impl System {
         if let Some(coarse) = &mut self.coarse {
             coarse.reserve(count)?;
         }
-        if let Some(implicit) = &mut self.implicit {
-            implicit.reserve_nodes(count)?;
-        }
+        self.integrator.reserve_nodes(count)?;
         let triangles = self.surface.len() + 2 * more;
         memory::reserve(&mut self.surface, triangles)?;
         self.forget_early();
@@ -47,44 +44,32 @@ impl System {
 
     /// Makes room for one spring more in what its solver knows.
     pub fn reserve_spring(&mut self) -> Result<()> {
-        let springs = self.forces.springs.spring_count() + 1;
-        let implicit = self.implicit.as_mut();
-        implicit.map_or(Ok(()), |implicit| implicit.make_room(springs))
+        self.integrator.reserve_springs(self.forces.springs.spring_count() + 1)
     }
 
     /// Makes room for what a cut leaves in a body of so many nodes.
     pub fn prepare_parts(&mut self, parts: &Parts, node_count: usize) -> Result<()> {
-        let changes = self.implicit.as_mut().map(|implicit| &mut implicit.changes);
-        self.forces.prepare_parts(parts, node_count, changes)
+        self.forces.prepare_parts(parts, node_count)
     }
 
     /// Becomes what a cut leaves, for which there is room.
     pub fn take_parts(&mut self, parts: &Parts, node_count: usize) {
-        let changes = self.implicit.as_mut().map(|implicit| &mut implicit.changes);
-        self.forces.take_parts(parts, node_count, changes);
+        self.forces.take_parts(parts, node_count);
     }
 
     /// Changes springs, of which there are nodes already, and what a solver knows of them and so many pairs of nodes of elements more. Changes
     /// nothing where it fails.
     pub fn rewire(&mut self, rewiring: &Rewiring, pairs: usize) -> Result<()> {
-        let more = rewiring.added.len() + pairs;
-        let implicit = self.implicit.as_ref();
-        let roomier = implicit
-            .map(|implicit| implicit.roomier(&self.forces, more))
-            .transpose()?;
-        self.forces.springs.rewire(rewiring)?;
-        if let (Some(implicit), Some(roomier)) = (&mut self.implicit, roomier.flatten()) {
-            implicit.adopt(roomier);
-        }
-        Ok(())
+        self.integrator
+            .prepare_cut(&self.forces, rewiring.added.len() + pairs)?;
+        self.forces.springs.rewire(rewiring)
     }
 
     /// Adds nodes, for which there is room, in their own numbers: they follow those that there are. Changes nothing where it fails.
     pub fn add_nodes(&mut self, nodes: &[NewNode]) -> Result<()> {
         let known = self.node_count();
         let count = known + nodes.len();
-        let changes = self.implicit.as_mut().map(|implicit| &mut implicit.changes);
-        self.forces.add_nodes(count, changes)?;
+        self.forces.add_nodes(count)?;
         self.order.grow(count);
         self.masses.resize(count, 0.0);
         self.inverse_masses.resize(count, 0.0);
@@ -93,9 +78,7 @@ impl System {
         if let Some(coarse) = &mut self.coarse {
             coarse.grow(count);
         }
-        if let Some(implicit) = &mut self.implicit {
-            implicit.grow(count);
-        }
+        self.integrator.grow(count);
         self.forget_early();
         self.surveys.resize(tile_count(count), Survey::NOTHING);
         self.tile_sums.resize(tile_count(count), TileSums::default());
@@ -135,9 +118,7 @@ impl System {
         if let Some(damping) = &mut self.damping {
             damping.copy(source);
         }
-        if let Some(implicit) = &mut self.implicit {
-            implicit.copy_motion(source, node);
-        }
+        self.integrator.copy_motion(source, node);
     }
 
     /// A zero vector for each node, with room for those that may come.

@@ -82,24 +82,6 @@ impl Need {
     }
 }
 
-/// What a step of VERLET needs that a body takes together with others.
-pub(crate) fn needed(body: &mut System, request: &StepRequest, team: &Team) -> Need {
-    let (start, beside_springs) = prepare(body, request, team);
-    if request.substeps > 0 {
-        return Need {
-            start,
-            substeps: request.substeps,
-            masses_for: 0.0,
-        };
-    }
-    let stable_substep = first_substep(body, &start, beside_springs);
-    let mut need = Need::new(body, request, start, stable_substep, beside_springs);
-    need.start.pace = start.pace.after(need.substeps, request.dt);
-    let substeps = start.pace.keep(need.substeps, request.dt, request.max_substeps);
-    need.substeps = refined(substeps, &start, request);
-    need
-}
-
 /// A number of substeps, 1 at least.
 fn as_count(substeps: f64) -> u32 {
     substeps.clamp(1.0, f64::from(u32::MAX)) as u32
@@ -173,7 +155,7 @@ pub(crate) fn relieve_squeezed(
     team: &Team,
 ) -> Option<(u32, f32)> {
     let is_squeezed = substeps_needed(request, stable_substep) > f64::from(unrelieved(body, request));
-    if body.implicit.is_some() || !is_squeezed {
+    if !is_squeezed {
         return None;
     }
     let limit = body.relieve(request, true, 1, team)?;

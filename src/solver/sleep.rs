@@ -255,7 +255,7 @@ impl System {
                 asleep_count: 0,
                 neighbours: Vec::new(),
                 starts: Vec::new(),
-                in_parts: self.implicit.is_none() && !self.forces.beside.is_any(),
+                in_parts: self.integrator.solution().is_none() && !self.forces.beside.is_any(),
                 bounds: Bounds::EMPTY,
                 margin: 0.0,
                 step: 0.0,
@@ -454,7 +454,7 @@ impl System {
 
     /// Finds what forces would make of nodes whose tiles sleep beside some that are awake, or may fall asleep.
     fn feel(&self, sleeper: &mut Sleeper, gravity: Vec3, team: &Team) {
-        if self.implicit.is_some() {
+        if self.integrator.solution().is_some() {
             return;
         }
         let mut tiles = std::mem::take(&mut sleeper.tiles);

@@ -14,9 +14,9 @@ impl System {
             && self.forces.are_sound(count)
             && self.order.is_sound(count)
             && self
-                .implicit
-                .as_ref()
-                .is_none_or(|implicit| implicit.solution.is_sound(count))
+                .integrator
+                .solution()
+                .is_none_or(|solution| solution.is_sound(count))
             && self.state.is_sound(count)
             && self.pins.are_sound(count)
             && self.early.iter().flatten().all(|early| early.velocities.len() == count)

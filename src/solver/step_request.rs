@@ -34,6 +34,8 @@ pub(crate) struct StepRequest<'a> {
     pub neighbor_speed: Option<f32>,
     /// Where the stages are timed, if they are.
     pub profile: Option<&'a Profile>,
+    /// How many products there may be in all where equations are solved; `u32::MAX`: as many as the definition allows.
+    pub work: u32,
     /// Whether mass may be added where more substeps are needed than are allowed.
     pub relieves: bool,
 }
@@ -49,6 +51,7 @@ impl StepRequest<'_> {
             tolerance: 0.0,
             tools: &[],
             neighbor_speed: None,
+            work: u32::MAX,
             relieves: false,
             profile: None,
             dynamic: &[],
@@ -78,6 +81,27 @@ impl StepRequest<'_> {
             0 => self.max_substeps,
             fixed => fixed,
         })
+    }
+}
+
+/// How a step is taken.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StepStart {
+    /// What it begins with.
+    pub carry: Carry,
+    pub substeps: u32,
+    /// After so many of them a world with a tolerance looks at it.
+    pub middle: u32,
+}
+
+impl StepStart {
+    /// In so many substeps, looked at far from simple fractions of the step, where steps that have lost the phase of an oscillation may agree.
+    pub fn new(carry: Carry, substeps: u32) -> Self {
+        Self {
+            carry,
+            substeps,
+            middle: (f64::from(substeps) * 0.618).ceil() as u32,
+        }
     }
 }
 

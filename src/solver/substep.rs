@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::System;
 use super::closing::{Closed, ClosingKick};
+use super::gravity::GravityKicks;
 use super::kick::{Drift, Inertia, Kick, Survey, TileKick, look};
 use super::step_request::StepRequest;
 use crate::forces::Sum;
@@ -89,22 +90,22 @@ impl Part {
         self.duration += 0.5 * closing.substep;
     }
 
-    /// The full kick of a later substep, in which gravity gives `fall`.
-    pub fn go_on(&mut self, fall: Vec3) {
+    /// The full kick of a later substep, in this gravity.
+    pub fn go_on(&mut self, gravity: Vec3, kicks: &mut GravityKicks) {
         self.before = VelocityTime::Open;
         self.half = false;
         self.duration = self.substep;
         self.share = 1.0;
-        self.fall = fall;
+        self.fall = kicks.next(gravity.as_dvec3() * f64::from(self.substep));
     }
 
-    /// The half kick that closes the step, in which gravity gives `fall`.
-    pub fn close(&mut self, fall: Vec3) {
+    /// The half kick that closes the step, in this gravity.
+    pub fn close(&mut self, gravity: Vec3, kicks: &mut GravityKicks) {
         *self = Self {
             before: VelocityTime::Open,
             last: true,
             drifts: false,
-            fall,
+            fall: kicks.next(gravity.as_dvec3() * f64::from(0.5 * self.substep)),
             start: 1.0,
             end: 1.0,
             ..Self::opening(self.substep)

@@ -6,8 +6,9 @@ use super::early::Early;
 use super::energy_account::EnergyAccount;
 use super::energy_sums::TileSums;
 use super::grasp::Grasps;
-use super::implicit::Implicit;
+use super::integrator::{self, Integrator};
 use super::kick::Survey;
+use super::leapfrog::Leapfrog;
 use super::mass_scaling::{Heavier, MassScaling};
 use super::pace::Pace;
 use super::sleep::Sleeper;
@@ -66,8 +67,7 @@ pub(crate) struct System {
     pub origin: DVec3,
     /// Velocities at the time of the positions, for bodies whose springs have damping.
     pub predicted_velocities: Option<Vectors>,
-    /// For bodies that are moved implicitly.
-    pub(super) implicit: Option<Box<Implicit>>,
+    pub integrator: Box<dyn Integrator>,
     /// Forces from outside for the next step, N; kept from the first force on.
     pub applied: Option<Vectors>,
     /// Velocities from before the last half kick of a step, of the last one and of the one that is tried; for bodies that may press others.
@@ -101,7 +101,7 @@ pub(crate) struct System {
 
 saved! { System {
     order, forces, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys,
-    tile_sums, boxes, surface, state, origin, predicted_velocities, implicit, applied, early, contacts, contact,
+    tile_sums, boxes, surface, state, origin, predicted_velocities, integrator, applied, early, contacts, contact,
     bindings, node_room, is_cut_open, grasps, carry, forces_current, forces_applied, coarse, sleeper, may_be_cut,
     gravity_scale, acceleration,
 } where Self::is_sound }
@@ -170,7 +170,7 @@ impl System {
             surface,
             state: State::new(node_count, definition.solver == Solver::Verlet)?,
             origin: DVec3::ZERO,
-            implicit: None,
+            integrator: Box::new(Leapfrog),
             applied: None,
             early: None,
             contacts: None,
@@ -199,7 +199,7 @@ impl System {
     /// Makes what its solver keeps, for nodes that are in their places.
     pub fn make_solver(&mut self, definition: &BodyDefinition) -> Result<()> {
         let positions = self.state.positions();
-        self.implicit = Implicit::new(definition, positions, &self.forces)?;
+        self.integrator = integrator::make(definition, positions, &mut self.forces)?;
         if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 {
             let (uniform, damping) = (self.uniform_inverse_mass, self.damping.as_ref());
             let (forces, masses) = (&self.forces, self.masses());
@@ -314,10 +314,10 @@ impl System {
 
     /// Makes room for contacts within equations, where it has such.
     pub fn reserve_holds(&mut self) -> Result<()> {
-        if let (Some(contacts), Some(implicit)) = (&mut self.contacts, &mut self.implicit) {
-            implicit.reserve_contacts(contacts.reserve_holds()?)?;
+        if let Some(contacts) = &mut self.contacts {
+            self.integrator.reserve_contacts(contacts)?;
             if self.node_room > 0 {
-                implicit.reserve_nodes(self.node_room)?;
+                self.integrator.reserve_nodes(self.node_room)?;
             }
         }
         Ok(())
@@ -337,9 +337,7 @@ impl System {
     /// Prepares again what an attempted step that is not committed has changed.
     pub fn put_back(&mut self) {
         self.sleep_again();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.put_back();
-        }
+        self.integrator.put_back();
         self.forces.recall();
         if self.scaling.as_ref().is_some_and(|scaling| scaling.has_changed()) {
             // Nodes that were listed for the step alone are as heavy as they were.
@@ -434,15 +432,13 @@ impl System {
     pub fn commit(&mut self, (substeps, dt): (u32, f32), carry: Carry, tools: &[ToolPath]) {
         self.state.commit();
         self.carry = carry;
-        self.forces_current = carry.closing.is_none() && self.implicit.is_none();
+        self.forces_current = carry.closing.is_none() && self.integrator.takes_half_kicks();
         self.forces.settle();
         self.forces.keep();
         if let Some(scaling) = &mut self.scaling {
             scaling.settle(dt);
         }
-        if let Some(implicit) = &mut self.implicit {
-            implicit.commit();
-        }
+        self.integrator.commit();
         if let Some(early) = &mut self.early {
             early.swap(0, 1);
         }

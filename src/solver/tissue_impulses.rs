@@ -1,6 +1,6 @@
 //! What other tissue does to a body at the end of a step that it has tried.
 
-use glam::Vec3;
+use glam::{BVec3, Vec3};
 
 use super::closing::close;
 use super::{Changed, System};
@@ -23,7 +23,7 @@ pub(crate) struct Span<'a> {
 impl Span<'_> {
     /// Whether a body has a part in it: that which closes a step is VERLET's.
     pub fn concerns(&self, body: &System) -> bool {
-        self.drifts || body.implicit.is_none()
+        self.drifts || body.integrator.takes_half_kicks()
     }
 }
 
@@ -48,24 +48,25 @@ impl System {
         parts(self.bindings.as_ref(), own)
     }
 
-    /// Gives a node this mean velocity, m/s, in a substep: it has received `impulse`, N s, which a pinned node hands on.
-    pub fn nudge(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Span) {
+    /// Has what holds a node take its part of an impulse, N s: along which axes that is, unless nothing moves the node.
+    fn hand_on(&mut self, node: usize, impulse: Vec3, moment: &Span) -> Option<BVec3> {
         let held = self.pins.axes_of(node as u32);
         if let Some(pin) = self.pins.get_mut(node as u32) {
             pin.force_sum -= pin.held(impulse).as_dvec3() / f64::from(moment.duration);
         }
-        if self.inverse_masses[node] == 0.0 {
+        (self.inverse_masses[node] > 0.0).then_some(held)
+    }
+
+    /// Gives a node this mean velocity, m/s, in a substep: it has received `impulse`, N s, which a pinned node hands on.
+    pub fn nudge(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Span) {
+        let Some(held) = self.hand_on(node, impulse, moment) else {
             return;
-        }
+        };
         let state = self.state.substep();
         let was = state.velocities.get(node);
-        let now = match &mut self.implicit {
+        let now = match self.integrator.solution_mut() {
             None => velocity,
-            Some(implicit) => {
-                was + implicit
-                    .solution
-                    .deflect(node, Vec3::select(held, implicit.solution.mean(node), velocity))
-            }
+            Some(solution) => was + solution.deflect(node, Vec3::select(held, solution.mean(node), velocity)),
         };
         state.velocities.set(node, Vec3::select(held, was, now));
         if moment.drifts {
@@ -85,9 +86,9 @@ impl System {
 
     /// It is attached in the step in progress.
     pub fn attach(&mut self) {
-        self.implicit
-            .iter_mut()
-            .for_each(|implicit| implicit.solution.is_attached = true);
+        if let Some(solution) = self.integrator.solution_mut() {
+            solution.is_attached = true;
+        }
     }
 
     /// Goes on with nothing of the last step but positions and velocities, now that it is attached.
@@ -98,9 +99,9 @@ impl System {
 
     /// The same, now that it is attached no more.
     pub fn end_bonds(&mut self) {
-        self.implicit
-            .iter_mut()
-            .for_each(|implicit| implicit.solution.is_attached = false);
+        if let Some(solution) = self.integrator.solution_mut() {
+            solution.is_attached = false;
+        }
         self.changed(Changed::Course);
     }
 
@@ -118,7 +119,7 @@ impl System {
     /// What damping leaves of the speed that an impulse gives to a node, so that the impulse is what the force behind it
     /// would have given undamped.
     pub fn left_by_damping(&self, node: u32, moment: &Span) -> f32 {
-        match (&self.implicit, &self.damping) {
+        match (self.integrator.solution(), &self.damping) {
             (Some(_), Some(damping)) => 1.0 / (1.0 + damping.rates()[node as usize] * moment.duration),
             // A kick of VERLET gives (1 - exp(-x)) / x of what its forces would undamped: 1 - x / 2 but for terms of order 2.
             (None, Some(damping)) => 1.0 / (1.0 + 0.5 * damping.rates()[node as usize] * moment.duration),
@@ -128,17 +129,17 @@ impl System {
 
     /// How fast a node goes on its way in a substep, m/s.
     pub fn mean_velocity(&mut self, node: usize) -> Vec3 {
-        match &self.implicit {
+        match self.integrator.solution() {
             None => self.state.substep().velocities.get(node),
-            Some(implicit) => implicit.solution.mean(node),
+            Some(solution) => solution.mean(node),
         }
     }
 
     /// What its points are bound to, and where each node begins a substep and how fast it goes on its way, m/s.
     pub fn motion(&mut self) -> (Option<&Bindings>, impl Fn(usize) -> (Vec3, Vec3)) {
-        let (state, implicit) = (self.state.substep(), self.implicit.as_deref());
+        let (state, solution) = (self.state.substep(), self.integrator.solution());
         let motion_of = move |node| {
-            let mean = implicit.map_or_else(|| state.velocities.get(node), |implicit| implicit.solution.mean(node));
+            let mean = solution.map_or_else(|| state.velocities.get(node), |solution| solution.mean(node));
             (state.positions.get(node), mean)
         };
         (self.bindings.as_ref(), motion_of)
@@ -154,19 +155,15 @@ impl System {
 
     /// Gives a node that is attached this mean velocity, m/s, in a substep: it has received `impulse` in all, N s, which a pinned node hands on.
     pub fn draw(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Span) {
-        let held = self.pins.axes_of(node as u32);
-        if let Some(pin) = self.pins.get_mut(node as u32) {
-            pin.force_sum -= pin.held(impulse).as_dvec3() / f64::from(moment.duration);
-        }
-        if self.inverse_masses[node] == 0.0 {
+        let Some(held) = self.hand_on(node, impulse, moment) else {
             return;
-        }
+        };
         let given = Vec3::select(held, Vec3::ZERO, velocity - self.mean_velocity(node));
         if given == Vec3::ZERO {
             return;
         }
-        if let Some(implicit) = &mut self.implicit {
-            implicit.solution.draw(node, given, moment.duration);
+        if let Some(solution) = self.integrator.solution_mut() {
+            solution.draw(node, given, moment.duration);
         }
         let state = self.state.substep();
         state.velocities.set(node, state.velocities.get(node) + given);
@@ -178,39 +175,37 @@ impl System {
 
     /// Makes room for what it keeps of contacts with other tissue.
     pub fn reserve_pressed(&mut self) -> Result<()> {
-        if self.implicit.is_none() {
+        if self.integrator.solution().is_none() {
             return self.reserve_early();
         }
         let none = [self.zeros()?, self.zeros()?];
-        if let Some(implicit) = &mut self.implicit {
-            implicit.solution.add_pressed(none);
+        if let Some(solution) = self.integrator.solution_mut() {
+            solution.add_pressed(none);
         }
         Ok(())
     }
 
     /// Takes from an implicit body again what an equation took to press it, before contacts give what they have to.
     pub fn release_pressed(&mut self, duration: f32) {
-        let Some(implicit) = &mut self.implicit else {
+        let Some(solution) = self.integrator.solution_mut() else {
             return;
         };
         let state = self.state.substep();
         let rates = self.damping.as_ref().map(|damping| damping.rates());
-        implicit
-            .solution
-            .release_pressed(&self.inverse_masses, rates, |node, given| {
-                state.velocities.set(node, state.velocities.get(node) - given);
-                let place = state.next_positions.get(node) - given * duration;
-                state.next_positions.set(node, place);
-            });
+        solution.release_pressed(&self.inverse_masses, rates, |node, given| {
+            state.velocities.set(node, state.velocities.get(node) - given);
+            let place = state.next_positions.get(node) - given * duration;
+            state.next_positions.set(node, place);
+        });
     }
 
     /// Has the next equation of an implicit body know what a contact gave to a node, N s.
     pub fn press(&mut self, node: u32, impulse: Vec3) {
         let free = self.answer_of(node).cmpgt(Vec3::ZERO);
-        if let Some(implicit) = &mut self.implicit {
+        if let Some(solution) = self.integrator.solution_mut() {
             let impulse = Vec3::select(free, impulse, Vec3::ZERO);
             let rates = self.damping.as_ref().map(|damping| damping.rates());
-            implicit.solution.press(node as usize, impulse, rates);
+            solution.press(node as usize, impulse, rates);
         }
     }
 
@@ -219,8 +214,8 @@ impl System {
         let next_positions = self.state.substep().next_positions;
         let place = next_positions.get(node) + way;
         next_positions.set(node, place);
-        if let Some(implicit) = &mut self.implicit {
-            implicit.solution.part();
+        if let Some(solution) = self.integrator.solution_mut() {
+            solution.part();
         }
     }
 }

@@ -17,7 +17,7 @@ use super::pipeline::{self, DEEPEST, Plan};
 use super::sleep::Sleeper;
 use super::slow_down::{keep_energy, slow_down};
 use super::stability::Stability;
-use super::step_request::{Carry, StepRequest};
+use super::step_request::{Carry, StepRequest, StepStart};
 use super::substep::{Part, VelocityTime, kick_and_drift};
 use crate::base::{Stage, Stopwatch};
 use crate::contact::{Contacts, Meeting};
@@ -35,32 +35,30 @@ pub(crate) struct TooLong {
 /// A step that was taken, and is not current yet.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StepResult {
+    pub start: StepStart,
     /// What it carries on to the next.
     pub carry: Carry,
     /// Whether its positions and velocities are finite.
     pub finite: bool,
 }
 
-/// Takes the step with exactly `substeps` substeps, with masses made for substeps of `masses_for` seconds; 0: as they are. After `middle` of them a world with a tolerance looks at it.
+/// Takes the step with exactly so many substeps, with masses made for substeps of `masses_for` seconds; 0: as they are.
 pub(super) fn run(
     body: &mut System,
     request: &StepRequest,
-    substeps: u32,
-    middle: u32,
-    start: Carry,
+    start: StepStart,
     masses_for: f32,
     team: &Team,
 ) -> Result<StepResult, TooLong> {
-    let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
-    if masses_for == 0.0 {
-        check(&start.stability, substep)?;
-    }
     let mut step = Step {
-        middle,
-        ..Step::of(request, substeps, masses_for, team)
+        middle: start.middle,
+        ..Step::of(request, start.substeps, masses_for, team)
     };
+    if masses_for == 0.0 {
+        check(&start.carry.stability, step.substep)?;
+    }
     // What must be known between substeps cannot be known in a pipeline.
-    if substeps > 2 && may_stay_open(body) && !body.is_grasped() && !body.sleeps() {
+    if start.substeps > 2 && may_stay_open(body) && !body.is_grasped() && !body.sleeps() {
         step.pipeline = Plan::of(&*body.forces.springs, body.node_count());
     }
     if let Some(taken) = step.take(body, start)? {
@@ -70,7 +68,7 @@ pub(super) fn run(
     Ok(step.take(body, start)?.expect("only a pipeline goes too far"))
 }
 
-pub(crate) fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
+pub(super) fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
     match stability.limit() {
         Some(stable_substep) if substep > stable_substep => Err(TooLong { stable_substep }),
         _ => Ok(()),
@@ -78,7 +76,7 @@ pub(crate) fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> 
 }
 
 /// The same for elements, terms and what is enclosed, as they were deformed where forces were last worked out.
-pub(crate) fn check_beside_springs(body: &System, substep: f32) -> Result<(), TooLong> {
+pub(super) fn check_beside_springs(body: &System, substep: f32) -> Result<(), TooLong> {
     let stable_substep = body.forces.newest_limit_beside_springs();
     if substep <= stable_substep {
         Ok(())
@@ -88,7 +86,7 @@ pub(crate) fn check_beside_springs(body: &System, substep: f32) -> Result<(), To
 }
 
 /// A step to be taken.
-pub(crate) struct Step<'a> {
+pub(super) struct Step<'a> {
     request: &'a StepRequest<'a>,
     substeps: u32,
     /// s
@@ -115,7 +113,7 @@ impl<'a> Step<'a> {
     }
 
     /// Takes it; `None`: in a pipeline the body has moved further than is known to be stable.
-    fn take(&self, body: &mut System, start: Carry) -> Result<Option<StepResult>, TooLong> {
+    fn take(&self, body: &mut System, start: StepStart) -> Result<Option<StepResult>, TooLong> {
         let Self {
             request,
             substep,
@@ -123,7 +121,7 @@ impl<'a> Step<'a> {
             team,
             ..
         } = *self;
-        let mut carry = start;
+        let mut carry = start.carry;
         let mut finite = true;
         begin(body, request);
         carry.energy.share(0);
@@ -151,7 +149,7 @@ impl<'a> Step<'a> {
             };
             for (index, part) in (index..).zip(&mut parts[..depth]) {
                 if index > 0 {
-                    part.go_on(carry.gravity.next(request.gravity.as_dvec3() * f64::from(substep)));
+                    part.go_on(request.gravity, &mut carry.gravity);
                 }
                 part.last = may_stay_open && index + 1 == substeps;
                 part.start = f64::from(index) / f64::from(substeps);
@@ -194,15 +192,7 @@ impl<'a> Step<'a> {
             {
                 coarse.pass_middle(body.state.newest().0);
             }
-            let velocities = carry.gravity.velocities;
-            if !self.is_stable_after(&mut carry.stability, &velocities) {
-                carry.stability = carry
-                    .stability
-                    .for_short(substep)
-                    .unwrap_or_else(|| body.estimate(body.state.newest().0));
-                check(&carry.stability, substep)?;
-            }
-            check_beside_springs(body, substep)?;
+            self.check_after(body, &mut carry)?;
         }
         let sums = account.compares.then(|| TileSums::of_open(body, &part, team));
         // What a tool touches is closed with it.
@@ -212,11 +202,7 @@ impl<'a> Step<'a> {
                 gravity: request.gravity,
             });
         } else {
-            part.close(
-                carry
-                    .gravity
-                    .next(request.gravity.as_dvec3() * f64::from(0.5 * substep)),
-            );
+            part.close(request.gravity, &mut carry.gravity);
             finite = pass(body, request, &part, &mut carry, team);
             check_beside_springs(body, substep)?;
         }
@@ -224,12 +210,23 @@ impl<'a> Step<'a> {
             let excess = carry.energy.compare(&found);
             carry.energy.refine(slow_down(body, excess, false));
         }
-        Ok(Some(StepResult { carry, finite }))
+        Ok(Some(StepResult { start, carry, finite }))
+    }
+
+    /// Refuses to go on where the substep that was just taken has led the nodes to where longer ones are stable no more.
+    pub fn check_after(&self, body: &System, carry: &mut Carry) -> Result<(), TooLong> {
+        let substep = self.substep;
+        if !self.is_stable_after(&mut carry.stability, &{ carry.gravity.velocities }) {
+            let known = carry.stability.for_short(substep);
+            carry.stability = known.unwrap_or_else(|| body.estimate(body.state.newest().0));
+            check(&carry.stability, substep)?;
+        }
+        check_beside_springs(body, substep)
     }
 
     /// Whether what is known of stability still holds after a substep with velocities in this box. Masses that were made for
     /// the substep are enough wherever nodes go.
-    pub fn is_stable_after(&self, stability: &mut Stability, velocities: &Bounds) -> bool {
+    fn is_stable_after(&self, stability: &mut Stability, velocities: &Bounds) -> bool {
         self.masses_for > 0.0 || stability.holds_after(self.substep * diagonal(velocities))
     }
 
@@ -312,7 +309,7 @@ fn diagonal(velocities: &Bounds) -> f32 {
 }
 
 /// Takes one part of the step; whether what it leads to is finite, where it was looked at.
-pub(crate) fn pass(body: &mut System, request: &StepRequest, part: &Part, carry: &mut Carry, team: &Team) -> bool {
+pub(super) fn pass(body: &mut System, request: &StepRequest, part: &Part, carry: &mut Carry, team: &Team) -> bool {
     if part.drifts {
         body.lead_grasps(request.tools, [part.start, part.end]);
     }
@@ -339,7 +336,7 @@ pub(crate) fn pass(body: &mut System, request: &StepRequest, part: &Part, carry:
 }
 
 /// Starts the step over, from what is current.
-pub(crate) fn begin(body: &mut System, request: &StepRequest) {
+pub(super) fn begin(body: &mut System, request: &StepRequest) {
     body.state.begin();
     body.show_late();
     body.forces.recall();

@@ -5,32 +5,13 @@
 
 use super::Tissue;
 use crate::solver::{
-    Account, Carry, Energies, EnergyAccount, Outcome, Part, RESERVE, Span, Step, StepRequest, StepResult, System,
-    Systems, TileSums, TooLong, begin, begin_parts, check, check_beside_springs, end_part, finish, needed, next_part,
-    parts_near, pass, relieve_squeezed, slow_down, substeps_needed,
+    Account, CoupledBody, CoupledStep, Energies, EnergyAccount, Outcome, RESERVE, Span, StepRequest, StepResult,
+    StepStart, System, Systems, TooLong, finish, relieve_squeezed, slow_down, substeps_needed,
 };
 use crate::threads::Team;
 
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
 const ATTEMPTS: u32 = 6;
-
-/// The energy that a solved equation has gained is taken off where there are so many, rather than that the step is taken in more.
-const PARTS: u32 = 256;
-
-/// A body on its way through a step.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct CoupledBody {
-    start: Carry,
-    masses_for: f32,
-    carry: Carry,
-    part: Part,
-    /// Of the open velocities, where the step ends with a comparison of energies.
-    sums: Option<TileSums>,
-    /// What can be taken off its motion, J.
-    own: f64,
-    /// In how many substeps it would go by itself.
-    wanted: u32,
-}
 
 /// The bodies that go together, in islands, as `tissue` tells; `walks` has a place for each body.
 pub(crate) struct CoupledGroup<'a> {
@@ -59,7 +40,7 @@ impl CoupledGroup<'_> {
 
     fn attempt_island(&mut self, island: usize, bodies: &mut impl Systems, outcomes: &mut [Option<Outcome>]) {
         let request = self.request;
-        let [mut substeps, needed] = self.set_out(island, bodies, outcomes);
+        let [mut substeps, needed] = self.set_out(island, bodies);
         if substeps == 0 {
             return;
         }
@@ -115,10 +96,11 @@ impl CoupledGroup<'_> {
             };
             outcomes[place] = Some(if is_taken {
                 let taken = StepResult {
+                    start: StepStart::new(walk.start, substeps),
                     carry: walk.carry,
                     finite: body.state.newest_is_finite(),
                 };
-                finish(body, substeps, taken, 0.0)
+                finish(body, &taken, 0.0)
             } else {
                 // What limits all is told of the body that asked for most.
                 let limits = Some(walk.wanted) == most_wanted;
@@ -156,7 +138,7 @@ impl CoupledGroup<'_> {
             let account = Account::new(body, &walk.carry, request, substeps);
             let energies = account.settle(body, &mut walk.carry, walk.sums, team);
             walk.carry.energy.gain(std::mem::take(&mut work));
-            if of_bonds.is_none() || !body.is_explicit() {
+            if of_bonds.is_none() || !body.integrator.takes_half_kicks() {
                 walk.carry.energy.forget();
             }
             if let Some(energies) = energies {
@@ -186,7 +168,7 @@ impl CoupledGroup<'_> {
     }
 
     /// Makes a way for each body of an island: in how many substeps, 0: it has none, and how many of them VERLET needs.
-    fn set_out(&mut self, island: usize, bodies: &mut impl Systems, outcomes: &[Option<Outcome>]) -> [u32; 2] {
+    fn set_out(&mut self, island: usize, bodies: &mut impl Systems) -> [u32; 2] {
         let [mut substeps, mut needed] = [0; 2];
         let group = match self.tissue.islands.members(island) {
             [_] => 0,
@@ -198,12 +180,12 @@ impl CoupledGroup<'_> {
             let place = place as usize;
             if let Some(body) = bodies.at_mut(place) {
                 let request = &self.request.of(body);
-                let (begun, wanted) = CoupledBody::of(body, request, group, self.team);
-                substeps = substeps.max(wanted);
-                if body.is_explicit() {
-                    needed = needed.max(wanted);
+                let begun = CoupledBody::of(body, request, group, self.team);
+                substeps = substeps.max(begun.wanted);
+                if body.integrator.is_limited_by_stability() {
+                    needed = needed.max(begun.wanted);
                 }
-                body.begin_attempt(outcomes[place].is_some());
+                body.integrator.put_back();
                 self.walks[place] = Some(begun);
             }
         }
@@ -239,33 +221,25 @@ impl CoupledGroup<'_> {
             request,
             team,
         } = self;
-        let (request, team) = (*request, *team);
+        let members = tissue.islands.members(island);
         let request = &StepRequest {
             neighbor_speed: Some(tissue.fastest(island, bodies, request.gravity, request.dt)),
-            ..*request
+            ..**request
         };
-        let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
-        let compares = compares(tissue.islands.members(island), walks, bodies, request, substeps);
+        let step = &CoupledStep {
+            request,
+            substeps,
+            compares: compares(members, walks, bodies, request, substeps),
+            is_last,
+            team,
+        };
         tissue.bonds.begin(request.dt);
-        each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
-            let request = &request.of(body);
+        each(bodies, walks, members, |_, body, walk| {
             (walk.carry, walk.sums) = (walk.start, None);
-            if !body.is_explicit() {
-                begin_parts(body, request, substeps);
-                return Ok(());
-            }
-            if walk.masses_for == 0.0 {
-                check(&walk.start.stability, substep)?;
-            }
-            begin(body, request);
-            walk.part = Step::of(request, substeps, walk.masses_for, team).opening(body, &mut walk.carry);
-            if let Some(damping) = &mut body.damping {
-                damping.prepare(substep);
-            }
-            Ok(())
+            body.lend(|integrator, body| integrator.begin(body, walk, step))
         })?;
         let mut moment = Span {
-            duration: substep,
+            duration: step.substep(),
             drifts: true,
             begins: true,
             profile: request.profile,
@@ -274,45 +248,12 @@ impl CoupledGroup<'_> {
             moment.begins = index == 0;
             tissue.bonds.load(bodies);
             each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
-                let request = &request.of(body).weighed(body);
-                if !body.is_explicit() {
-                    // There may be no more parts to try it in.
-                    let is_last = is_last || substeps >= PARTS;
-                    let is_fine = next_part(body, request, [index, substeps], is_last, team);
-                    let shorter = TooLong {
-                        stable_substep: 0.25 * substep,
-                    };
-                    return if is_fine { Ok(()) } else { Err(shorter) };
-                }
-                if index > 0 {
-                    walk.part
-                        .go_on(walk.carry.gravity.next(request.gravity.as_dvec3() * f64::from(substep)));
-                }
-                walk.part.start = f64::from(index) / f64::from(substeps);
-                walk.part.end = f64::from(index + 1) / f64::from(substeps);
-                if compares && index + 1 == substeps {
-                    Account::keep_velocities(body, &walk.part);
-                }
-                pass(body, request, &walk.part, &mut walk.carry, team);
-                Ok(())
+                body.lend(|integrator, body| integrator.substep(body, walk, step, index))
             })?;
             tissue.meet(island, bodies, &moment);
             each(bodies, walks, tissue.islands.members(island), |place, body, walk| {
-                if !body.is_explicit() {
-                    end_part(body);
-                    return Ok(());
-                }
-                body.forces.age(f64::from(substep), body.state.next_positions(), team);
-                body.state.advance();
                 let velocities = tissue.velocities(place, walk.carry.gravity.velocities);
-                walk.carry.gravity.velocities = velocities;
-                let step = Step::of(request, substeps, walk.masses_for, team);
-                if !step.is_stable_after(&mut walk.carry.stability, &velocities) {
-                    let known = walk.carry.stability.for_short(substep);
-                    walk.carry.stability = known.unwrap_or_else(|| body.estimate(body.state.newest().0));
-                    check(&walk.carry.stability, substep)?;
-                }
-                check_beside_springs(body, substep)
+                body.lend(|integrator, body| integrator.end(body, walk, step, velocities))
             })?;
             if request.substeps == 0 && !is_last {
                 // What meets in this step was not known as it began.
@@ -325,55 +266,18 @@ impl CoupledGroup<'_> {
                 }
             }
         }
-        if compares {
-            each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
-                walk.sums = Some(TileSums::of_open(body, &walk.part, team));
-                Ok(())
-            })?;
-        }
         tissue.show_early(bodies);
         moment.drifts = false;
         moment.begins = false;
         tissue.bonds.load(bodies);
         each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
-            if !body.is_explicit() {
-                return Ok(());
-            }
-            let request = &request.of(body).weighed(body);
-            let fall = request.gravity.as_dvec3() * f64::from(0.5 * substep);
-            walk.part.close(walk.carry.gravity.next(fall));
-            pass(body, request, &walk.part, &mut walk.carry, team);
-            check_beside_springs(body, substep)
+            body.lend(|integrator, body| integrator.close(body, walk, step))
         })?;
         tissue.meet(island, bodies, &moment);
         each(bodies, walks, tissue.islands.members(island), |_, body, _| {
             body.feel_what_grasps_handed_on(request.tools);
             Ok(())
         })
-    }
-}
-
-impl CoupledBody {
-    /// A body's way through a step that is to begin, and how many substeps it wants by itself.
-    fn of(body: &mut System, request: &StepRequest, group: u64, team: &Team) -> (Self, u32) {
-        let (mut start, masses_for, substeps) = if body.is_explicit() {
-            let need = needed(body, request, team);
-            (need.start, need.masses_for, need.substeps)
-        } else {
-            let parts = parts_near(request.dt).max(request.substeps);
-            (body.carry, 0.0, parts)
-        };
-        start.energy.share(group);
-        let walk = Self {
-            start,
-            masses_for,
-            carry: start,
-            part: Part::opening(0.0),
-            sums: None,
-            own: 0.0,
-            wanted: substeps,
-        };
-        (walk, substeps)
     }
 }
 
@@ -394,7 +298,7 @@ fn compares(
     for &place in members {
         if let (Some(walk), Some(body)) = (&walks[place as usize], bodies.at(place as usize)) {
             let account = Account::new(body, &walk.start, request, substeps);
-            if !account.watches || !body.is_explicit() {
+            if !account.watches || !body.integrator.takes_half_kicks() {
                 return false;
             }
             is_due |= account.compares;

@@ -34,7 +34,7 @@ use self::entangled::Entangled;
 use self::groups::Groups;
 use self::islands::Islands;
 use self::link::Link;
-pub(crate) use self::lockstep::{CoupledBody, CoupledGroup};
+pub(crate) use self::lockstep::CoupledGroup;
 use self::pairs::Pairs;
 pub(crate) use self::skin::Skin;
 use self::touches::Touches;
@@ -234,10 +234,11 @@ impl Tissue {
         }
         // What closes a step is half a kick, of VERLET alone.
         if !moment.drifts {
-            self.touches
-                .note(&self.links, self.duration, |places| !any_is_explicit(bodies, places));
+            self.touches.note(&self.links, self.duration, |places| {
+                !any_takes_half_kicks(bodies, places)
+            });
             let members = self.islands.members(island).iter();
-            if !any_is_explicit(bodies, members.map(|&place| place as usize)) {
+            if !any_takes_half_kicks(bodies, members.map(|&place| place as usize)) {
                 return;
             }
         } else if moment.begins {
@@ -262,7 +263,7 @@ impl Tissue {
         self.stop_what_meets(island, bodies, moment);
         if !moment.drifts {
             self.touches.note(&self.links, 0.5 * self.duration, |places| {
-                any_is_explicit(bodies, places)
+                any_takes_half_kicks(bodies, places)
             });
         }
         watch.stop(moment.profile, Stage::ContactSolver);
@@ -325,10 +326,10 @@ impl Tissue {
     pub fn show_early(&self, bodies: &mut impl Systems) {
         for link in self.links.iter().filter(|link| link.presses()) {
             let places = link.sides.map(|side| side.body);
-            let are_explicit = places.map(|place| is_explicit(bodies, place));
+            let take_half_kicks = places.map(|place| takes_half_kicks(bodies, place));
             for index in 0..2 {
-                if are_explicit[index]
-                    && !are_explicit[1 - index]
+                if take_half_kicks[index]
+                    && !take_half_kicks[1 - index]
                     && let Some(body) = bodies.at_mut(places[index])
                 {
                     body.show_early();
@@ -457,13 +458,13 @@ impl Tissue {
 }
 
 /// Whether the body at this place takes half kicks.
-fn is_explicit(bodies: &impl Systems, place: usize) -> bool {
-    bodies.at(place).is_none_or(System::is_explicit)
+fn takes_half_kicks(bodies: &impl Systems, place: usize) -> bool {
+    bodies.at(place).is_none_or(|body| body.integrator.takes_half_kicks())
 }
 
 /// Whether one of the bodies at these places does.
-fn any_is_explicit(bodies: &impl Systems, places: impl IntoIterator<Item = usize>) -> bool {
-    places.into_iter().any(|place| is_explicit(bodies, place))
+fn any_takes_half_kicks(bodies: &impl Systems, places: impl IntoIterator<Item = usize>) -> bool {
+    places.into_iter().any(|place| takes_half_kicks(bodies, place))
 }
 
 /// Does something with each of these bodies that tools press, or may press as tissue moves it, its skin and its contacts with tools.

@@ -5,8 +5,8 @@ use glam::{DVec3, FloatExt, Vec3};
 use super::Tissue;
 use super::islands::Reach;
 use super::link::Key;
+use super::meet_each_other;
 use super::skin::Skin;
-use super::{is_explicit, meet_each_other};
 use crate::geometry::Bounds;
 use crate::nodes::parts;
 use crate::solver::{System, Systems};
@@ -139,7 +139,8 @@ impl Tissue {
         pressing: impl Iterator<Item = (Key, f32, f32)>,
     ) -> u32 {
         let members = self.islands.members(island);
-        if members.iter().all(|&place| is_explicit(bodies, place as usize)) {
+        let solution = |&place: &u32| bodies.at(place as usize)?.integrator.solution();
+        if members.iter().find_map(solution).is_none() {
             return 0;
         }
         let rates = pressing.filter_map(|(sides, impulse, fresh)| {

@@ -159,22 +159,18 @@ impl World {
 
     /// Steps by `dt` seconds with so much work.
     pub(super) fn step_of(&mut self, dt: f32, work: u32) -> Result<StepReport> {
-        self.allow(work);
-        let result = self.step(dt);
-        self.allow(u32::MAX);
-        result
-    }
-
-    fn allow(&mut self, work: u32) {
         self.work = work;
-        for (_, body) in self.bodies.iter_mut() {
-            body.system_mut().allow(work);
-        }
+        let result = self.step(dt);
+        self.work = u32::MAX;
+        result
     }
 
     /// The longest explicit substep that is known to be stable and to keep the energy, s; infinity where nothing is known.
     fn known_substep(&self) -> f32 {
-        let explicit = self.bodies.iter().filter(|(_, body)| body.system().is_explicit());
+        let explicit = self
+            .bodies
+            .iter()
+            .filter(|(_, body)| body.system().integrator.is_limited_by_stability());
         let known = explicit.filter_map(|(_, body)| {
             let system = body.system();
             Some(system.carry.limit_by_energy(system.newest_limit(&system.carry)?))

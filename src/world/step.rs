@@ -131,6 +131,7 @@ impl World {
             gravity: definition.gravity,
             substeps: definition.substeps,
             max_substeps: definition.max_substeps.min(*work),
+            work: *work,
             relieves: *work == u32::MAX,
             // Fixed substeps are taken as they are.
             tolerance: if definition.substeps == 0 {
@@ -202,7 +203,7 @@ impl World {
         let (id, body, stable_substep, error) = failed.min_by(|one, other| one.2.total_cmp(&other.2))?;
         let of = if error > 0.0 {
             SubstepLimit::of_all(LimitKind::Tolerance)
-        } else if !body.system().is_explicit() {
+        } else if !body.system().integrator.is_limited_by_stability() {
             SubstepLimit::of_all(LimitKind::Parts)
         } else {
             body.substep_limit()

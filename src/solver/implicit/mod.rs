@@ -14,6 +14,7 @@ mod contact;
 mod energy;
 mod estimate;
 mod gradient;
+mod integrator;
 mod iterations;
 mod loops;
 mod parts;
@@ -22,22 +23,19 @@ mod rigid;
 mod solution;
 mod step;
 
-pub(super) use parts::run;
-pub(crate) use parts::{begin_parts, end_part, next_part, parts_near};
+pub(crate) use solution::Solution;
 
-use crate::base::{Result, StateHasher, memory};
+use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, MOST_ITERATIONS, Solver, SolverReport};
 use crate::forces::{Changes, Forces};
 use crate::soa::{Vectors, tile_count};
-use crate::solver::changed::Cached;
 use crate::solver::newton::Newton;
 use blocks::{Blocks, Noise};
 use coarse::Coarse;
 use estimate::Spectrum;
 use gradient::Partial;
-use pressed::Pressed;
-use solution::{History, Solution};
+use solution::History;
 use step::Formula;
 
 /// What rounding makes of a coordinate, as a fraction of the body's extent.
@@ -79,7 +77,7 @@ pub(crate) struct Implicit {
     allowed: u32,
     /// The part of a step's correction that may be missing.
     accuracy: f32,
-    pub solution: Solution,
+    solution: Solution,
     /// How the last equation that was solved makes velocities of what forces do.
     taken: Formula,
     /// s: what forces do within the step, m.
@@ -91,8 +89,8 @@ pub(crate) struct Implicit {
     corrections: Vectors,
     residuals: Vectors,
     searches: Vectors,
-    /// What forces make of the search direction.
-    pub changes: Changes,
+    /// What forces make of the search direction: lent by the body while its equation is solved.
+    changes: Changes,
     /// The matrix times the search direction, and what the preconditioner makes of the residual.
     products: Vectors,
     preconditioned: Vectors,
@@ -114,22 +112,24 @@ pub(crate) struct Implicit {
     spectrum: Spectrum,
     /// Whether the preconditioner is to be made again, from the current state: then what it is now means nothing.
     stale: bool,
-    /// Whether that was so when the step in progress began.
+    /// Whether that was so before the step in progress.
     was_stale: bool,
     /// That of the step in progress, and that of the current state.
     memory: Experience,
     kept: Experience,
     /// Where the equations are solved exactly.
-    newton: Option<Newton>,
+    newton: Option<Box<Newton>>,
+    /// The same with room for a cut that is not made yet.
+    roomier: Option<Box<Newton>>,
     /// How the step in progress is taken, and how that was which led to the current state.
     report: SolverReport,
-    pub told: SolverReport,
+    told: SolverReport,
 }
 
 saved! { Implicit {
-    order, budget, left, accuracy, solution, taken, pushes, means, corrections, residuals, searches, changes, products,
+    order, budget, left, accuracy, solution, taken, pushes, means, corrections, residuals, searches, products,
     preconditioned, inertia, all_inertia, noise, prepared, blocks, coarse, stiffened, loads, partials, spectrum, stale,
-    was_stale, memory, kept, newton, report, told } leaves { allowed: u32::MAX,
+    was_stale, memory, kept, newton, report, told } leaves { allowed: u32::MAX, changes: Changes::default(), roomier: None,
 } where Self::ends }
 
 impl Experience {
@@ -146,28 +146,30 @@ impl Implicit {
         self.budget <= MOST_ITERATIONS
     }
 
-    /// For nodes at these positions that these forces move, where a definition asks for it; what is 0 there is as by default.
-    pub fn new(definition: &BodyDefinition, positions: &Vectors, forces: &Forces) -> Result<Option<Box<Self>>> {
+    /// For nodes at these positions that these forces move; what is 0 in the definition is as by default.
+    pub fn new(definition: &BodyDefinition, positions: &Vectors, forces: &mut Forces) -> Result<Self> {
         let node_count = positions.len();
         let is_exact = definition.solver == Solver::Newton;
-        let (accuracy, budget) = match definition.solver {
-            Solver::Verlet | Solver::Auto => return Ok(None),
+        let (accuracy, budget) = if is_exact {
+            // As good as nothing, and far above what rounding makes; for bodies of a million nodes.
+            (1e-6, 100_000)
+        } else {
             // A fraction of what a step of a length worth taking is off by itself, and more products than a body can need that is to be
             // stepped while somebody waits.
-            Solver::Implicit => (0.01, 1000),
-            // As good as nothing, and far above what rounding makes; for bodies of a million nodes.
-            Solver::Newton => (1e-6, 100_000),
+            (0.01, 1000)
         };
         let nothing = Vectors::zeros(0)?;
         let solved = if is_exact { &nothing } else { positions };
-        let newton = is_exact.then(|| Newton::new(forces)).transpose()?;
-        let changes = (!is_exact).then(|| forces.room_for_changes()).transpose()?;
+        let newton = is_exact.then(|| memory::boxed(Newton::new(forces)?)).transpose()?;
+        if !is_exact {
+            forces.make_room_for_changes()?;
+        }
         let solved_count = solved.len();
         let vectors = || Vectors::zeros(solved_count);
         let coarse = Coarse::new(solved)?;
         let or = |given: u32, default| if given == 0 { default } else { given };
         let given = definition.accuracy;
-        let it = Self {
+        Ok(Self {
             order: or(definition.order, 2),
             budget: or(definition.iterations, budget),
             left: 0,
@@ -180,7 +182,7 @@ impl Implicit {
             corrections: vectors()?,
             residuals: vectors()?,
             searches: vectors()?,
-            changes: changes.unwrap_or_default(),
+            changes: Changes::default(),
             products: vectors()?,
             preconditioned: vectors()?,
             inertia: memory::filled(0.0, solved_count)?,
@@ -198,38 +200,10 @@ impl Implicit {
             memory: Experience::NONE,
             kept: Experience::NONE,
             newton,
+            roomier: None,
             report: SolverReport::BEFORE,
             told: SolverReport::default(),
-        };
-        Ok(Some(memory::boxed(it)?))
-    }
-
-    /// Makes room for so many nodes in all.
-    pub fn reserve_nodes(&mut self, count: usize) -> Result<()> {
-        self.vectors_mut().try_for_each(|vectors| vectors.reserve(count))?;
-        if self.newton.is_some() {
-            return Ok(());
-        }
-        memory::reserve(&mut self.inertia, count)?;
-        self.spectrum.reserve(count)?;
-        self.blocks.reserve(count)?;
-        self.coarse.reserve(count)?;
-        memory::reserve(&mut self.loads, self.coarse.size() * tile_count(count))?;
-        memory::reserve(&mut self.partials, tile_count(count))
-    }
-
-    /// Adds nodes, for which there is room, up to so many in all; NEWTON has been made roomier.
-    pub fn grow(&mut self, count: usize) {
-        self.vectors_mut().for_each(|vectors| vectors.grow(count));
-        self.prepared = 0.0;
-        if self.newton.is_some() {
-            return;
-        }
-        self.inertia.resize(count, 0.0);
-        self.blocks.grow(count);
-        self.coarse.grow(count);
-        self.loads.resize(self.coarse.size() * tile_count(count), 0.0);
-        self.partials.resize(tile_count(count), Partial::default());
+        })
     }
 
     /// What there is for each node: beside histories, pushes and means where its equation is solved by conjugate gradients.
@@ -248,68 +222,8 @@ impl Implicit {
         histories.chain([&mut self.pushes]).chain(&mut self.means).chain(solved)
     }
 
-    /// Has a new node go on as another does.
-    pub fn copy_motion(&mut self, source: usize, node: usize) {
-        let history = self.solution.current_mut();
-        for vectors in [&mut history.ways, &mut history.gains, &mut history.remainders] {
-            if node < vectors.len() {
-                vectors.set(node, vectors.get(source));
-            }
-        }
-        if let Some(newton) = &mut self.newton {
-            newton.copy_remainder(self.solution.settled, source, node);
-        }
-    }
-
-    /// Where the equations are solved exactly, what that needs with the nodes that these forces have, and so many springs more.
-    pub fn roomier(&self, forces: &Forces, more: usize) -> Result<Option<Newton>> {
-        let roomier = |newton: &Newton| newton.roomier(forces, more);
-        self.newton.as_ref().map(roomier).transpose()
-    }
-
-    /// Goes on with that.
-    pub fn adopt(&mut self, newton: Newton) {
-        self.newton = Some(newton);
-    }
-
-    /// Lets each step from now on take so many products at most; `u32::MAX`: as many as the definition allows.
-    pub fn allow(&mut self, products: u32) {
-        self.allowed = products;
-    }
-
-    /// Makes room for so many springs in all.
-    pub fn make_room(&mut self, spring_count: usize) -> Result<()> {
-        self.newton
-            .as_mut()
-            .map_or(Ok(()), |newton| newton.make_room(spring_count))
-    }
-
-    /// Makes room for so many contacts in an equation.
-    pub fn reserve_contacts(&mut self, count: usize) -> Result<()> {
-        if self.means.is_none() {
-            self.means = Some(Vectors::zeros(self.pushes.len())?);
-        }
-        // Up to four nodes move what a contact presses.
-        let nodes = (4 * count).min(self.inertia.len());
-        Ok(self.stiffened.try_reserve(nodes)?)
-    }
-
-    /// Makes what the step in progress leaves to the next that of the current state.
-    pub fn commit(&mut self) {
-        self.solution.settled = 1 - self.solution.settled;
-        self.told = self.report;
-        self.kept = self.memory;
-        self.kept.smallest = self.spectrum.known_smallest();
-        self.stale |= self.kept.worn;
-    }
-
-    /// Begins to attempt a step, which may be taken several times.
-    pub fn attempt(&mut self) {
-        self.was_stale = self.stale;
-    }
-
     /// Begins a step anew, from the current state.
-    fn begin(&mut self) {
+    fn begin_anew(&mut self) {
         (self.report.error, self.report.has_converged) = (0.0, true);
         self.memory = self.kept;
         self.spectrum.assume(self.kept.smallest);
@@ -325,11 +239,6 @@ impl Implicit {
         }
     }
 
-    /// The step in progress is not to be.
-    pub fn put_back(&mut self) {
-        self.stale = self.was_stale;
-    }
-
     /// Notes how many products a solution took.
     fn wear(&mut self, products: u32) {
         let fresh = &mut self.memory.fresh_products;
@@ -337,56 +246,6 @@ impl Implicit {
             *fresh = products;
         } else if products > 2 * *fresh + 8 {
             self.memory.worn = true;
-        }
-    }
-
-    /// What the next step depends on beside the state.
-    pub fn hash(&self, hasher: &mut StateHasher) {
-        let history = self.solution.current();
-        let History {
-            ways,
-            gains,
-            remainders,
-            step,
-            energy,
-            credit,
-            pressed: _,
-        } = history;
-        for vectors in [ways, gains, remainders] {
-            hasher.write_vectors(vectors.iter());
-        }
-        hasher.write_floats(&[*step, self.accuracy]);
-        let [energy, size] = energy.map_or([f64::NAN; 2], |total| [total.energy, total.size]);
-        hasher.write_doubles(&[energy, size, *credit]);
-        hasher.write_vectors(history.pressing().into_iter().flat_map(Vectors::iter));
-        hasher.write_u64(u64::from(self.order) << 32 | u64::from(self.budget));
-        if let Some(newton) = &self.newton {
-            newton.hash(self.solution.settled, hasher);
-        }
-        hasher.write_u64(u64::from(self.stale));
-        if !self.stale {
-            hasher.write_u64(self.kept.smallest.to_bits());
-            hasher.write_u64(u64::from(self.kept.fresh_products));
-            self.blocks.hash(hasher);
-            self.coarse.hash(hasher);
-        }
-    }
-
-    /// Forgets what a change has made invalid.
-    pub(in crate::solver) fn forget(&mut self, known: Cached) {
-        let history = self.solution.current_mut();
-        match known {
-            Cached::Energy | Cached::EquationEnergy => history.energy = None,
-            Cached::Matrix => self.stale = true,
-            Cached::History => {
-                (history.step, history.energy) = (0.0, None);
-                history.remainders.clear();
-                history.pressed.iter_mut().for_each(Pressed::forget);
-                if let Some(newton) = &mut self.newton {
-                    newton.forget_remainders(self.solution.settled);
-                }
-            }
-            _ => {}
         }
     }
 }

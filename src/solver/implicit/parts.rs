@@ -5,7 +5,8 @@ use super::{End, Implicit, contact};
 use crate::def::SolverReport;
 use crate::solver::System;
 use crate::solver::grasp::Lapse;
-use crate::solver::step_request::{Carry, StepRequest};
+use crate::solver::integrator::Stepped;
+use crate::solver::step_request::{StepRequest, StepStart};
 use crate::solver::verlet::{StepResult, TooLong, begin};
 use crate::threads::Team;
 
@@ -21,91 +22,90 @@ const SHARE: u32 = 32;
 /// Takes the step in `substeps` equal parts, each a solved equation. Where one ends with more energy than was put in, it was
 /// not solved; then the step is taken again in shorter parts, which are easier to solve, and in the end its motion is slowed
 /// down. How many parts were taken, and what came of them; refused is what is near something and would take more parts than a step may.
-pub(in crate::solver) fn run(
+pub(super) fn run(
     body: &mut System,
+    implicit: &mut Implicit,
     request: &StepRequest,
-    substeps: u32,
-    middle: u32,
-    start: Carry,
+    start: StepStart,
     team: &Team,
-) -> Result<(u32, StepResult), TooLong> {
-    let mut end = End::NotFinite;
+) -> Stepped<StepResult> {
+    let StepStart {
+        carry,
+        substeps,
+        middle,
+    } = start;
     let mut parts = 1;
-    if let Some(mut implicit) = body.implicit.take() {
-        implicit.report = SolverReport::BEFORE;
-        implicit.left = (implicit.budget.saturating_mul(request.substeps.max(1))).min(implicit.allowed);
-        let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
-            .ceil()
-            .max(1.0);
-        let short = short.min(f64::from(u32::MAX / 4 / substeps)) as u32;
-        let mut is_near = contact::is_near(body);
-        let is_long = contact::may_be_long(body, &implicit, request);
-        let is_bounded = implicit.is_bounded();
-        let parts_near = match (is_long, is_bounded) {
-            (false, _) => short,
-            (true, false) => 1,
-            // Half of the work for the parts, half for their products.
-            (true, true) => (implicit.allowed / (2 * contact::COST_OF_A_PART)).clamp(1, short),
-        };
-        if is_near {
-            parts = parts_near;
-        }
-        implicit.grant(substeps.saturating_mul(parts));
-        let (mut cuts, mut is_final) = (0, false);
-        loop {
-            if is_near && short > 1 && parts >= short && substeps * short > request.most_parts() {
-                body.implicit = Some(implicit);
-                return Err(TooLong {
-                    stable_substep: contact::LONGEST as f32,
-                });
-            }
-            let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
-            // What a small budget does not solve in so many parts it does not solve in more.
-            let is_spent = is_near && cuts > 0 && whole[0] / 4 > implicit.budget.min(implicit.allowed);
-            let is_last_resort = is_final || cuts == CUTS || whole[0].saturating_mul(4) > PARTS || is_spent;
-            let may_be_shorter = is_long && parts < short && contact::is_near(body);
-            let resorts = [is_last_resort, is_final || is_bounded && is_near];
-            end = run_in_parts(body, &mut implicit, request, whole, resorts, team);
-            match end {
-                End::Fine => break,
-                End::Near | End::Gained if is_final => break,
-                // A caller that bounds the work of a step has it taken twice, or more often where it would be refused else.
-                _ if is_bounded && !is_final => {
-                    is_final = true;
-                    is_near |= end == End::Near;
-                    parts = parts.max(parts_near);
-                    implicit.left = implicit.allowed;
-                    implicit.grant(substeps.saturating_mul(parts));
-                }
-                // Then there was nothing near before, and the equation knew of nothing.
-                End::Near if is_long && !is_near => is_near = true,
-                End::Near => {
-                    is_near = true;
-                    parts = if is_long {
-                        shorter(parts, short)
-                    } else {
-                        parts.max(short)
-                    };
-                    implicit.grant(substeps.saturating_mul(parts));
-                }
-                End::Gained | End::NotFinite if may_be_shorter => {
-                    parts = shorter(parts, short);
-                    implicit.grant_again(substeps.saturating_mul(parts));
-                }
-                End::Gained | End::NotFinite if is_last_resort => break,
-                End::Gained | End::NotFinite => {
-                    cuts += 1;
-                    parts = parts.saturating_mul(4);
-                }
-            }
-        }
-        body.implicit = Some(implicit);
-    }
-    let taken = StepResult {
-        carry: start,
-        finite: end == End::Fine,
+    implicit.report = SolverReport::BEFORE;
+    implicit.left = (implicit.budget.saturating_mul(request.substeps.max(1))).min(implicit.allowed);
+    let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
+        .ceil()
+        .max(1.0);
+    let short = short.min(f64::from(u32::MAX / 4 / substeps)) as u32;
+    let mut is_near = contact::is_near(body);
+    let is_long = contact::may_be_long(body, implicit, request);
+    let is_bounded = implicit.is_bounded();
+    let parts_near = match (is_long, is_bounded) {
+        (false, _) => short,
+        (true, false) => 1,
+        // Half of the work for the parts, half for their products.
+        (true, true) => (implicit.allowed / (2 * contact::COST_OF_A_PART)).clamp(1, short),
     };
-    Ok((substeps.saturating_mul(parts), taken))
+    if is_near {
+        parts = parts_near;
+    }
+    implicit.grant(substeps.saturating_mul(parts));
+    let (mut cuts, mut is_final) = (0, false);
+    let end = loop {
+        if is_near && short > 1 && parts >= short && substeps * short > request.most_parts() {
+            return Err(TooLong {
+                stable_substep: contact::LONGEST as f32,
+            });
+        }
+        let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
+        // What a small budget does not solve in so many parts it does not solve in more.
+        let is_spent = is_near && cuts > 0 && whole[0] / 4 > implicit.budget.min(implicit.allowed);
+        let is_last_resort = is_final || cuts == CUTS || whole[0].saturating_mul(4) > PARTS || is_spent;
+        let may_be_shorter = is_long && parts < short && contact::is_near(body);
+        let resorts = [is_last_resort, is_final || is_bounded && is_near];
+        let end = run_in_parts(body, implicit, request, whole, resorts, team);
+        match end {
+            End::Fine => break end,
+            End::Near | End::Gained if is_final => break end,
+            // A caller that bounds the work of a step has it taken twice, or more often where it would be refused else.
+            _ if is_bounded && !is_final => {
+                is_final = true;
+                is_near |= end == End::Near;
+                parts = parts.max(parts_near);
+                implicit.left = implicit.allowed;
+                implicit.grant(substeps.saturating_mul(parts));
+            }
+            // Then there was nothing near before, and the equation knew of nothing.
+            End::Near if is_long && !is_near => is_near = true,
+            End::Near => {
+                is_near = true;
+                parts = if is_long {
+                    shorter(parts, short)
+                } else {
+                    parts.max(short)
+                };
+                implicit.grant(substeps.saturating_mul(parts));
+            }
+            End::Gained | End::NotFinite if may_be_shorter => {
+                parts = shorter(parts, short);
+                implicit.grant_again(substeps.saturating_mul(parts));
+            }
+            End::Gained | End::NotFinite if is_last_resort => break end,
+            End::Gained | End::NotFinite => {
+                cuts += 1;
+                parts = parts.saturating_mul(4);
+            }
+        }
+    };
+    Ok(StepResult {
+        start: StepStart::new(carry, substeps.saturating_mul(parts)),
+        carry,
+        finite: end == End::Fine,
+    })
 }
 
 /// In how many parts a step is tried near tools that was not solved in so many, and that may be taken in `short`.
@@ -116,7 +116,7 @@ fn shorter(parts: u32, short: u32) -> u32 {
 
 impl Implicit {
     /// Lets a step of so many parts have its share for each.
-    fn grant(&mut self, parts: u32) {
+    pub(super) fn grant(&mut self, parts: u32) {
         let share = (self.budget.min(self.allowed) / SHARE).max(1);
         self.left = self.left.max(share.saturating_mul(parts));
     }
@@ -137,7 +137,7 @@ fn run_in_parts(
     team: &Team,
 ) -> End {
     begin(body, request);
-    implicit.begin();
+    implicit.begin_anew();
     for index in 0..substeps {
         let end = take_part(body, implicit, request, [index, substeps], resorts, team);
         if end != End::Fine {
@@ -154,7 +154,7 @@ fn run_in_parts(
 }
 
 /// Takes one of equal parts of a step, up to where it becomes current.
-fn take_part(
+pub(super) fn take_part(
     body: &mut System,
     implicit: &mut Implicit,
     request: &StepRequest,
@@ -202,44 +202,8 @@ fn take_part(
 }
 
 /// In how many parts a step near a tool or other tissue is to be taken at least.
-pub(crate) fn parts_near(dt: f32) -> u32 {
+pub(super) fn parts_near(dt: f32) -> u32 {
     (f64::from(dt) / contact::LONGEST)
         .ceil()
         .clamp(1.0, f64::from(u32::MAX / 4)) as u32
-}
-
-/// Begins a step of so many parts that are taken one by one.
-pub(crate) fn begin_parts(body: &mut System, request: &StepRequest, parts: u32) {
-    begin(body, request);
-    if let Some(implicit) = &mut body.implicit {
-        implicit.report = SolverReport::BEFORE;
-        implicit.left = implicit.budget.min(implicit.allowed);
-        implicit.grant(parts);
-        implicit.begin();
-    }
-}
-
-/// Takes one of equal parts of such a step, up to where it becomes current: whether it gained no energy, or as a last resort was slowed
-/// down.
-pub(crate) fn next_part(
-    body: &mut System,
-    request: &StepRequest,
-    part_of: [u32; 2],
-    is_last_resort: bool,
-    team: &Team,
-) -> bool {
-    let Some(mut implicit) = body.implicit.take() else {
-        return true;
-    };
-    let end = take_part(body, &mut implicit, request, part_of, [is_last_resort, false], team);
-    body.implicit = Some(implicit);
-    end == End::Fine
-}
-
-/// Ends such a part, after which other tissue may have changed where it led.
-pub(crate) fn end_part(body: &mut System) {
-    if let Some(implicit) = &mut body.implicit {
-        implicit.solution.settle_deflection();
-    }
-    body.state.advance();
 }

@@ -108,6 +108,7 @@ impl Solution {
         &self.histories[self.place(is_first)]
     }
 
+    /// Which of them that is.
     pub(super) fn place(&self, is_first: bool) -> usize {
         if is_first { self.settled } else { 1 - self.settled }
     }

@@ -132,7 +132,10 @@ impl Substep<'_> {
         } else {
             self.prepare(body, implicit);
             self.aim(body, implicit);
-            if !self.minimise(body, implicit) {
+            implicit.changes = std::mem::take(&mut body.forces.changes);
+            let is_finite = self.minimise(body, implicit);
+            body.forces.changes = std::mem::take(&mut implicit.changes);
+            if !is_finite {
                 return End::NotFinite;
             }
         }

@@ -45,8 +45,8 @@ impl Bonds {
             }
         }
         for bond in &mut self.bonds {
-            let has_equation = |corner: BondCorner| bodies.at(corner.body).is_some_and(|body| !body.is_explicit());
-            bond.has_equation = bond.used().any(has_equation);
+            let solution = |corner: BondCorner| bodies.at(corner.body)?.integrator.solution();
+            bond.has_equation = bond.used().any(|corner| solution(corner).is_some());
             bond.is_in_turn = bond.used().all(|corner| is_of_group(corner.body));
         }
     }
