@@ -113,7 +113,7 @@ fn change(body: &mut Body, bound: &[Bound], change: &SurfaceChange) {
         .resize(body.node_count() + new.len())
         .expect("memory");
     body.system.rewire(&Rewiring::default(), 0).expect("memory");
-    body.add_nodes(&new).expect("room");
+    body.add_nodes(&new);
     body.change_surface(change);
 }
 

@@ -224,7 +224,7 @@ impl Body {
             at_pieces.extend(of_pieces.chain(changing.iter().copied()));
             memory::sort_once(&mut at_pieces);
         }
-        self.system.prepare_parts(&parts, known + nodes.len())?;
+        self.system.forces.prepare_parts(&parts, known + nodes.len())?;
         if let Some(tears) = &mut self.tears {
             tears.reserve(changes.springs.len().max(rewiring.added.len()))?;
         }
@@ -242,8 +242,8 @@ impl Body {
         }
         // Damping is to be that of masses as they are.
         self.system.scale_masses(0.0);
-        self.add_nodes(&nodes)?;
-        self.system.take_parts(&parts, known + nodes.len());
+        self.add_nodes(&nodes);
+        self.system.forces.take_parts(&parts, known + nodes.len());
         if let Some(tears) = &mut self.tears {
             tears.grow(known + nodes.len());
             tears.follow(changes, &rewiring, &self.system.order);

@@ -239,7 +239,8 @@ impl Body {
             rest_length,
             damping: 0.0,
         };
-        self.system.reserve_spring()?;
+        let springs = self.system.forces.springs.spring_count() + 1;
+        self.system.integrator.reserve_springs(springs)?;
         if let Some(cuttable) = &mut self.cuttable {
             cuttable.reserve_spring([a, b], &self.system.order)?;
         }

@@ -163,14 +163,13 @@ impl Body {
     pub(super) fn reserve_nodes(&mut self, more: usize) -> Result<()> {
         let count = self.node_count().checked_add(more).ok_or(Error::OutOfMemory)?;
         self.published.reserve(count)?;
-        self.system.reserve_nodes(more)
+        self.system.make_room(more)
     }
 
-    /// Adds nodes, for which there is room, in their own numbers: they follow those that there are. Changes nothing where it fails.
-    pub(super) fn add_nodes(&mut self, nodes: &[NewNode]) -> Result<()> {
-        self.system.add_nodes(nodes)?;
+    /// Adds nodes, for which there is room, in their own numbers: they follow those that there are.
+    pub(super) fn add_nodes(&mut self, nodes: &[NewNode]) {
+        self.system.add_nodes(nodes);
         self.published.grow(self.node_count());
-        Ok(())
     }
 
     /// Shows callers the nodes from this one on, which are new.

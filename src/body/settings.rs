@@ -4,7 +4,7 @@ use super::Body;
 use crate::base::{Result, memory, not_negative};
 use crate::def::{BodyContact, BodySettings, Sleep};
 use crate::nodes::NodeDamping;
-use crate::soa::{tile_count, tile_nodes};
+use crate::soa::{PerNode, tile_count, tile_nodes};
 use crate::solver::{Changed, close};
 
 impl Body {
@@ -62,7 +62,7 @@ impl Body {
             scaling.set_rates(&rates);
         }
         let mut made = NodeDamping::new(rates)?;
-        made.reserve(self.system.node_room)?;
+        made.reserve_nodes(self.system.node_room)?;
         // The velocities so far are those of the damping so far.
         close(&mut self.system);
         self.system.damping = is_damped.then_some(made);

@@ -10,7 +10,7 @@ use super::tetrahedra::{GROUP, Group, TetrahedronGroups};
 use super::{Deformed, Elements, Load, Rest, Sums};
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::soa::{Masses, Rates, TILE, Vectors, tile_count};
+use crate::soa::{Masses, PerNode, Rates, TILE, Vectors, tile_count};
 use crate::springs::{Springs, rates_anywhere};
 
 /// The groups of a part that comes later.
@@ -100,7 +100,7 @@ impl Elements {
         if let Some(rings) = &mut self.rings {
             memory::reserve(&mut rings.volumes, count)?;
             self.offsets.make_room(rings.volumes.len(), count)?;
-            self.forces.pressures.reserve(count)?;
+            self.forces.pressures.reserve_nodes(count)?;
             if let Some(memory) = &mut self.memory {
                 memory.reserve_rings(count)?;
             }

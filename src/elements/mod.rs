@@ -23,7 +23,7 @@ use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::def::{RelaxationStep, Viscosity, Yielding};
 use crate::simd::{ChosenKernel, Record};
-use crate::soa::Vectors;
+use crate::soa::{PerNode, Vectors};
 use crate::threads::{Items, Team};
 pub(crate) use cut::PieceOfElement;
 pub(crate) use forces::Shares;
@@ -100,7 +100,7 @@ impl Sums {
 
     /// Makes room for more copies and parts, and for rings of so many nodes in all, or none.
     fn reserve(&mut self, copies: usize, parts: usize, ring_count: usize) -> Result<()> {
-        self.pressures.reserve(ring_count)?;
+        self.pressures.reserve_nodes(ring_count)?;
         if !self.ways.is_empty() {
             self.ways.try_reserve(copies)?;
         }
@@ -115,7 +115,7 @@ impl Sums {
         if self.pressures.of_nodes.is_empty() {
             return Ok(());
         }
-        self.pressures.reserve(node_count)
+        self.pressures.reserve_nodes(node_count)
     }
 
     /// Becomes one of so many copies and parts, for which there is room.

@@ -16,7 +16,7 @@ use super::{Deformed, Elements, Sums};
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::simd::{ChosenKernel, Record};
-use crate::soa::Vectors;
+use crate::soa::{PerNode, Vectors};
 use crate::threads::Team;
 
 /// How long they take to fade to 1/e, s: short for an eye, and longer than sound takes through what is cut.

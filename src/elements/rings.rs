@@ -4,7 +4,7 @@ use super::parts::{Copies, FemPart};
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::simd::Record;
-use crate::soa::{TILE, tile_count, tile_nodes};
+use crate::soa::{TILE, per_node, tile_count, tile_nodes};
 use crate::threads::{Items, Team, Tiles};
 
 /// What each node and the tetrahedra about it have of volume at rest: a quarter of theirs, m³.
@@ -37,24 +37,14 @@ pub(super) struct Pressures {
 
 saved! { Pressures { of_nodes, energies } }
 
+per_node! { Pressures { of_nodes } tiles { energies } }
+
 impl Pressures {
     pub fn new(node_count: usize) -> Result<Self> {
         Ok(Self {
             of_nodes: memory::filled(0.0, node_count)?,
             energies: memory::filled(0.0, tile_count(node_count))?,
         })
-    }
-
-    /// Makes room for so many nodes in all.
-    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
-        memory::reserve(&mut self.of_nodes, node_count)?;
-        memory::reserve(&mut self.energies, tile_count(node_count))
-    }
-
-    /// Becomes one of so many nodes, for which there is room.
-    pub fn grow(&mut self, node_count: usize) {
-        self.of_nodes.resize(node_count, 0.0);
-        self.energies.resize(tile_count(node_count), 0.0);
     }
 
     /// Those that growths of the copies, m³, lead to where volume resists with `kappa`, Pa, less the offsets, m³, and with the loads on top

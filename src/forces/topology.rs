@@ -3,7 +3,7 @@
 use super::Forces;
 use crate::base::Result;
 use crate::elements::PieceOfElement;
-use crate::soa::{Masses, Region, Scale};
+use crate::soa::{Masses, PerNode, Region, Scale};
 use crate::springs::SpringChange;
 use crate::terms::Parting;
 
@@ -16,32 +16,29 @@ pub(crate) struct Parts {
     pub terms: Parting,
 }
 
-impl Forces {
-    /// Makes room for so many nodes in all.
-    pub fn reserve_nodes(&mut self, count: usize) -> Result<()> {
+impl PerNode for Forces {
+    fn reserve_nodes(&mut self, count: usize) -> Result<()> {
         self.springs.reserve_nodes(count)?;
-        for records in self.records.iter_mut().chain(&mut self.changes.records) {
-            records.reserve(count)?;
-        }
+        self.records.reserve_nodes(count)?;
         if let Some(elements) = &mut self.elements {
             elements.reserve_nodes(count)?;
         }
         if let Some(terms) = &mut self.beside.terms {
             terms.reserve_nodes(count)?;
         }
+        self.changes.records.reserve_nodes(count)?;
         let sums = self.changes.elements.as_mut();
         sums.map_or(Ok(()), |sums| sums.reserve_rings(count))
     }
 
-    /// Adds nodes, for which there is room, up to so many in all. Changes nothing where it fails.
-    pub fn add_nodes(&mut self, count: usize) -> Result<()> {
-        self.springs.resize(count)?;
-        for records in self.records.iter_mut().chain(&mut self.changes.records) {
-            records.grow(count);
-        }
-        Ok(())
+    /// Springs, elements and terms grow where a cut changes them.
+    fn grow(&mut self, count: usize) {
+        self.records.grow(count);
+        self.changes.records.grow(count);
     }
+}
 
+impl Forces {
     /// Makes room for what a cut leaves in a body of so many nodes.
     pub fn prepare_parts(&mut self, parts: &Parts, node_count: usize) -> Result<()> {
         if let Some(elements) = &mut self.elements {

@@ -14,6 +14,12 @@ pub(crate) struct Bounds {
 
 saved! { Bounds { min, max } }
 
+impl Default for Bounds {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl Bounds {
     pub const EMPTY: Self = Self {
         min: Vec3::INFINITY,

@@ -5,7 +5,7 @@
 
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::soa::TILE;
+use crate::soa::{TILE, per_node};
 
 /// What half a substep does to each node's velocity; kept only by bodies that have node damping.
 #[derive(Debug)]
@@ -22,6 +22,8 @@ pub(crate) struct NodeDamping {
 
 saved! { NodeDamping { rates, loss, gain, substep } }
 
+per_node! { NodeDamping { rates, loss, gain } }
+
 impl NodeDamping {
     pub fn new(rates: Vec<f32>) -> Result<Self> {
         Ok(Self {
@@ -32,17 +34,10 @@ impl NodeDamping {
         })
     }
 
-    /// Makes room for so many nodes in all.
-    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
-        [&mut self.rates, &mut self.loss, &mut self.gain]
-            .into_iter()
-            .try_for_each(|values| memory::reserve(values, node_count))
-    }
-
-    /// Adds a node, for which there is room, that is damped as another is.
-    pub fn copy(&mut self, source: usize) {
+    /// Has a node be damped as another is.
+    pub fn copy(&mut self, source: usize, node: usize) {
         for values in [&mut self.rates, &mut self.loss, &mut self.gain] {
-            values.push(values[source]);
+            values[node] = values[source];
         }
     }
 

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::base::Result;
 use crate::codec::saved;
-use crate::soa::Vectors;
+use crate::soa::{Vectors, per_node};
 
 /// Positions, velocities and spring forces of all nodes, with room for a step in progress.
 ///
@@ -33,6 +33,8 @@ pub(crate) struct State {
 }
 
 saved! { State { positions, velocities, forces, remainders, current, latest, settled, kept, carried } }
+
+per_node! { State { positions, velocities, forces, remainders } }
 
 /// What a substep reads and writes.
 pub(crate) struct Substep<'a> {
@@ -82,16 +84,6 @@ impl State {
         })
     }
 
-    /// Makes room for so many nodes in all.
-    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
-        self.all_mut().try_for_each(|vectors| vectors.reserve(node_count))
-    }
-
-    /// Adds nodes at zero, for which there is room, up to so many in all.
-    pub fn grow(&mut self, node_count: usize) {
-        self.all_mut().for_each(|vectors| vectors.grow(node_count));
-    }
-
     /// Has a node move as another does.
     pub fn copy(&mut self, source: usize, node: usize) {
         let current = [
@@ -103,13 +95,6 @@ impl State {
         for vectors in current.into_iter().chain(remainders) {
             vectors.set(node, vectors.get(source));
         }
-    }
-
-    fn all_mut(&mut self) -> impl Iterator<Item = &mut Vectors> {
-        let moving = self.positions.iter_mut().chain(&mut self.velocities);
-        moving
-            .chain(&mut self.forces)
-            .chain(self.remainders.iter_mut().flatten())
     }
 
     pub fn positions(&self) -> &Vectors {

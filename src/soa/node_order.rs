@@ -1,5 +1,6 @@
 //! The order in which a body keeps its nodes, and the caller's.
 
+use super::PerNode;
 use std::ops::Range;
 
 use crate::base::{Result, memory};
@@ -17,6 +18,24 @@ pub(crate) struct NodeOrder {
 }
 
 saved! { NodeOrder { own, caller } }
+
+impl PerNode for NodeOrder {
+    fn reserve_nodes(&mut self, node_count: usize) -> Result<()> {
+        if self.is_callers() {
+            return Ok(());
+        }
+        memory::reserve(&mut self.own, node_count)?;
+        memory::reserve(&mut self.caller, node_count)
+    }
+
+    fn grow(&mut self, node_count: usize) {
+        if !self.is_callers() {
+            let more = self.own.len() as u32..node_count as u32;
+            self.own.extend(more.clone());
+            self.caller.extend(more);
+        }
+    }
+}
 
 impl NodeOrder {
     /// Whether nodes are kept in the caller's order.
@@ -38,24 +57,6 @@ impl NodeOrder {
         let is_back = |(place, &number): (usize, &u32)| self.own.get(number as usize) == Some(&(place as u32));
         self.own.len() == self.caller.len()
             && (self.is_callers() || self.own.len() == count && self.caller.iter().enumerate().all(is_back))
-    }
-
-    /// Makes room for so many nodes in all.
-    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
-        if self.is_callers() {
-            return Ok(());
-        }
-        memory::reserve(&mut self.own, node_count)?;
-        memory::reserve(&mut self.caller, node_count)
-    }
-
-    /// Adds nodes, for which there is room, up to so many in all: they are called as they are kept.
-    pub fn grow(&mut self, node_count: usize) {
-        if !self.is_callers() {
-            let more = self.own.len() as u32..node_count as u32;
-            self.own.extend(more.clone());
-            self.caller.extend(more);
-        }
     }
 
     /// The body's own number of one of the caller's.

@@ -1,6 +1,7 @@
 //! Vectors of nodes a second time, as records: three numbers that lie together are one load, not three.
 
 use super::TILE;
+use super::per_node;
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::simd::{Loops, Record};
@@ -14,20 +15,12 @@ pub(crate) struct Records(Vec<Record>);
 
 saved! { Records { 0 } }
 
+per_node! { Records { 0 } }
+
 impl Records {
     /// `count` of them, all zero.
     pub fn zeros(count: usize) -> Result<Self> {
         Ok(Self(memory::filled(Record::default(), count)?))
-    }
-
-    /// Makes room for so many in all.
-    pub fn reserve(&mut self, count: usize) -> Result<()> {
-        memory::reserve(&mut self.0, count)
-    }
-
-    /// Adds zeros, for which there is room, up to so many in all.
-    pub fn grow(&mut self, count: usize) {
-        self.0.resize(count, Record::default());
     }
 
     pub fn as_slice(&self) -> &[Record] {

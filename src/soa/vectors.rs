@@ -1,5 +1,6 @@
 //! Vectors of all nodes as structure of arrays, laid out for kernels that take sixteen nodes at a time.
 
+use super::PerNode;
 use std::ops::Range;
 
 use glam::Vec3;
@@ -137,6 +138,16 @@ impl Saved for Vectors {
             floats_into(axis, from)?;
         }
         Ok(vectors)
+    }
+}
+
+impl PerNode for Vectors {
+    fn reserve_nodes(&mut self, count: usize) -> Result<()> {
+        self.reserve(count)
+    }
+
+    fn grow(&mut self, count: usize) {
+        Self::grow(self, count);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::base::Result;
 use crate::codec::saved;
-use crate::soa::Vectors;
+use crate::soa::{Vectors, per_node};
 
 /// Positions within and at the end of a coarser step, and velocities at its end; kept only in worlds with a tolerance.
 ///
@@ -18,6 +18,8 @@ pub(crate) struct CoarseStep {
 
 saved! { CoarseStep { middle, positions, velocities, middle_difference } }
 
+per_node! { CoarseStep { middle, positions, velocities } }
+
 impl CoarseStep {
     pub fn new(node_count: usize) -> Result<Self> {
         Ok(Self {
@@ -26,22 +28,6 @@ impl CoarseStep {
             velocities: Vectors::zeros(node_count)?,
             middle_difference: 0.0,
         })
-    }
-
-    /// Makes room for so many nodes in all.
-    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
-        self.all_mut()
-            .into_iter()
-            .try_for_each(|vectors| vectors.reserve(node_count))
-    }
-
-    /// Adds nodes, for which there is room, up to so many in all.
-    pub fn grow(&mut self, node_count: usize) {
-        self.all_mut().into_iter().for_each(|vectors| vectors.grow(node_count));
-    }
-
-    fn all_mut(&mut self) -> [&mut Vectors; 3] {
-        [&mut self.middle, &mut self.positions, &mut self.velocities]
     }
 
     /// Compares the positions within the step with those kept, and keeps them instead.

@@ -3,7 +3,7 @@
 use super::System;
 use crate::base::Result;
 use crate::codec::saved;
-use crate::soa::Vectors;
+use crate::soa::{Vectors, per_node};
 
 /// Velocities from before the last half kick of a step.
 #[derive(Debug)]
@@ -14,6 +14,8 @@ pub(crate) struct Early {
 }
 
 saved! { Early { velocities, is_seen } }
+
+per_node! { Early { velocities } }
 
 impl System {
     /// Makes room for velocities from before the last half kick of a step.

@@ -17,7 +17,7 @@ use crate::contact::Contacts;
 use crate::def::{BodyDefinition, Solver, SolverReport};
 use crate::forces::Forces;
 use crate::geometry::Bounds;
-use crate::soa::Vectors;
+use crate::soa::{PerNode, Vectors};
 use crate::threads::Team;
 
 /// What each is saved as.
@@ -28,7 +28,7 @@ pub(super) const IMPLICIT: u8 = 1;
 pub(super) type Stepped<T> = std::result::Result<T, TooLong>;
 
 /// How a body is moved. What has no body here concerns only integrators that keep something beside the state.
-pub(crate) trait Integrator: Debug + Send + Sync {
+pub(crate) trait Integrator: PerNode + Debug + Send + Sync {
     /// Takes a step that the body takes alone, in as many substeps as are asked for, or as it needs; or `again` in so many.
     fn step(
         &mut self,
@@ -95,11 +95,6 @@ pub(crate) trait Integrator: Debug + Send + Sync {
     /// Writes which integrator it is, and what it keeps.
     fn save(&self, to: &mut Writer);
 
-    /// Makes room for so many nodes in all.
-    fn reserve_nodes(&mut self, _count: usize) -> Result<()> {
-        Ok(())
-    }
-
     /// Makes room for so many springs in all.
     fn reserve_springs(&mut self, _count: usize) -> Result<()> {
         Ok(())
@@ -110,13 +105,10 @@ pub(crate) trait Integrator: Debug + Send + Sync {
         Ok(())
     }
 
-    /// Makes room for a cut that leaves the nodes that these forces have now, with so many springs more. Changes nothing before [`Self::grow`].
+    /// Makes room for a cut that leaves the nodes that these forces have now, with so many springs more. Changes nothing before nodes are added.
     fn prepare_cut(&mut self, _forces: &Forces, _more: usize) -> Result<()> {
         Ok(())
     }
-
-    /// Adds nodes, for which there is room, up to so many in all.
-    fn grow(&mut self, _count: usize) {}
 
     /// Has a new node go on as another does.
     fn copy_motion(&mut self, _source: usize, _node: usize) {}

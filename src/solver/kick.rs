@@ -256,6 +256,12 @@ pub(crate) struct Survey {
 
 saved! { Survey { velocities, finite } }
 
+impl Default for Survey {
+    fn default() -> Self {
+        Self::NOTHING
+    }
+}
+
 impl Survey {
     pub const NOTHING: Self = Self {
         velocities: Bounds::EMPTY,

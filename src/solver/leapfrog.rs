@@ -11,6 +11,7 @@ use super::step_request::{Carry, StepRequest, StepStart};
 use super::verlet::{Step, StepResult, TooLong, begin, check, check_beside_springs, pass, run};
 use crate::codec::{Writer, saved};
 use crate::geometry::Bounds;
+use crate::soa::per_node;
 use crate::threads::Team;
 
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
@@ -24,6 +25,8 @@ const RELIEFS: i32 = 8;
 pub(super) struct Leapfrog;
 
 saved! { Leapfrog }
+
+per_node! { Leapfrog {} }
 
 impl Integrator for Leapfrog {
     fn step(

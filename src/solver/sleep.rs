@@ -12,7 +12,7 @@ use crate::codec::saved;
 use crate::contact::ToolPath;
 use crate::def::Sleep;
 use crate::geometry::Bounds;
-use crate::soa::{TILE, TileForces, WriteRecords, tile_count, tile_nodes};
+use crate::soa::{PerNode, TILE, TileForces, WriteRecords, tile_count, tile_nodes};
 use crate::springs::Motion;
 use crate::threads::{Items, Team};
 
@@ -68,6 +68,22 @@ saved! { Sleeper {
     sleep, tiles, asleep, asleep_count, neighbours, starts, in_parts, bounds, margin, step, before, knew_forces,
 } }
 
+impl PerNode for Sleeper {
+    fn reserve_nodes(&mut self, count: usize) -> Result<()> {
+        let tiles = tile_count(count);
+        memory::reserve(&mut self.tiles, tiles)?;
+        memory::reserve(&mut self.before, tiles)?;
+        memory::reserve(&mut self.asleep, tiles)
+    }
+
+    /// Tiles are joined otherwise than before, and all of them are awake: from now on the body sleeps as a whole.
+    fn grow(&mut self, count: usize) {
+        self.tiles.grow(tile_count(count));
+        self.asleep.grow(tile_count(count));
+        self.in_parts = false;
+    }
+}
+
 impl Sleeper {
     #[inline]
     pub fn is_asleep(&self, tile: usize) -> bool {
@@ -105,21 +121,6 @@ impl Sleeper {
     fn rest(&mut self, tile: usize) {
         self.asleep[tile] = true;
         self.asleep_count += 1;
-    }
-
-    /// Makes room for so many tiles.
-    pub fn reserve(&mut self, tiles: usize) -> Result<()> {
-        memory::reserve(&mut self.tiles, tiles)?;
-        memory::reserve(&mut self.before, tiles)?;
-        memory::reserve(&mut self.asleep, tiles)
-    }
-
-    /// The body has so many tiles now, for which there is room, joined otherwise than before, and all of them awake: from now on it sleeps as a
-    /// whole.
-    pub fn grow(&mut self, tiles: usize) {
-        self.tiles.resize(tiles, Tile::default());
-        self.asleep.resize(tiles, false);
-        self.in_parts = false;
     }
 
     /// A spring joins these of its own nodes now. Where tiles become neighbours that were not, the body sleeps as a whole.
@@ -263,7 +264,7 @@ impl System {
                 knew_forces: false,
             };
             self.join_tiles(&mut sleeper)?;
-            sleeper.reserve(tile_count(self.node_count().max(self.node_room)))?;
+            sleeper.reserve_nodes(self.node_count().max(self.node_room))?;
             self.sleeper = Some(memory::boxed(sleeper)?);
         }
         Ok(())

@@ -22,7 +22,7 @@ use crate::forces::Forces;
 use crate::geometry::Bounds;
 use crate::nodes::{Bindings, NodeDamping, Pins, State};
 use crate::simd::ChosenKernel;
-use crate::soa::{Masses, NodeOrder, Vectors, tile_count};
+use crate::soa::{Masses, NodeOrder, Vectors, per_node, tile_count};
 use crate::threads::Team;
 
 /// How a body is cut.
@@ -105,6 +105,11 @@ saved! { System {
     bindings, node_room, is_cut_open, grasps, carry, forces_current, forces_applied, coarse, sleeper, may_be_cut,
     gravity_scale, acceleration,
 } where Self::is_sound }
+
+per_node! { System {
+    order, forces, masses, inverse_masses, damping, state, predicted_velocities, integrator, applied, early, coarse,
+    sleeper,
+} tiles { surveys, tile_sums, boxes } }
 
 impl System {
     /// Of a definition, in this order, with these forces and the surface in the caller's numbers. Its nodes have no positions yet, and nothing

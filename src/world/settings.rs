@@ -3,6 +3,7 @@
 use super::World;
 use crate::base::{BodyId, Error, Result, ensure, memory};
 use crate::def::{BodyContact, BodySettings};
+use crate::soa::PerNode;
 use crate::solver::CoarseStep;
 
 impl World {
@@ -23,7 +24,7 @@ impl World {
             let mut made = memory::reserved(bodies().count())?;
             for (place, body) in bodies() {
                 let mut coarse = CoarseStep::new(body.node_count())?;
-                coarse.reserve(body.node_count() + body.system().spare_nodes())?;
+                coarse.reserve_nodes(body.node_count() + body.system().spare_nodes())?;
                 made.push((place, coarse));
             }
             for (place, coarse) in made {

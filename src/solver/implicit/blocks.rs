@@ -7,7 +7,7 @@ use glam::{BVec3, DMat3, Vec3};
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::forces::Forces;
-use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
+use crate::soa::{TILE, Vectors, per_node, tile_count, tile_nodes};
 use crate::springs::{Springs, Tangent};
 use crate::threads::{Team, Tiles};
 
@@ -42,6 +42,8 @@ pub(super) struct Blocks {
 
 saved! { Blocks { stiffness, inverse } }
 
+per_node! { Blocks { stiffness, inverse } }
+
 impl Blocks {
     pub fn new(node_count: usize) -> Result<Self> {
         let entry = || memory::filled(0.0, node_count);
@@ -49,21 +51,6 @@ impl Blocks {
             stiffness: memory::filled([0.0; 6], node_count)?,
             inverse: [entry()?, entry()?, entry()?, entry()?, entry()?, entry()?],
         })
-    }
-
-    /// Makes room for so many nodes in all.
-    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
-        memory::reserve(&mut self.stiffness, node_count)?;
-        let mut entries = self.inverse.iter_mut();
-        entries.try_for_each(|entry| memory::reserve(entry, node_count))
-    }
-
-    /// Adds nodes, for which there is room, up to so many in all.
-    pub fn grow(&mut self, node_count: usize) {
-        self.stiffness.resize(node_count, [0.0; 6]);
-        for entry in &mut self.inverse {
-            entry.resize(node_count, 0.0);
-        }
     }
 
     /// Takes in forces at these positions.

@@ -14,7 +14,7 @@ use crate::codec::saved;
 use crate::forces::Forces;
 use crate::nodes::Pins;
 use crate::simd::{ChosenKernel, Loops};
-use crate::soa::{TILE, Vectors};
+use crate::soa::{PerNode, TILE, Vectors};
 use crate::solver::held::without_held;
 use crate::springs::Tangent;
 
@@ -54,6 +54,21 @@ pub(super) struct Coarse {
 
 saved! { Coarse { clusters, count, places, free, stiffness, inverse, loads, motions, sums } }
 
+impl PerNode for Coarse {
+    fn reserve_nodes(&mut self, node_count: usize) -> Result<()> {
+        memory::reserve(&mut self.clusters, node_count.div_ceil(BLOCK))?;
+        self.places.reserve_nodes(node_count)?;
+        memory::reserve(&mut self.free, node_count)
+    }
+
+    fn grow(&mut self, node_count: usize) {
+        let last = self.clusters.last().copied().unwrap_or(0);
+        self.clusters.resize(node_count.div_ceil(BLOCK), last);
+        self.places.grow(node_count);
+        self.free.resize(node_count, 0.0);
+    }
+}
+
 impl Coarse {
     /// Clusters of nodes at these positions.
     pub fn new(positions: &Vectors) -> Result<Self> {
@@ -81,21 +96,6 @@ impl Coarse {
             motions: memory::filled(0.0, size)?,
             sums: memory::filled(0.0, size)?,
         })
-    }
-
-    /// Makes room for so many nodes in all.
-    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
-        memory::reserve(&mut self.clusters, node_count.div_ceil(BLOCK))?;
-        self.places.reserve(node_count)?;
-        memory::reserve(&mut self.free, node_count)
-    }
-
-    /// Adds nodes, for which there is room, up to so many in all: to the last cluster, which is a worse one then.
-    pub fn grow(&mut self, node_count: usize) {
-        let last = self.clusters.last().copied().unwrap_or(0);
-        self.clusters.resize(node_count.div_ceil(BLOCK), last);
-        self.places.grow(node_count);
-        self.free.resize(node_count, 0.0);
     }
 
     /// How many numbers describe a motion of all clusters.
