@@ -1,4 +1,4 @@
-//! What a solver is to the rest of the library: how it moves a body, alone or with others, and what it keeps for that.
+//! The trait that solvers implement, and the table of those that there are: how each moves a body, alone or with others, and what it keeps.
 
 use std::fmt::Debug;
 
@@ -10,7 +10,7 @@ use super::leapfrog::Leapfrog;
 use super::needs::Need;
 use super::step_request::{Carry, StepRequest, StepStart};
 use super::substep::Part;
-use super::verlet::{StepResult, TooLong};
+use super::verlet::Stepped;
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{Reader, Saved, Writer, shape_with};
 use crate::contact::Contacts;
@@ -24,19 +24,10 @@ use crate::threads::Team;
 pub(super) const LEAPFROG: u8 = 0;
 pub(super) const IMPLICIT: u8 = 1;
 
-/// What came of steps, or why there is none.
-pub(super) type Stepped<T> = std::result::Result<T, TooLong>;
-
-/// How a body is moved. What has no body here concerns only integrators that keep something beside the state.
+/// How a body is moved. The functions that do nothing by default are for integrators that keep something beside the state.
 pub(crate) trait Integrator: PerNode + Debug + Send + Sync {
-    /// Takes a step that the body takes alone, in as many substeps as are asked for, or as it needs; or `again` in so many.
-    fn step(
-        &mut self,
-        body: &mut System,
-        request: &StepRequest,
-        again: Option<StepStart>,
-        team: &Team,
-    ) -> Stepped<StepResult>;
+    /// Takes a step that the body takes alone: in as many substeps as are asked for, or as it needs, or `again` in so many.
+    fn step(&mut self, body: &mut System, request: &StepRequest, again: Option<StepStart>, team: &Team) -> Stepped;
 
     /// What a step needs that the body takes together with others.
     fn need(&mut self, body: &mut System, request: &StepRequest, team: &Team) -> Need;
@@ -47,16 +38,15 @@ pub(crate) trait Integrator: PerNode + Debug + Send + Sync {
     /// Takes a substep of it, up to where other tissue may change where that leads.
     fn substep(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep, index: u32) -> Stepped<()>;
 
-    /// Ends the substep, with velocities in this box.
-    fn end(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep, velocities: Bounds)
-    -> Stepped<()>;
+    /// Ends the substep, after which other tissue leaves velocities in this box.
+    fn end(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep, given: Bounds) -> Stepped<()>;
 
     /// Takes the half kick that closes the step, where there is one.
     fn close(&mut self, _body: &mut System, _walk: &mut CoupledBody, _step: &CoupledStep) -> Stepped<()> {
         Ok(())
     }
 
-    /// Whether half kicks open and close a step, so that forces at its end are known. The energy account is one of such steps.
+    /// Whether half kicks open and close a step: the last leaves the forces at its end, and the energy account compares such steps alone.
     fn takes_half_kicks(&self) -> bool {
         false
     }
@@ -66,7 +56,7 @@ pub(crate) trait Integrator: PerNode + Debug + Send + Sync {
         false
     }
 
-    /// Where its equations lead all nodes at once, if it solves such; contacts with other tissue come after those.
+    /// Where its equations have led all nodes at once, if it solves such. Contacts with other tissue are solved after them, and change this.
     fn solution(&self) -> Option<&Solution> {
         None
     }
@@ -200,7 +190,7 @@ impl CoupledBody {
 }
 
 impl System {
-    /// Has its integrator do something with it. What is asked of that meanwhile, leapfrog answers.
+    /// Has its integrator do something with it. A leapfrog stands in its place meanwhile.
     pub fn lend<R>(&mut self, act: impl FnOnce(&mut dyn Integrator, &mut Self) -> R) -> R {
         // Leapfrog has no size: nothing is allocated.
         let mut integrator = std::mem::replace(&mut self.integrator, Box::new(Leapfrog));

@@ -1,14 +1,15 @@
-//! Leapfrog as an integrator: how many substeps stability needs, and steps that bodies take together.
+//! Leapfrog as an integrator: how many substeps stability needs, and steps that bodies take together. A step alone is in `verlet.rs`.
 //!
-//! It keeps nothing of its own: what one step hands to the next is in [`Carry`] and the state, which who reads a body between steps asks.
+//! It keeps nothing of its own. What one step hands to the next is in [`Carry`] and in the state: reading velocities, sleep and changes of
+//! springs need it between steps.
 
 use super::System;
 use super::energy_monitor::Account;
 use super::energy_sums::TileSums;
-use super::integrator::{CoupledBody, CoupledStep, Integrator, LEAPFROG, Stepped};
+use super::integrator::{CoupledBody, CoupledStep, Integrator, LEAPFROG};
 use super::needs::{Need, first_substep, prepare, refined, substeps_needed};
 use super::step_request::{Carry, StepRequest, StepStart};
-use super::verlet::{Step, StepResult, TooLong, begin, check, check_beside_springs, pass, run};
+use super::verlet::{Step, Stepped, TooLong, begin, check, check_beside_springs, pass, run};
 use crate::codec::{Writer, saved};
 use crate::geometry::Bounds;
 use crate::soa::per_node;
@@ -20,7 +21,7 @@ const ATTEMPTS: u32 = 4;
 /// How often masses are made within a step for elements that its motion made stiff.
 const RELIEFS: i32 = 8;
 
-/// VERLET.
+/// The integrator of VERLET.
 #[derive(Debug)]
 pub(super) struct Leapfrog;
 
@@ -29,13 +30,7 @@ saved! { Leapfrog }
 per_node! { Leapfrog {} }
 
 impl Integrator for Leapfrog {
-    fn step(
-        &mut self,
-        body: &mut System,
-        request: &StepRequest,
-        again: Option<StepStart>,
-        team: &Team,
-    ) -> Stepped<StepResult> {
+    fn step(&mut self, body: &mut System, request: &StepRequest, again: Option<StepStart>, team: &Team) -> Stepped {
         let start = match again {
             Some(start) => start,
             None => {
@@ -98,17 +93,11 @@ impl Integrator for Leapfrog {
         Ok(())
     }
 
-    fn end(
-        &mut self,
-        body: &mut System,
-        walk: &mut CoupledBody,
-        step: &CoupledStep,
-        velocities: Bounds,
-    ) -> Stepped<()> {
+    fn end(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep, given: Bounds) -> Stepped<()> {
         let (substep, team) = (step.substep(), step.team);
         body.forces.age(f64::from(substep), body.state.next_positions(), team);
         body.state.advance();
-        walk.carry.gravity.velocities = velocities;
+        walk.carry.gravity.velocities = given;
         Step::of(step.request, step.substeps, walk.masses_for, team).check_after(body, &mut walk.carry)
     }
 
@@ -135,13 +124,7 @@ impl Integrator for Leapfrog {
 }
 
 /// Takes the step with as many substeps as stability needs.
-fn run_stably(
-    body: &mut System,
-    request: &StepRequest,
-    start: Carry,
-    beside_springs: f32,
-    team: &Team,
-) -> Stepped<StepResult> {
+fn run_stably(body: &mut System, request: &StepRequest, start: Carry, beside_springs: f32, team: &Team) -> Stepped {
     let mut stable_substep = first_substep(body, &start, beside_springs);
     let mut beside_springs = beside_springs;
     let (mut attempt, mut reliefs, mut was_tried, mut guess) = (0, 0, false, 1.0);

@@ -205,7 +205,7 @@ impl System {
     pub fn make_solver(&mut self, definition: &BodyDefinition) -> Result<()> {
         let positions = self.state.positions();
         self.integrator = integrator::make(definition, positions, &mut self.forces)?;
-        if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 {
+        if self.integrator.is_limited_by_stability() && definition.mass_scaling > 0.0 {
             let (uniform, damping) = (self.uniform_inverse_mass, self.damping.as_ref());
             let (forces, masses) = (&self.forces, self.masses());
             let beside = forces.carried_beside_springs(positions, &masses)?;

@@ -42,14 +42,11 @@ pub(crate) struct StepResult {
     pub finite: bool,
 }
 
+/// What came of a step, or why there is none.
+pub(super) type Stepped<T = StepResult> = Result<T, TooLong>;
+
 /// Takes the step with exactly so many substeps, with masses made for substeps of `masses_for` seconds; 0: as they are.
-pub(super) fn run(
-    body: &mut System,
-    request: &StepRequest,
-    start: StepStart,
-    masses_for: f32,
-    team: &Team,
-) -> Result<StepResult, TooLong> {
+pub(super) fn run(body: &mut System, request: &StepRequest, start: StepStart, masses_for: f32, team: &Team) -> Stepped {
     let mut step = Step {
         middle: start.middle,
         ..Step::of(request, start.substeps, masses_for, team)
@@ -68,7 +65,7 @@ pub(super) fn run(
     Ok(step.take(body, start)?.expect("only a pipeline goes too far"))
 }
 
-pub(super) fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
+pub(super) fn check(stability: &Stability, substep: f32) -> Stepped<()> {
     match stability.limit() {
         Some(stable_substep) if substep > stable_substep => Err(TooLong { stable_substep }),
         _ => Ok(()),
@@ -76,7 +73,7 @@ pub(super) fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> 
 }
 
 /// The same for elements, terms and what is enclosed, as they were deformed where forces were last worked out.
-pub(super) fn check_beside_springs(body: &System, substep: f32) -> Result<(), TooLong> {
+pub(super) fn check_beside_springs(body: &System, substep: f32) -> Stepped<()> {
     let stable_substep = body.forces.newest_limit_beside_springs();
     if substep <= stable_substep {
         Ok(())
@@ -113,7 +110,7 @@ impl<'a> Step<'a> {
     }
 
     /// Takes it; `None`: in a pipeline the body has moved further than is known to be stable.
-    fn take(&self, body: &mut System, start: StepStart) -> Result<Option<StepResult>, TooLong> {
+    fn take(&self, body: &mut System, start: StepStart) -> Stepped<Option<StepResult>> {
         let Self {
             request,
             substep,
@@ -214,7 +211,7 @@ impl<'a> Step<'a> {
     }
 
     /// Refuses to go on where the substep that was just taken has led the nodes to where longer ones are stable no more.
-    pub fn check_after(&self, body: &System, carry: &mut Carry) -> Result<(), TooLong> {
+    pub fn check_after(&self, body: &System, carry: &mut Carry) -> Stepped<()> {
         let substep = self.substep;
         if !self.is_stable_after(&mut carry.stability, &{ carry.gravity.velocities }) {
             let known = carry.stability.for_short(substep);

@@ -33,17 +33,17 @@ use crate::geometry::Bounds;
 use crate::soa::{PerNode, Vectors, tile_count};
 use crate::solver::System;
 use crate::solver::changed::Cached;
-use crate::solver::integrator::{CoupledBody, CoupledStep, IMPLICIT, Integrator, Stepped};
+use crate::solver::integrator::{CoupledBody, CoupledStep, IMPLICIT, Integrator};
 use crate::solver::needs::Need;
 use crate::solver::newton::Newton;
 use crate::solver::step_request::{StepRequest, StepStart};
-use crate::solver::verlet::{StepResult, TooLong, begin};
+use crate::solver::verlet::{Stepped, TooLong, begin};
 use crate::threads::Team;
 use blocks::{Blocks, Noise};
 use coarse::Coarse;
 use estimate::Spectrum;
 use gradient::Partial;
-use parts::{parts_near, run, take_part};
+use parts::{parts_near, take_part};
 use pressed::Pressed;
 use solution::History;
 use step::Formula;
@@ -269,16 +269,10 @@ impl Implicit {
 }
 
 impl Integrator for Implicit {
-    fn step(
-        &mut self,
-        body: &mut System,
-        request: &StepRequest,
-        again: Option<StepStart>,
-        team: &Team,
-    ) -> Stepped<StepResult> {
+    fn step(&mut self, body: &mut System, request: &StepRequest, again: Option<StepStart>, team: &Team) -> Stepped {
         self.allowed = request.work;
         let start = again.unwrap_or_else(|| StepStart::new(body.carry, request.substeps.max(1)));
-        run(body, self, request, start, team)
+        self.run(body, request, start, team)
     }
 
     fn need(&mut self, body: &mut System, request: &StepRequest, _team: &Team) -> Need {
@@ -312,13 +306,7 @@ impl Integrator for Implicit {
         }
     }
 
-    fn end(
-        &mut self,
-        body: &mut System,
-        _walk: &mut CoupledBody,
-        _step: &CoupledStep,
-        _velocities: Bounds,
-    ) -> Stepped<()> {
+    fn end(&mut self, body: &mut System, _walk: &mut CoupledBody, _step: &CoupledStep, _given: Bounds) -> Stepped<()> {
         self.solution.settle_deflection();
         body.state.advance();
         Ok(())
