@@ -457,11 +457,12 @@ impl Skin {
     /// Remembers what contacts have changed in a substep, before the body knows of it.
     pub fn remember(&mut self, body: &mut System) {
         let movers = self.changing.iter().flat_map(|changing| &changing.movers);
+        let (bindings, motion_of) = body.motion();
+        let bindings = bindings.filter(|_| self.changing.is_some());
         for &node in self.nodes.iter().chain(movers) {
-            let bindings = body.bindings.as_ref().filter(|_| self.changing.is_some());
             if bindings.is_none_or(|bindings| bindings.get(node).is_none()) {
                 let node = node as usize;
-                self.changes[node] = self.velocities[node] - Vec3A::from(body.mean_velocity(node));
+                self.changes[node] = self.velocities[node] - Vec3A::from(motion_of(node).1);
             }
         }
     }
