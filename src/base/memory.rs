@@ -72,6 +72,12 @@ pub(crate) fn reserve<T>(values: &mut Vec<T>, count: usize) -> Result<()> {
     Ok(values.try_reserve_exact(count.saturating_sub(values.len()))?)
 }
 
+/// The same and up to an eighth more, for a list that grows with each body: it is copied now and then, not each time. The count alone
+/// tells how much room that is, so that a world that is loaded has as much.
+pub(crate) fn reserve_in_steps<T>(values: &mut Vec<T>, count: usize) -> Result<()> {
+    reserve(values, count.next_multiple_of((count.next_power_of_two() / 8).max(1)))
+}
+
 /// Gives back the room beyond the values. By a copy: `shrink_to_fit` makes one too of what is aligned by more than memory is anyway, and ends the program
 /// where there is none for it.
 pub(crate) fn shrink<T: Copy>(values: &mut Vec<T>) -> Result<()> {

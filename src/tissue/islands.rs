@@ -59,10 +59,10 @@ impl Islands {
     /// Makes room for the body at this place.
     pub fn make_place(&mut self, place: usize) -> Result<()> {
         let count = self.parents.len().max(place + 1);
-        memory::reserve(&mut self.members, count)?;
-        memory::reserve(&mut self.islands, count)?;
-        memory::reserve(&mut self.reaches, count)?;
-        memory::reserve(&mut self.pairs, room_for(count))?;
+        memory::reserve_in_steps(&mut self.members, count)?;
+        memory::reserve_in_steps(&mut self.islands, count)?;
+        memory::reserve_in_steps(&mut self.reaches, count)?;
+        memory::reserve_in_steps(&mut self.pairs, room_for(count))?;
         while self.parents.len() < count {
             memory::push(&mut self.parents, NONE)?;
         }

@@ -117,9 +117,9 @@ impl NearRun {
 impl Pairs {
     /// Makes room for so many lists of surfaces: of so many corners and edges that may meet other bodies, and that may meet their own.
     pub fn reserve(&mut self, lists: usize, [with_bodies, with_itself]: [usize; 2]) -> Result<()> {
-        memory::reserve(&mut self.lists, lists)?;
-        memory::reserve(&mut self.runs, with_bodies + with_itself)?;
-        memory::reserve(&mut self.features, ROOM * with_bodies + ROOM_WITH_ITSELF * with_itself)
+        memory::reserve_in_steps(&mut self.lists, lists)?;
+        memory::reserve_in_steps(&mut self.runs, with_bodies + with_itself)?;
+        memory::reserve_in_steps(&mut self.features, ROOM * with_bodies + ROOM_WITH_ITSELF * with_itself)
     }
 
     /// A step of an island begins.

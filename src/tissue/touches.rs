@@ -32,7 +32,7 @@ impl Touches {
     /// Makes room for those of so many contacts, of which few press at once.
     pub(super) fn reserve(&mut self, contacts: usize) -> Result<()> {
         let mut all = [&mut self.settled, &mut self.next].into_iter();
-        all.try_for_each(|touches| memory::reserve(touches, contacts / PRESSING))
+        all.try_for_each(|touches| memory::reserve_in_steps(touches, contacts / PRESSING))
     }
 
     /// A step begins, or is begun again.

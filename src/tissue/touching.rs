@@ -29,7 +29,7 @@ saved! { TouchingPairs { pairs } }
 impl TouchingPairs {
     /// Makes room for those of so many contacts, of which few press at once.
     pub(super) fn reserve(&mut self, contacts: usize) -> Result<()> {
-        memory::reserve(&mut self.pairs, contacts / PRESSING)
+        memory::reserve_in_steps(&mut self.pairs, contacts / PRESSING)
     }
 
     /// A step begins, or is begun again.

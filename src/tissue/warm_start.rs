@@ -63,7 +63,7 @@ impl Pushes {
     pub(super) fn reserve(&mut self, contacts: usize) -> Result<()> {
         let count = contacts / PRESSING;
         let mut all = [&mut self.last, &mut self.settled, &mut self.next].into_iter();
-        all.try_for_each(|pushes| memory::reserve(pushes, count))
+        all.try_for_each(|pushes| memory::reserve_in_steps(pushes, count))
     }
 
     /// A step begins, or is begun again.
