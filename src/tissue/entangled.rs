@@ -18,8 +18,7 @@ saved! { Entangled { 0 } }
 impl Entangled {
     /// Makes room for one more surface, where there are so many.
     pub fn reserve(&mut self, surfaces: usize) -> Result<()> {
-        let more = (ROOM * (surfaces + 1)).saturating_sub(self.0.len());
-        memory::reserve_in_steps(&mut self.0, more)
+        memory::reserve_in_steps(&mut self.0, ROOM * (surfaces + 1))
     }
 
     /// Whether these two are.

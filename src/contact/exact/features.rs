@@ -148,12 +148,11 @@ impl ExactSolid {
         let bounds = Bounds::of(corners.into_iter());
         let planes = SeparatingPlanes::face(corners);
         self.tree.near(&bounds, pairs.limit as f32, |place| {
-            let placed = self.tree.placed(place);
-            if planes.is_beyond(&placed.corners, within) {
+            if planes.is_beyond(&self.tree.placed(place).corners, within) {
                 return pairs.limit as f32;
             }
-            if count < STARTS && !placed.is_beside(&corners, 0.0) && !planes.is_beyond(&placed.corners, 0.0) {
-                crossed[count] = self.crossed(face, place);
+            if count < STARTS {
+                crossed[count] = self.crossed(corners, &planes, place);
                 count += usize::from(crossed[count].is_some());
             }
             for node in self.facets.salient_nodes(place) {
@@ -186,10 +185,20 @@ impl ExactSolid {
         best
     }
 
-    /// A point, as weights, where a face and the border of the triangle at a place pass through each other, and the
-    /// normals of what meets there.
-    pub(super) fn crossed(&self, face: [DVec3; 3], place: usize) -> Option<([f64; 3], [DVec3; 2])> {
-        let triangle = self.tree.placed(place).exact();
+    /// A point, as weights, where a face, which lies between these planes, and the border of the triangle at a place pass through each other, and
+    /// the normals of what meets there.
+    pub(super) fn crossed(
+        &self,
+        corners: [Vec3; 3],
+        planes: &SeparatingPlanes,
+        place: usize,
+    ) -> Option<([f64; 3], [DVec3; 2])> {
+        let placed = self.tree.placed(place);
+        // Most are told apart before rounding would decide.
+        if placed.is_beside(&corners, 0.0) || planes.is_beyond(&placed.corners, 0.0) {
+            return None;
+        }
+        let (triangle, face) = (placed.exact(), corners.map(|corner| corner.as_dvec3()));
         if lies_beside(triangle, face) || lies_beside(face, triangle) {
             return None;
         }

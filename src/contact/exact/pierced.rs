@@ -9,10 +9,10 @@ use glam::{DVec3, Vec3};
 
 use super::ExactSolid;
 use super::facets::Facets;
+use super::separating_planes::SeparatingPlanes;
 use crate::contact::closest::Closest;
 use crate::geometry::Bounds;
 use crate::geometry::nearest::{Spot, nearest_on_triangle};
-use crate::geometry::tree::PlacedTriangle;
 
 /// Edges of a solid that an edge has passed, at most.
 const PASSED: usize = 16;
@@ -92,11 +92,8 @@ impl ExactSolid {
 
     /// The same for a face.
     fn past_sides_of_face(&self, corners: [Vec3; 3]) -> Option<f64> {
-        let face = corners.map(|corner| corner.as_dvec3());
-        let plane = PlacedTriangle::new(corners);
-        self.past_sides(&corners, |place| {
-            !plane.is_beside(&self.tree.placed(place).corners, 0.0) && self.crossed(face, place).is_some()
-        })
+        let planes = SeparatingPlanes::face(corners);
+        self.past_sides(&corners, |place| self.crossed(corners, &planes, place).is_some())
     }
 
     fn past_sides(&self, corners: &[Vec3], passes: impl Fn(usize) -> bool) -> Option<f64> {
