@@ -15,8 +15,8 @@ const FLAT: f64 = 1e-6;
 /// Triangles cross where they pass through each other by more than this part of the largest coordinate: about what rounding makes of them.
 const CROSSING: f64 = 1e-6;
 
-/// Rounds of turning edges, at most: for rows of flat triangles.
-const ROUNDS: usize = 16;
+/// Rounds of turning edges, at most: of a row of flat triangles along one edge, each round parts one.
+const ROUNDS: usize = 100;
 
 /// No node lies further from the origin, m: squares of distances stay finite in `f32`.
 pub(crate) const FURTHEST: f32 = 1e9;
@@ -149,26 +149,17 @@ impl ClosedSurface {
         Ok(())
     }
 
-    /// Where a triangle is flat, the number of its longest side.
-    fn flat_side(&self, triangle: usize) -> Option<usize> {
-        let corners = self.corners(triangle).map(|corner| corner.as_dvec3());
-        let [a, b, c] = corners;
-        let mut longest = (0, 0.0);
-        for side in 0..3 {
-            let squared = corners[side].distance_squared(corners[(side + 1) % 3]);
-            if squared > longest.1 {
-                longest = (side, squared);
-            }
-        }
-        (!((b - a).cross(c - a).length() > FLAT * longest.1)).then_some(longest.0)
+    fn is_flat(&self, triangle: usize) -> bool {
+        relative_height(self.corners(triangle)) <= FLAT
     }
 
-    /// Turns the longest edge of each flat triangle, so that it parts its neighbour there; refused where that does not help.
+    /// Turns edges until no triangle is flat: the longest of each, so that it parts its neighbour there. Where the lower of the two would become no
+    /// higher, the neighbour's longest edge is turned first (longest-edge paths: Rivara 1997). Refused where this does not help.
     fn part_flat_triangles(&mut self) -> Result<()> {
         let mut sides: Vec<(u64, u32, u32)> = Vec::new();
         let mut touched: Vec<bool> = Vec::new();
         for round in 0..=ROUNDS {
-            let Some(first) = (0..self.triangles.len()).find(|&index| self.flat_side(index).is_some()) else {
+            let Some(first) = (0..self.triangles.len()).find(|&index| self.is_flat(index)) else {
                 return Ok(());
             };
             if round == ROUNDS {
@@ -189,33 +180,49 @@ impl ClosedSurface {
             touched.try_reserve(self.triangles.len())?;
             touched.resize(self.triangles.len(), false);
             for flat in first..self.triangles.len() {
-                let Some(side) = self.flat_side(flat) else {
-                    continue;
-                };
-                let edge = super::pack(&self.triangles[flat], super::TRIANGLE_EDGES[side]);
-                let start = sides.partition_point(|other| other.0 < edge);
-                let mut others = sides[start..].iter().take_while(|other| other.0 == edge);
-                let (Some(one), Some(two), None) = (others.next(), others.next(), others.next()) else {
-                    continue;
-                };
-                let &(_, neighbour, across) = if one.1 as usize == flat { two } else { one };
-                let neighbour = neighbour as usize;
-                let turn = |triangle: [u32; 3], by: usize| [0, 1, 2].map(|corner| triangle[(corner + by) % 3]);
-                // From `c` to `a` along the edge, and in the neighbour back.
-                let [c, a, b] = turn(self.triangles[flat], side);
-                let [_, _, d] = turn(self.triangles[neighbour], across as usize);
-                let parting = (u64::from(b.min(d)) << 32) | u64::from(b.max(d));
-                let is_there = sides.binary_search_by_key(&parting, |other| other.0).is_ok();
-                if b == d || is_there || touched[flat] || touched[neighbour] {
-                    continue;
+                if self.is_flat(flat) {
+                    self.turn_edge_beside(flat, &sides, &mut touched);
                 }
-                self.triangles[flat] = [a, b, d];
-                self.triangles[neighbour] = [b, c, d];
-                touched[flat] = true;
-                touched[neighbour] = true;
             }
         }
         Ok(())
+    }
+
+    /// Turns the longest edge of a flat triangle, or a longer one that leads on from there. `sides` has the edges of all triangles in order, as they were
+    /// when none was `touched`.
+    fn turn_edge_beside(&mut self, flat: usize, sides: &[(u64, u32, u32)], touched: &mut [bool]) {
+        let mut triangle = flat;
+        let mut length = 0.0;
+        loop {
+            let (side, squared) = longest_side(self.corners(triangle));
+            let edge = super::pack(&self.triangles[triangle], super::TRIANGLE_EDGES[side]);
+            let start = sides.partition_point(|other| other.0 < edge);
+            let mut others = sides[start..].iter().take_while(|other| other.0 == edge);
+            let (Some(one), Some(two), None) = (others.next(), others.next(), others.next()) else {
+                return;
+            };
+            let &(_, neighbour, across) = if one.1 as usize == triangle { two } else { one };
+            let neighbour = neighbour as usize;
+            if squared <= length || touched[triangle] || touched[neighbour] {
+                return;
+            }
+            let turn = |triangle: [u32; 3], by: usize| [0, 1, 2].map(|corner| triangle[(corner + by) % 3]);
+            // From `c` to `a` along the edge, and in the neighbour back.
+            let [c, a, b] = turn(self.triangles[triangle], side);
+            let [_, _, d] = turn(self.triangles[neighbour], across as usize);
+            let turned = [[a, b, d], [b, c, d]];
+            let parting = (u64::from(b.min(d)) << 32) | u64::from(b.max(d));
+            let is_there = sides.binary_search_by_key(&parting, |other| other.0).is_ok();
+            let height = |nodes: [u32; 3]| relative_height(nodes.map(|node| self.positions[node as usize]));
+            let least = |both: [[u32; 3]; 2]| height(both[0]).min(height(both[1]));
+            let now = least([self.triangles[triangle], self.triangles[neighbour]]);
+            if b != d && !is_there && least(turned) > now {
+                [self.triangles[triangle], self.triangles[neighbour]] = turned;
+                (touched[triangle], touched[neighbour]) = (true, true);
+                return;
+            }
+            (triangle, length) = (neighbour, squared);
+        }
     }
 
     /// For each triangle the first of those that are joined to it by edges; refused where an edge is open.
@@ -361,6 +368,26 @@ impl ClosedSurface {
         }
         Ok(())
     }
+}
+
+/// The number of a triangle's longest side, and the square of its length.
+fn longest_side(corners: [Vec3; 3]) -> (usize, f64) {
+    let mut longest = (0, 0.0);
+    for side in 0..3 {
+        let squared = corners[side]
+            .as_dvec3()
+            .distance_squared(corners[(side + 1) % 3].as_dvec3());
+        if squared > longest.1 {
+            longest = (side, squared);
+        }
+    }
+    longest
+}
+
+/// A triangle's height over its longest side, as a part of that; 0 of a point.
+fn relative_height(corners: [Vec3; 3]) -> f64 {
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+    ((b - a).cross(c - a).length() / longest_side(corners).1).max(0.0)
 }
 
 /// Whether an edge of the first triangle passes through the second, with which it shares no node.

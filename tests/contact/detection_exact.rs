@@ -1,5 +1,6 @@
 //! Closed surfaces, and what lies within them by exact tests.
 
+use crate::support::random::Random;
 use crate::support::solid::real;
 use glam::{Quat, Vec3};
 use sinew::detection::exact::{Exact, Overlap};
@@ -131,6 +132,8 @@ fn real_meshes() {
     for (name, scale) in [
         ("stomach.stl", 1e-3),
         ("forceps_jaw_left.stl", 1e-3),
+        // Rounded otherwise: of its rows of flat triangles some are then exactly along a line.
+        ("forceps_jaw_left.stl", 1.0),
         ("liver_collision.stl", 1e-3),
     ] {
         let Some(mut mesh) = real(name, scale) else {
@@ -146,6 +149,64 @@ fn real_meshes() {
         mesh.triangles.swap_remove(17);
         let told = refusal(&(mesh.positions, mesh.triangles));
         assert!(told.contains("not closed"), "{name}: {told}");
+    }
+}
+
+/// Adds triangles without an area between a straight row of nodes and the line from its first to its last, in random order.
+fn close_gap(triangles: &mut Vec<[u32; 3]>, row: &[u32], random: &mut Random) {
+    if let [first, .., last] = row
+        && row.len() > 2
+    {
+        let between = 1 + random.below(row.len() - 2);
+        triangles.push([*first, *last, row[between]]);
+        close_gap(triangles, &row[..=between], random);
+        close_gap(triangles, &row[between..], random);
+    }
+}
+
+#[test]
+fn rows_of_flat_triangles_take_parts_of_their_neighbours() {
+    let mut random = Random(7);
+    for case in 0..200 {
+        let turned = Quat::from_scaled_axis(random.point(-3.0, 3.0));
+        let (size, shift) = (10_f32.powf(random.between(-3.0, 3.0)), random.point(-2.0, 2.0));
+        let at = |place: Vec3| size * (turned * place + shift);
+        // A tetrahedron with nodes along one of its edges, of which the face on one side knows nothing.
+        let between = 1 + random.below(30);
+        let mut parts: Vec<f32> = (0..between).map(|_| random.between(0.01, 0.99)).collect();
+        parts.sort_unstable_by(f32::total_cmp);
+        let mut positions = vec![Vec3::Z, Vec3::Y, Vec3::ZERO];
+        positions.extend(parts.iter().map(|&part| Vec3::X * part));
+        positions.push(Vec3::X);
+        let row: Vec<u32> = (2..positions.len() as u32).collect();
+        let last = positions.len() as u32 - 1;
+        let mut triangles = vec![[0, 1, 2], [0, last, 1], [0, 2, last]];
+        triangles.extend(row.windows(2).map(|ends| [1, ends[1], ends[0]]));
+        let whole = triangles.len();
+        close_gap(
+            &mut triangles,
+            &row.iter().rev().copied().collect::<Vec<_>>(),
+            &mut random,
+        );
+        assert_eq!(triangles.len(), whole + between);
+        let positions: Vec<Vec3> = positions.into_iter().map(at).collect();
+        let surface = ClosedSurface::new(&positions, &triangles).unwrap_or_else(|refused| panic!("{case}: {refused}"));
+        let volume = f64::from(size).powi(3) / 6.0;
+        assert!(
+            (surface.volume() / volume - 1.0).abs() < 1e-5,
+            "{case}: {} of {volume}",
+            surface.volume()
+        );
+        assert_eq!(surface.triangles().len(), triangles.len());
+        for nodes in surface.triangles() {
+            let [a, b, c] = nodes.map(|node| surface.positions()[node as usize].as_dvec3());
+            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+            let height = (b - a).cross(c - a).length() / longest;
+            assert!(
+                height > 1e-6 * longest,
+                "{case}: {nodes:?} is {height} high of {longest}"
+            );
+        }
     }
 }
 
