@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use crate::base::{Error, Result, memory};
 use crate::codec::saved;
-use crate::handover::pool::{PoolReader, PoolWriter};
 use crate::soa::{TILE, tile_count, tile_nodes};
+use crate::sync::pool::{PoolReader, PoolWriter};
 use crate::threads::{Team, Tiles};
 
 /// So many readers of one body at a time.

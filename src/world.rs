@@ -31,12 +31,12 @@ use crate::base::{AttachmentId, Profile, Result, StateHasher, WorldTag, ensure, 
 use crate::body::Body;
 use crate::contact::{DynamicTool, Tool, ToolPath};
 use crate::def::finite_vector;
+use crate::deformable_contact::DeformableContact;
 use crate::readers::Clock;
 use crate::simd::{ChosenKernel, Kernel};
 use crate::slots::Slots;
 use crate::solver::{CoupledBody, Outcome};
 use crate::threads::{RunTasks, Threads};
-use crate::tissue::Tissue;
 use attachments::Attachment;
 use blade::Blade;
 pub use blade::{BladeDefinition, BladeReport};
@@ -123,7 +123,7 @@ pub struct World {
     /// Those of them that are rigid bodies.
     dynamic: Vec<DynamicTool>,
     /// Contacts of tissue with tissue, where bodies ask for them.
-    pub(crate) tissue: Option<Box<Tissue>>,
+    pub(crate) tissue: Option<Box<DeformableContact>>,
     /// The bodies that take their substeps together, by their places; none where none can.
     walks: Vec<Option<CoupledBody>>,
     /// How the step in progress ended for each body, at its place.

@@ -34,9 +34,9 @@ macro_rules! with {
                 pub use crate::sync::*;
                 $(pub const $ordering: std::sync::atomic::Ordering = std::sync::atomic::Ordering::$weak;)*
             }
-            #[path = "../src/handover/pool.rs"]
+            #[path = "../src/sync/pool.rs"]
             pub mod pool;
-            #[path = "../src/handover/triple_buffer.rs"]
+            #[path = "../src/sync/triple_buffer.rs"]
             pub mod triple_buffer;
         }
     };

@@ -6,6 +6,7 @@ use super::cuttable::Cuttable;
 use crate::base::{Error, Result, memory};
 use crate::contact::SurfaceChange;
 use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, Sweep};
+use crate::deformable_contact::{Skin, SkinChange, SurfaceToBe};
 use crate::elements::PieceOfElement;
 use crate::forces::Parts;
 use crate::nodes::{Bound, NewNode};
@@ -13,7 +14,6 @@ use crate::soa::NodeOrder;
 use crate::solver::{Changed, System, close_beside};
 use crate::springs::{Rewiring, SpringChange};
 use crate::terms::Parting;
-use crate::tissue::{Skin, SkinChange, SurfaceToBe};
 
 /// What a cut did.
 ///

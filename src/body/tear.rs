@@ -7,9 +7,9 @@ use super::{Body, CutReport};
 use crate::base::{Error, Result, memory, outer};
 use crate::cutting::{CutSurface, Divided, VertexLoad};
 use crate::def::{TearReport, Values, Withheld, check_given};
+use crate::deformable_contact::Skin;
 use crate::springs::{Link, pull};
 use crate::threads::Team;
-use crate::tissue::Skin;
 
 /// What became of a spring that was to tear.
 #[derive(Clone, Copy, Debug)]

@@ -6,7 +6,7 @@ use super::tear::Torn;
 use crate::base::{Result, memory};
 use crate::cutting::{CutMaterial, Divided, VertexLoad};
 use crate::def::Withheld;
-use crate::tissue::Skin;
+use crate::deformable_contact::Skin;
 
 impl Body {
     /// The nodes at which a spring, or an edge of elements, may tear its solid, in the order in which they are to be tried: that of its own nodes

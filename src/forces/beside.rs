@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::cavities::{At, Enclosed};
 use crate::codec::saved;
-use crate::enclosed::{At, Enclosed};
 use crate::terms::{TangentBlocks, Term, Terms};
 
 /// What acts beside springs and elements. A solver may borrow it for as long as it solves.

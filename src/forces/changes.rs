@@ -4,9 +4,9 @@ use glam::DMat3;
 
 use super::{Forces, Sum};
 use crate::base::Result;
+use crate::cavities;
 use crate::codec::saved;
 use crate::elements::{self, Sums};
-use crate::enclosed;
 use crate::soa::{Records, Vectors};
 use crate::terms::TangentBlocks;
 use crate::threads::Team;
@@ -17,7 +17,7 @@ pub(crate) struct Changes {
     /// The ways, for springs that gather them, and elements.
     pub records: Option<Records>,
     pub(super) elements: Option<Sums>,
-    cavities: Option<enclosed::PressureChanges>,
+    cavities: Option<cavities::PressureChanges>,
 }
 
 saved! { Changes { records, elements, cavities } }
@@ -83,7 +83,7 @@ impl Forces {
     }
 
     /// Shows for each cavity kappa over its volume at rest, Pa/m³, and what its triangles have of how its volume grows.
-    pub fn show_cavity_factors(&self, positions: &Vectors, see: &mut dyn FnMut(f64, enclosed::Gradients)) {
+    pub fn show_cavity_factors(&self, positions: &Vectors, see: &mut dyn FnMut(f64, cavities::Gradients)) {
         let at = |node: usize| positions.get(node).as_dvec3();
         let cavities = self.beside.cavities.iter();
         cavities.for_each(|cavities| cavities.show_factors(&at, see));

@@ -11,10 +11,10 @@ use std::ops::Range;
 use glam::{DVec3, Vec3};
 
 use crate::base::{Result, StateHasher, memory};
+use crate::cavities::{self, Enclosed};
 use crate::codec::saved;
 use crate::def::{BodyDefinition, EnclosedReport, Spring};
 use crate::elements::{self, Elements, Law};
-use crate::enclosed::{self, Enclosed};
 use crate::simd::ChosenKernel;
 use crate::soa::{NodeOrder, Records, TileForces, Vectors, View, WriteRecords, tile_count, tile_nodes};
 use crate::springs::{Course, Link, Motion, Springs, pull, store};
@@ -47,7 +47,7 @@ pub(crate) struct Sum<'a> {
     pub springs: &'a dyn Springs,
     elements: Option<elements::Shares<'a>>,
     terms: Option<&'a Terms>,
-    cavities: Option<enclosed::PressureShares<'a>>,
+    cavities: Option<cavities::PressureShares<'a>>,
 }
 
 impl Sum<'_> {

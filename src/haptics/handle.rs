@@ -12,7 +12,7 @@ use crate::base::{Result, ensure};
 use crate::contact::Pose;
 use crate::def::finite_vector;
 use crate::geometry::rotation;
-use crate::handover::triple_buffer::{BufferReader, BufferWriter};
+use crate::sync::triple_buffer::{BufferReader, BufferWriter};
 
 /// Beside what the motion of the device explains, a tick changes the force by no more than this, N, or this part of it.
 const LEAST_CHANGE: f64 = 0.02;

@@ -8,9 +8,9 @@ use super::{World, make_walks};
 use crate::base::{AttachmentId, BodyId, Error, Result, ToolId, ensure, memory};
 use crate::codec::{saved, saved_enum};
 use crate::def::{Anchor, SurfacePoint};
+use crate::deformable_contact::{BondPoint, Bonds, Thread, are_one};
 use crate::solver::Grip;
 use crate::solver::Outcome;
-use crate::tissue::{BondPoint, Bonds, Thread, are_one};
 
 /// Whose attachment it is.
 #[derive(Clone, Copy, Debug)]

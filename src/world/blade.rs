@@ -9,9 +9,9 @@ use crate::codec::saved;
 use crate::contact::Pose;
 use crate::cutting::Met;
 use crate::def::{CollisionFilter, finite_vector};
+use crate::deformable_contact::Lead;
 use crate::geometry::rotation::{turn_between, turned};
 use crate::mesh::FURTHEST;
-use crate::tissue::Lead;
 
 /// A proxy is held at no more points: a blade through more layers of a body is held at some.
 pub(super) const MOST_HOLDS: usize = 8;

@@ -11,8 +11,8 @@ use super::World;
 use super::blade::{Blade, BladeDefinition, BladeReport, MOST_HOLDS, Stand};
 use crate::base::{BladeId, BodyId, Result, SlotId};
 use crate::def::CollisionFilter;
+use crate::deformable_contact::Lead;
 use crate::slots::Slots;
-use crate::tissue::Lead;
 
 impl World {
     /// Adds a blade: an edge that is moved by its pose, as tools are, cuts the bodies made for it ([`BodyDefinition::spare_nodes`]) as

@@ -8,8 +8,8 @@ use crate::base::{BodyId, Result, SlotId, memory};
 use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
 use crate::cutting::Sweep;
 use crate::def::{Anchor, BodyDefinition};
+use crate::deformable_contact::Skin;
 use crate::solver::{RestStateDefinition, RestStateReport};
-use crate::tissue::Skin;
 
 impl World {
     /// Adds a body.

@@ -6,11 +6,11 @@ use super::World;
 use crate::base::{BodyId, Error, Result, ToolId};
 use crate::contact::{Form, Pose};
 use crate::geometry::rotation;
-use crate::handover::triple_buffer::{BufferReader, BufferWriter, triple_buffer};
 use crate::haptics::{
     Cone, Coupling, HapticContact, HapticDefinition, HapticHandle, MOST_CONTACTS, Secant, Sent, Vector6, WrenchModel,
     ZERO, about, along, difference, inverse, joined, product, scaled, spread, sum,
 };
+use crate::sync::triple_buffer::{BufferReader, BufferWriter, triple_buffer};
 
 /// What nobody feels, N.
 const UNFELT: f64 = 1e-3;

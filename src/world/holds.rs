@@ -8,7 +8,7 @@ use super::{World, make_walks};
 use crate::base::{Result, memory};
 use crate::body::{Body, HoldAt};
 use crate::cutting::Met;
-use crate::tissue::{Lead, Thread};
+use crate::deformable_contact::{Lead, Thread};
 
 /// Where a proxy is to be held: a point of the tissue, and that of the proxy next to it.
 pub(super) type Held = (HoldAt, DVec3);

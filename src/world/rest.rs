@@ -2,12 +2,12 @@
 
 use crate::body::Body;
 use crate::contact::ToolPath;
+use crate::deformable_contact::DeformableContact;
 use crate::slots::Slots;
 use crate::solver::Outcome;
-use crate::tissue::Tissue;
 
 /// Wakes what tools come near to, and with each body those that fell asleep with it.
-pub(super) fn rouse_groups(tissue: &mut Tissue, bodies: &mut Slots<Body>, tools: &[ToolPath]) {
+pub(super) fn rouse_groups(tissue: &mut DeformableContact, bodies: &mut Slots<Body>, tools: &[ToolPath]) {
     bodies.iter_mut().for_each(|(_, body)| body.system_mut().rouse(tools));
     let mut woken = std::mem::take(&mut tissue.groups);
     let is_asleep = |bodies: &Slots<Body>, place: usize| bodies.at(place).is_some_and(|body| body.system().is_asleep());
@@ -21,7 +21,7 @@ pub(super) fn rouse_groups(tissue: &mut Tissue, bodies: &mut Slots<Body>, tools:
 }
 
 /// Wakes all bodies of an island of which one is awake.
-pub(super) fn wake_islands(tissue: &Tissue, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
+pub(super) fn wake_islands(tissue: &DeformableContact, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
     for island in 0..tissue.islands.count() {
         if tissue.is_asleep(island, bodies) {
             continue;
@@ -38,7 +38,7 @@ pub(super) fn wake_islands(tissue: &Tissue, bodies: &mut Slots<Body>, outcomes: 
 }
 
 /// After a step: an island of which all have been at rest for long enough falls asleep. `took` tells whether a body took the step.
-pub(super) fn rest_islands(tissue: &mut Tissue, bodies: &mut Slots<Body>, took: impl Fn(usize) -> bool) {
+pub(super) fn rest_islands(tissue: &mut DeformableContact, bodies: &mut Slots<Body>, took: impl Fn(usize) -> bool) {
     for (place, body) in bodies.iter() {
         if !body.system().is_asleep() {
             tissue.groups.leave(place);

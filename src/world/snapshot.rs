@@ -5,11 +5,11 @@ use crate::base::{Error, Result, WorldTag, ensure, memory};
 use crate::body::Body;
 use crate::codec::{Saved, Writer, begin, opened, read_section, saved, seal, shape_with, write_section};
 use crate::contact::Tool;
+use crate::deformable_contact::DeformableContact;
 use crate::simd::Kernel;
 use crate::slots::Slots;
 use crate::soa::TILE;
 use crate::threads::RunTasks;
-use crate::tissue::Tissue;
 
 use super::attachments::Attachment;
 use super::blade::Blade;
@@ -24,7 +24,7 @@ const SHAPE: u64 = {
     let shape = shape_with(shape, Tool::SHAPE);
     let shape = shape_with(shape, Attachment::SHAPE);
     let shape = shape_with(shape, Blade::SHAPE);
-    let shape = shape_with(shape, Tissue::SHAPE);
+    let shape = shape_with(shape, DeformableContact::SHAPE);
     shape_with(shape, TILE as u64)
 };
 

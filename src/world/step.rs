@@ -10,10 +10,10 @@ use crate::base::{
 use crate::body::Body;
 use crate::contact::{TRIES, ToolPath};
 use crate::def::ChoiceReason;
+use crate::deformable_contact::CoupledGroup;
 use crate::slots::Slots;
 use crate::solver::{Outcome, RESERVE, StepRequest, attempt};
 use crate::threads::{Items, Team};
-use crate::tissue::CoupledGroup;
 
 /// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
 const SHARED_FROM: usize = 8192;

@@ -4,7 +4,7 @@ use super::World;
 use super::attachments::{Which, check_limit, refuse_one_point};
 use crate::base::{AttachmentId, BodyId, Error, Result, ensure};
 use crate::def::Anchor;
-use crate::tissue::{Thread, distance};
+use crate::deformable_contact::{Thread, distance};
 
 /// What a suture is like.
 ///

@@ -15,7 +15,7 @@ const MAY_IMPORT: &[Row] = &[
     ("simd", &["base"]),
     ("codec", &["base", "simd"]),
     ("slots", &["base", "codec"]),
-    ("handover", &[]),
+    ("sync", &[]),
     ("threads", &["base"]),
     ("soa", &["base", "simd", "codec", "threads"]),
     ("nodes", &["base", "codec", "threads", "soa"]),
@@ -28,20 +28,20 @@ const MAY_IMPORT: &[Row] = &[
     ("springs", &["base", "simd", "codec", "soa", "order", "def"]),
     ("elements", &["base", "simd", "codec", "threads", "soa", "def", "springs"]),
     ("terms", &["base", "simd", "codec", "threads", "soa", "def", "springs"]),
-    ("enclosed", &["base", "codec", "threads", "soa", "def", "springs"]),
-    ("forces", &["base", "simd", "codec", "threads", "soa", "def", "springs", "elements", "terms", "enclosed"]),
+    ("cavities", &["base", "codec", "threads", "soa", "def", "springs"]),
+    ("forces", &["base", "simd", "codec", "threads", "soa", "def", "springs", "elements", "terms", "cavities"]),
     ("material", &["base", "mesh", "def", "elements"]),
     ("cutting", &["base", "codec", "strain"]),
     ("contact", &["base", "simd", "codec", "soa", "nodes", "geometry", "mesh", "def", "raster"]),
-    ("readers", &["base", "codec", "handover", "threads", "soa"]),
+    ("readers", &["base", "codec", "sync", "threads", "soa"]),
     ("solver", &["base", "simd", "codec", "threads", "soa", "nodes", "geometry", "def", "springs", "elements", "forces",
         "contact"]),
-    ("tissue", &["base", "codec", "threads", "soa", "nodes", "geometry", "mesh", "def", "contact", "solver"]),
+    ("deformable_contact", &["base", "codec", "threads", "soa", "nodes", "geometry", "mesh", "def", "contact", "solver"]),
     ("body", &["base", "simd", "codec", "slots", "threads", "soa", "nodes", "geometry", "order", "mesh", "def", "springs",
-        "elements", "terms", "forces", "material", "cutting", "contact", "readers", "solver", "tissue"]),
-    ("haptics", &["base", "handover", "geometry", "def", "contact"]),
-    ("world", &["base", "simd", "codec", "slots", "handover", "threads", "soa", "geometry", "mesh", "def", "cutting", "contact",
-        "readers", "solver", "tissue", "body", "haptics"]),
+        "elements", "terms", "forces", "material", "cutting", "contact", "readers", "solver", "deformable_contact"]),
+    ("haptics", &["base", "sync", "geometry", "def", "contact"]),
+    ("world", &["base", "simd", "codec", "slots", "sync", "threads", "soa", "geometry", "mesh", "def", "cutting", "contact",
+        "readers", "solver", "deformable_contact", "body", "haptics"]),
     ("embedding", &["base", "geometry", "mesh", "def", "cutting", "body", "world"]),
     ("query", &["base", "geometry", "def", "contact", "body", "world"]),
     ("detection", &["contact"]),
@@ -309,7 +309,7 @@ fn all_sources() -> Vec<(String, String)> {
 
 #[test]
 fn few_files_beside_forces_name_elements_terms_or_cavities() {
-    const NAMED: [&str; 3] = ["elements", "terms", "enclosed"];
+    const NAMED: [&str; 3] = ["elements", "terms", "cavities"];
     let sources = all_sources();
     let names = |(file, text): &&(String, String)| {
         let module = module_of(file);

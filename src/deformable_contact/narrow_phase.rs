@@ -1,6 +1,6 @@
 //! Finds the contacts of bodies that take a substep together.
 
-use super::Tissue;
+use super::DeformableContact;
 use super::bonds::Bonds;
 use super::entangled::Entangled;
 use super::link::{ContactSide, Link};
@@ -14,7 +14,7 @@ use crate::solver::{Span, System, Systems};
 /// What keeps off a surface without thickness, as a part of its short edges: in `f32` something must.
 pub(super) const LEAST_THICKNESS: f32 = 1e-3;
 
-impl Tissue {
+impl DeformableContact {
     /// Draws what of each surface is near others that it is found by in images, as the substep begins.
     pub(super) fn draw(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
         for member in 0..self.islands.members(island).len() {

@@ -3,7 +3,7 @@
 //! All take as many as the one that needs most: one of VERLET what its stability asks for, one of the other solvers substeps of 1 ms as
 //! near a tool, and shorter ones where stiff bodies press each other.
 
-use super::Tissue;
+use super::DeformableContact;
 use crate::solver::{
     Account, CoupledBody, CoupledStep, Energies, EnergyAccount, Outcome, RESERVE, Span, StepRequest, StepResult,
     StepStart, System, Systems, TooLong, finish, relieve_squeezed, slow_down, substeps_needed,
@@ -15,7 +15,7 @@ const ATTEMPTS: u32 = 6;
 
 /// The bodies that go together, in islands, as `tissue` tells; `walks` has a place for each body.
 pub(crate) struct CoupledGroup<'a> {
-    pub tissue: &'a mut Tissue,
+    pub tissue: &'a mut DeformableContact,
     pub walks: &'a mut [Option<CoupledBody>],
     pub request: &'a StepRequest<'a>,
     pub team: &'a Team<'a>,

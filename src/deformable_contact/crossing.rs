@@ -1,6 +1,6 @@
 //! Edges of one surface that pass through triangles of another: what contact is to prevent, and what it left.
 
-use super::Tissue;
+use super::DeformableContact;
 use super::plan::are_asleep;
 use super::search::shift;
 use super::skin::{NONE, Skin};
@@ -9,7 +9,7 @@ use crate::geometry::Bounds;
 use crate::geometry::predicates::crosses;
 use crate::solver::Systems;
 
-impl Tissue {
+impl DeformableContact {
     /// Finds the edges of bodies that go together that pass through tissue when a step begins, or as one that was tried ends: how many
     /// there are.
     pub fn find_crossings(&mut self, bodies: &impl Systems, at_end: bool) -> u32 {

@@ -76,7 +76,7 @@ impl Bonds {
 
     /// What bonds of the group have put in in the step, and what their threads store as it ends, J; `None` where that is not known: a thread
     /// becomes shorter, is led or gives way.
-    pub(in crate::tissue) fn energy(&self) -> Option<[f64; 2]> {
+    pub(in crate::deformable_contact) fn energy(&self) -> Option<[f64; 2]> {
         let mut sums = [0.0; 2];
         for bond in self.bonds.iter().filter(|bond| bond.is_in_turn) {
             let stored = bond.thread.as_ref().map_or(Some(0.0), |thread| {
@@ -117,7 +117,12 @@ impl Bonds {
     }
 
     /// Takes a substep as it is to be, after the skins.
-    pub(in crate::tissue) fn follow(&mut self, bodies: &mut impl Systems, skins: &[Option<Skin>], moment: &Span) {
+    pub(in crate::deformable_contact) fn follow(
+        &mut self,
+        bodies: &mut impl Systems,
+        skins: &[Option<Skin>],
+        moment: &Span,
+    ) {
         for end in self.ends.iter_mut().filter(|end| end.is_in_turn) {
             let Some(body) = bodies.at_mut(end.body) else { continue };
             let skin = skins.get(end.body).and_then(Option::as_ref);
@@ -149,7 +154,7 @@ impl Bonds {
     }
 
     /// Has threads between bodies that keep each other apart by these contacts give way to them.
-    pub(in crate::tissue) fn loosen(&mut self, links: &[Link], moment: &Span) {
+    pub(in crate::deformable_contact) fn loosen(&mut self, links: &[Link], moment: &Span) {
         for bond in self.bonds.iter_mut().filter(|bond| bond.acts) {
             let [a, b] = bond.points.map(|point| point.body);
             if let Some(thread) = &mut bond.thread {
@@ -163,7 +168,7 @@ impl Bonds {
 
     /// Makes the velocities of the points of each bond equal, or those that its thread asks for, one after the other: the largest difference
     /// that there was, m/s.
-    pub(in crate::tissue) fn sweep(&mut self, skins: &mut [Option<Skin>], moment: &Span) -> f32 {
+    pub(in crate::deformable_contact) fn sweep(&mut self, skins: &mut [Option<Skin>], moment: &Span) -> f32 {
         let mut largest = 0.0_f32;
         for bond in self.bonds.iter_mut().filter(|bond| bond.acts) {
             let [velocity, size] = bond.velocity(&self.ends, skins);
@@ -197,7 +202,12 @@ impl Bonds {
     }
 
     /// Gives bodies what was found, and foresees the same for the next substep.
-    pub(in crate::tissue) fn give(&mut self, bodies: &mut impl Systems, skins: &[Option<Skin>], moment: &Span) {
+    pub(in crate::deformable_contact) fn give(
+        &mut self,
+        bodies: &mut impl Systems,
+        skins: &[Option<Skin>],
+        moment: &Span,
+    ) {
         self.ends.iter_mut().for_each(|end| end.given = Vec3::ZERO);
         for bond in self.bonds.iter_mut().filter(|bond| bond.acts) {
             let duration = bond.duration(moment, self.is_opening);
@@ -225,7 +235,7 @@ impl Bonds {
     }
 
     /// Moves what is apart at the end of a substep of `duration` seconds together, without giving it speed.
-    pub(in crate::tissue) fn part(&mut self, bodies: &mut impl Systems, duration: f32) {
+    pub(in crate::deformable_contact) fn part(&mut self, bodies: &mut impl Systems, duration: f32) {
         let Self { bonds, ends, .. } = self;
         for end in ends.iter_mut().filter(|end| end.is_in_turn) {
             if let Some(body) = bodies.at(end.body) {

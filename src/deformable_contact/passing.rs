@@ -5,7 +5,7 @@
 
 use glam::Vec3A;
 
-use super::Tissue;
+use super::DeformableContact;
 use super::link::Link;
 use super::search::shift;
 use super::skin::Skin;
@@ -20,7 +20,7 @@ const NEAR_OF_CLOSED: f32 = 0.2;
 const ALLOWED: f32 = 0.01;
 const ALLOWED_OF_CLOSED: f32 = 0.1;
 
-impl Tissue {
+impl DeformableContact {
     /// Asks more of contacts where any has sides that end nearer than they are to, as fast as they go now: whether any has.
     pub(super) fn hold_sides(&mut self, moment: &Span) -> bool {
         let Self { links, skins, .. } = self;

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, FloatExt, Vec3};
 
-use super::Tissue;
+use super::DeformableContact;
 use super::islands::Reach;
 use super::link::Key;
 use super::meet_each_other;
@@ -24,7 +24,7 @@ const FOLLOWED: f32 = 1.0;
 /// How much further than they can come bodies count as near, as a part of their extents.
 const MARGIN: f32 = 0.005;
 
-impl Tissue {
+impl DeformableContact {
     /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, those that are attached,
     /// and by themselves those that meet themselves.
     pub fn plan(&mut self, bodies: &impl Systems, dt: f32) {

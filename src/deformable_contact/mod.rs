@@ -84,7 +84,7 @@ const ROOM: usize = 1;
 
 /// Contacts of tissue with tissue; kept only in worlds with bodies that ask for them.
 #[derive(Debug, Default)]
-pub(crate) struct Tissue {
+pub(crate) struct DeformableContact {
     pub islands: Islands,
     /// By a body's place in the world.
     skins: Vec<Option<Skin>>,
@@ -111,9 +111,9 @@ pub(crate) struct Tissue {
     pub bonds: Bonds,
 }
 
-saved! { Tissue { islands, skins, clearances, entangled, links, duration, known, pushes, touches, touching, pairs, groups, bonds } }
+saved! { DeformableContact { islands, skins, clearances, entangled, links, duration, known, pushes, touches, touching, pairs, groups, bonds } }
 
-impl Tissue {
+impl DeformableContact {
     /// Makes room for a body at this place in the world, which meets tissue.
     pub fn join(&mut self, place: usize, body: &System) -> Result<()> {
         let mut skin = Skin::new(body)?;
