@@ -1,5 +1,5 @@
-//! Debug drawing: what contact, pins, attachments, springs and sleep are like, as lines, points and triangles for a program's own
-//! renderer.
+//! Debug drawing: contacts, pins, attachments, springs and sleep as lines, points and triangles for the renderer of the
+//! host.
 
 use glam::Vec3;
 
@@ -23,12 +23,12 @@ const SLIDING: Rgba = 0x40d0_ffff;
 const ATTACHED: Rgba = 0xd040_ffff;
 const ASLEEP: Rgba = 0x6070_a060;
 const BOX: Rgba = 0x8080_80ff;
-/// Springs that are as long as at rest, compressed as far as the scale goes, and stretched as far.
+/// The colors of springs at rest, at the largest compression and at the largest stretch of the scale.
 const RELAXED: [f32; 3] = [0.85, 0.85, 0.85];
 const COMPRESSED: [f32; 3] = [0.1, 0.3, 1.0];
 const STRETCHED: [f32; 3] = [1.0, 0.15, 0.1];
 
-/// What draws. Places are in the world's coordinates, m.
+/// The interface of a renderer. Positions are in world coordinates, m.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -56,7 +56,7 @@ pub trait DebugCanvas {
     fn triangle(&mut self, corners: [Vec3; 3], color: Rgba);
 }
 
-/// What is drawn.
+/// The definition of a debug drawing.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -78,30 +78,30 @@ pub trait DebugCanvas {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DebugDrawDefinition {
-    /// A point where a tool pressed a body when the last step ended, and a line along the force on the tool.
+    /// A point at each contact of a tool with a body at the end of the last step, and a line along the force on the tool.
     pub contacts: bool,
     /// A line along the normal of each such contact, away from the tool.
     pub normals: bool,
-    /// A point at each pinned node; of another color where it is free along an axis.
+    /// A point at each pinned node, in another color if an axis is free.
     pub pins: bool,
-    /// A line from a tool to each node that it holds, and between points that are attached or sutured to each other.
+    /// A line from a tool to each attached node, and between attached or sutured points.
     pub attachments: bool,
-    /// A line along each spring, colored by its strain: blue compressed, red stretched.
+    /// A line along each spring, blue if compressed, red if stretched.
     pub springs: bool,
-    /// The triangles of the surface whose nodes all sleep.
+    /// The surface triangles whose nodes all sleep.
     pub sleeping: bool,
-    /// The box about each body.
+    /// The bounding box of each body.
     pub bounds: bool,
-    /// How long the normals are, m, at least 0.
+    /// The length of normals, m, at least 0.
     pub normal_length: f32,
-    /// How long a force of 1 N is, m/N, at least 0.
+    /// The length of a force of 1 N, m/N, at least 0.
     pub force_scale: f32,
-    /// The strain at which springs have the strongest color, above 0.
+    /// The strain of the strongest color, above 0.
     pub full_strain: f32,
 }
 
 impl Default for DebugDrawDefinition {
-    /// Everything, with normals of 1 cm, 1 cm for each newton, and the strongest color at a strain of a tenth.
+    /// Draws everything, with normals of 1 cm, forces of 1 cm/N, and the strongest color at a strain of 0.1.
     fn default() -> Self {
         Self {
             contacts: true,
@@ -119,10 +119,10 @@ impl Default for DebugDrawDefinition {
 }
 
 impl World {
-    /// Draws what the definition asks for, as the last step left it. It allocates nothing and changes nothing.
+    /// Draws the state after the last step. It allocates nothing and changes nothing.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): a length or the scale is out of its range. Nothing is drawn then.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): a length or the scale is out of range. After an error nothing is drawn.
     pub fn debug_draw(&self, definition: &DebugDrawDefinition, canvas: &mut dyn DebugCanvas) -> Result<()> {
         not_negative("normal_length", definition.normal_length)?;
         not_negative("force_scale", definition.force_scale)?;
@@ -143,7 +143,7 @@ impl World {
             }
         }
         if definition.attachments {
-            self.show_attached(|ends| canvas.line(ends, ATTACHED));
+            self.visit_attachments(|ends| canvas.line(ends, ATTACHED));
         }
         if definition.contacts || definition.normals {
             self.draw_contacts(definition, canvas);
@@ -168,14 +168,14 @@ impl World {
 }
 
 fn draw_sleeping(body: &Body, canvas: &mut dyn DebugCanvas) {
-    let Some(sleeper) = body.system().sleeper.as_deref() else {
+    let Some(sleep_state) = body.system().sleep_state.as_deref() else {
         return;
     };
     let positions = body.positions();
     let count = body.node_count();
     let sleeps = |node: u32| {
         let tile = body.system().order.own(node) as usize / TILE;
-        tile < tile_count(count) && sleeper.is_asleep(tile)
+        tile < tile_count(count) && sleep_state.is_asleep(tile)
     };
     for triangle in body.surface() {
         if triangle.iter().all(|&node| sleeps(node)) {
@@ -190,7 +190,7 @@ fn draw_springs(body: &Body, full: f32, canvas: &mut dyn DebugCanvas) {
         let system = body.system();
         let own = system.order.own(node as u32) as usize;
         system.forces.springs.visit(own, &mut |link| {
-            let other = system.callers(link.neighbour as usize);
+            let other = system.caller_index(link.neighbor as usize);
             if other > node && link.rest_length > 0.0 {
                 let strain = place.distance(positions[other]) / link.rest_length - 1.0;
                 canvas.line([place, positions[other]], color_of(strain / full));
@@ -199,7 +199,7 @@ fn draw_springs(body: &Body, full: f32, canvas: &mut dyn DebugCanvas) {
     }
 }
 
-/// The color of a spring with this part of the strain that the scale goes to.
+/// The color of a spring for a strain relative to the largest of the scale.
 fn color_of(part: f32) -> Rgba {
     let part = part.clamp(-1.0, 1.0);
     let end = if part < 0.0 { COMPRESSED } else { STRETCHED };
@@ -212,7 +212,7 @@ fn color_of(part: f32) -> Rgba {
 
 fn draw_pins(body: &Body, canvas: &mut dyn DebugCanvas) {
     for pin in body.system().pins.iter() {
-        let place = body.positions()[body.system().callers(pin.node as usize)];
+        let place = body.positions()[body.system().caller_index(pin.node as usize)];
         canvas.point(place, if pin.is_partial() { SLIDING } else { PINNED });
     }
 }

@@ -1,4 +1,4 @@
-//! Which parts of two surfaces overlap, and by how much, without a world.
+//! Overlap of two surfaces, without a world.
 
 /// In image space: rays through the pixels of a parallel view (CInDeR; Halic et al., section 2.1).
 pub mod image_space {

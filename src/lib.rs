@@ -1,4 +1,4 @@
-//! Soft tissue for programs that already have a loop.
+//! Real-time soft-tissue simulation for programs with their own main loop.
 
 mod base;
 mod body;

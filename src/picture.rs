@@ -1,4 +1,4 @@
-//! Pictures of a world.
+//! Images of a world.
 
 use glam::Vec3;
 
@@ -6,13 +6,13 @@ use glam::Vec3;
 use crate::base::Error;
 use crate::base::{BodyId, Result, ensure, memory};
 use crate::body::Body;
-use crate::contact::{Contact, Form, Pose, Tool};
+use crate::contact::{Contact, Pose, Tool, ToolShape};
 use crate::def::finite_vector;
 use crate::mesh::is_closed;
 use crate::raster::{self, Camera, ColourScale, Coloured, Image, Lines, Look, Scene, Surface};
 use crate::world::World;
 
-/// How a world is drawn.
+/// The definition of an image of a world.
 ///
 /// ```
 #[doc = include_str!("doctest/cloth.txt")]
@@ -29,16 +29,16 @@ pub struct PictureDefinition {
     pub width: u32,
     /// Pixels, 1 to 16384.
     pub height: u32,
-    /// Where the camera is, in metres, and what it looks at; `None`: a view fitted to the bodies.
+    /// The position of the camera and its target, m; `None` for a view fitted to the bodies.
     pub eye_and_target: Option<(Vec3, Vec3)>,
-    /// What is up in the picture.
+    /// The up direction of the image.
     pub up: Vec3,
-    /// For a fitted view: from the scene towards the camera.
+    /// The direction from the scene to the camera, for a fitted view.
     pub direction: Vec3,
-    /// The vertical angle of view, above 0 and below pi, in radians.
+    /// The vertical field of view, above 0 and below pi, rad.
     pub field_of_view: f32,
-    /// Whether the points are drawn where tools press bodies, and the forces on the tools there: the largest is as long as a sixth of
-    /// the scene, seen through what hides it.
+    /// Draws the contacts of tools with bodies, and the forces on the tools. The largest force is as long as a sixth of
+    /// the scene. They are visible through other surfaces.
     pub show_contacts: bool,
 }
 
@@ -57,7 +57,7 @@ impl Default for PictureDefinition {
     }
 }
 
-/// A body that is coloured by a number for each of its nodes, such as strain or a force.
+/// A body colored by a value for each node, such as strain or a force.
 ///
 /// ```
 #[doc = include_str!("doctest/cloth.txt")]
@@ -73,28 +73,28 @@ impl Default for PictureDefinition {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyValues<'a> {
-    /// Which.
+    /// The body.
     pub body: BodyId,
-    /// For each node, in the caller's order.
+    /// The value of each node, in the caller's order.
     pub values: &'a [f32],
-    /// What colours they have.
+    /// The color scale.
     pub scale: ColourScale,
 }
 
 impl World {
-    /// A picture of all bodies and tools: the surface of a body, or its springs where it has none.
+    /// Renders an image of all bodies and tools. Bodies without a surface are drawn as springs.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: something in the definition is out of its range. [`Error::OutOfMemory`].
+    /// [`Error::InvalidArgument`]: a value of the definition is out of range. [`Error::OutOfMemory`].
     pub fn picture(&self, definition: &PictureDefinition) -> Result<Image> {
         self.picture_of_values(definition, &[])
     }
 
-    /// The same with some bodies coloured by numbers; what values stand for which colours is the caller's to tell.
+    /// Renders an image with some bodies colored by values. The image has no legend.
     ///
     /// # Errors
-    /// As [`World::picture`]; and [`Error::InvalidArgument`]: not one value for each node, one that is not finite, or a scale whose
-    /// `low` is not below `high`. [`Error::StaleId`].
+    /// Those of [`World::picture`]. [`Error::InvalidArgument`]: the number of values differs from the number of nodes, a value is not finite, or
+    /// `low` of a scale is not below `high`. [`Error::StaleId`].
     pub fn picture_of_values(&self, definition: &PictureDefinition, coloured: &[BodyValues]) -> Result<Image> {
         for of in coloured {
             self.body(of.body)?;
@@ -154,7 +154,7 @@ impl World {
         scene.draw(&camera, definition.width, definition.height)
     }
 
-    /// A dot where a tool presses a body, and a line along the force on it.
+    /// Draws a dot at each contact of a tool, and a line along the force on it.
     fn marks_of_contacts(&self, scene: &Scene) -> Vec<(raster::Shape, Look)> {
         let extent = scene.extent().map_or(0.0, |(low, high)| (high - low).max_element());
         let contacts: Vec<Contact> = self
@@ -183,7 +183,7 @@ impl World {
         }
     }
 
-    /// For each body the springs that stand for a surface it does not have.
+    /// The springs to draw for each body without a surface.
     fn springs_to_draw(&self) -> Result<Vec<Vec<[u32; 2]>>> {
         let springs = |body: &Body| {
             if body.surface().is_empty() {
@@ -214,40 +214,40 @@ impl PictureDefinition {
     }
 }
 
-/// The triangles of a body's skin, and those that cuts have bared, with a sharp edge between them; `None` where all is skin.
+/// The surface of a body and the faces exposed by cuts, with a sharp edge between them; `None` without exposed faces.
 fn skin_and_inside(body: &Body) -> Result<Option<[Vec<[u32; 3]>; 2]>> {
-    if !body.bared().any(|is_bared| is_bared) {
+    if !body.exposed().any(|is_exposed| is_exposed) {
         return Ok(None);
     }
     let mut parts = [Vec::new(), Vec::new()];
-    for (&triangle, is_bared) in body.surface().iter().zip(body.bared()) {
-        memory::push(&mut parts[usize::from(is_bared)], triangle)?;
+    for (&triangle, is_exposed) in body.surface().iter().zip(body.exposed()) {
+        memory::push(&mut parts[usize::from(is_exposed)], triangle)?;
     }
     Ok(Some(parts))
 }
 
-/// The radius of a contact's dot, and how long the largest force is drawn, as parts of the scene.
+/// The radius of a contact's dot, and the length of the largest force, relative to the scene.
 const DOT: f32 = 0.006;
 const LONGEST_FORCE: f32 = 1.0 / 6.0;
 
-/// What a tool that is no mesh looks like.
+/// The mesh that stands for a tool of a closed form.
 fn shape_of(tool: &Tool) -> Option<(raster::Shape, Look)> {
     let centre = tool.pose.position;
     let up = tool.pose.orientation * Vec3::Y;
-    let shape = match tool.form {
-        Form::Mesh(_) => return None,
-        Form::HalfSpace => {
+    let shape = match tool.shape {
+        ToolShape::Mesh(_) => return None,
+        ToolShape::HalfSpace => {
             let plane = raster::Shape::Plane {
                 point: centre,
                 normal: up,
             };
             return Some((plane, Look::GROUND));
         }
-        Form::Rounded {
+        ToolShape::Rounded {
             radius,
             half_length: 0.0,
         } => raster::Shape::Sphere { centre, radius },
-        Form::Rounded { radius, half_length } => raster::Shape::Capsule {
+        ToolShape::Rounded { radius, half_length } => raster::Shape::Capsule {
             start: centre - up * half_length,
             end: centre + up * half_length,
             radius,
@@ -256,9 +256,9 @@ fn shape_of(tool: &Tool) -> Option<(raster::Shape, Look)> {
     Some((shape, Look::INSTRUMENT))
 }
 
-/// The surface of a tool that is a mesh, where it is.
+/// The surface of a mesh tool at its pose.
 fn mesh_of(tool: &Tool) -> Option<(Vec<Vec3>, &[[u32; 3]])> {
-    let Form::Mesh(solid) = &tool.form else {
+    let ToolShape::Mesh(solid) = &tool.shape else {
         return None;
     };
     let Pose { position, orientation } = tool.pose;

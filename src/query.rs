@@ -1,4 +1,4 @@
-//! What of the bodies of a world a ray meets, or is nearest to a point: for a hand that is to grasp it.
+//! Ray casts and nearest-point queries on the bodies of a world.
 
 mod tools;
 
@@ -9,7 +9,7 @@ use crate::base::Error;
 use crate::base::{BodyId, Result, ToolId, ensure};
 use crate::body::Body;
 use crate::def::{CollisionFilter, finite_vector};
-use crate::geometry::Bounds;
+use crate::geometry::Aabb;
 use crate::geometry::nearest::{nearest_on_triangle, weighted};
 use crate::geometry::predicates::pierce;
 use crate::world::World;
@@ -30,19 +30,19 @@ use crate::world::World;
 pub struct SurfaceHit {
     /// The body it belongs to.
     pub body: BodyId,
-    /// The triangle, by its place in [`Body::surface`](crate::Body::surface).
+    /// The index of the triangle in [`Body::surface`](crate::Body::surface).
     pub triangle: u32,
-    /// Of the triangle's corners, 1 in sum, none below 0.
+    /// The barycentric weights of the triangle's corners: at least 0, with sum 1.
     pub weights: [f32; 3],
-    /// Where it is, m.
+    /// The position, m.
     pub position: Vec3,
-    /// The triangle's, outward, of unit length; 0 where it has no area.
+    /// The outward unit normal of the triangle; 0 if it has no area.
     pub normal: Vec3,
-    /// From where it was asked for, m.
+    /// The distance from the query's origin, m.
     pub distance: f32,
 }
 
-/// What a ray meets.
+/// The surface that a ray hits.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -63,21 +63,20 @@ pub enum RayHit {
     Tool {
         /// The tool.
         tool: ToolId,
-        /// Where it is met, m.
+        /// The position of the hit, m.
         position: Vec3,
-        /// Outward, of unit length.
+        /// The outward unit normal.
         normal: Vec3,
-        /// From the origin of the ray, m.
+        /// The distance from the origin of the ray, m.
         distance: f32,
     },
 }
 
 impl World {
-    /// As [`World::cast_ray`], of the bodies and tools that meet this filter: as if the ray were a thing with its
-    /// category and mask.
+    /// Casts a ray as [`World::cast_ray`] does, against the bodies and tools that collide with this filter.
     ///
     /// # Errors
-    /// As [`World::cast_ray`].
+    /// Those of [`World::cast_ray`].
     pub fn cast_ray_at(
         &self,
         origin: Vec3,
@@ -111,18 +110,18 @@ impl World {
         Ok(found)
     }
 
-    /// The first point that a ray from `origin` (m) along `direction` (of any length) meets on the surface of a body within
-    /// `max_distance` (m, may be infinite), at the nodes' current places; `None` where there is none. Fronts and backs of triangles count;
-    /// what lies along a triangle does not meet it.
+    /// The first point of a body's surface on a ray from `origin` (m) along `direction` (of any length) within
+    /// `max_distance` (m, can be infinite), at the current positions; `None` without a hit. Both sides of triangles count;
+    /// a ray in the plane of a triangle does not hit it.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: a number is not finite, the direction is zero, or `max_distance` is negative or not a number.
-    /// [`Error::OutOfMemory`]: there is none for a tree over a body's surface.
+    /// [`Error::OutOfMemory`]: the search tree of a body could not be allocated.
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, max_distance: f32) -> Result<Option<SurfaceHit>> {
         self.cast_ray_where(origin, direction, max_distance, |_| true)
     }
 
-    /// The same of some bodies.
+    /// Casts a ray against some bodies.
     fn cast_ray_where(
         &self,
         origin: Vec3,
@@ -142,7 +141,7 @@ impl World {
             let furthest = start
                 .abs()
                 .max(bounds.min.as_dvec3().abs().max(bounds.max.as_dvec3().abs()));
-            // Past all of the body: what is as far as is asked for is met too.
+            // Beyond the body; a hit at exactly `max_distance` counts.
             let length = 4.0 * furthest.length() + 1.0;
             let limit = found.map_or(f64::from(max_distance), |(distance, _)| distance);
             if !meets(&bounds, start, way * length.min(limit)) {
@@ -169,12 +168,12 @@ impl World {
         Ok(found.map(|(_, hit)| hit))
     }
 
-    /// The point of the bodies' surfaces that is nearest to `point` (m), at the nodes' current places, no further than `max_distance` (m, may
-    /// be infinite); `None` where there is none.
+    /// The point of the bodies' surfaces nearest to `point` (m), at the current positions, within `max_distance` (m, can
+    /// be infinite); `None` without one.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a coordinate is not finite, or `max_distance` is negative or not a number. [`Error::OutOfMemory`]: there is
-    /// none for a tree over a body's surface.
+    /// [`Error::InvalidArgument`]: a coordinate is not finite, or `max_distance` is negative or not a number. [`Error::OutOfMemory`]: the search
+    /// tree of a body could not be allocated.
     pub fn nearest_point(&self, point: Vec3, max_distance: f32) -> Result<Option<SurfaceHit>> {
         finite_vector("point", point)?;
         check_distance(max_distance)?;
@@ -188,7 +187,7 @@ impl World {
                 continue;
             }
             let mut first = None;
-            let about = Bounds { min: point, max: point };
+            let about = Aabb { min: point, max: point };
             body.query_tree()?.nearest(&about, limit as f32, |triangle| {
                 let (_, corners) = body.surface_triangle(triangle);
                 let (weights, _) = nearest_on_triangle(place, corners);
@@ -208,7 +207,7 @@ impl World {
 }
 
 impl SurfaceHit {
-    /// Where a triangle of a body is nearest to a place, so far from where was asked.
+    /// The hit on a triangle of a body, at this distance from the query's origin.
     fn new((id, body): (BodyId, &Body), triangle: usize, place: DVec3, distance: f64) -> Self {
         let (_, corners) = body.surface_triangle(triangle);
         let (weights, _) = nearest_on_triangle(place, corners);
@@ -225,22 +224,22 @@ impl SurfaceHit {
 }
 
 impl Body {
-    /// The nodes of a triangle of its surface, and where they are published.
+    /// The nodes of a triangle of the surface, and their published positions.
     fn surface_triangle(&self, triangle: usize) -> ([u32; 3], [DVec3; 3]) {
         let nodes = self.surface()[triangle];
         (nodes, nodes.map(|node| self.positions()[node as usize].as_dvec3()))
     }
 
-    /// The box about its nodes as they are published, and a little more.
-    fn published_bounds(&self) -> Bounds {
+    /// The bounding box of the published positions, slightly extended.
+    fn published_bounds(&self) -> Aabb {
         let bounds = self.system().local_bounds().moved(self.origin());
-        // By what rounding takes.
+        // Covers rounding.
         let rounding = 1e-6 * bounds.magnitudes().max_element();
         bounds.extended(rounding)
     }
 }
 
-/// Takes what is nearer than what was found, and where both are as near the lower number: in whichever order triangles are looked at.
+/// Keeps the nearer hit; between equals the lower index, so that the order of the search does not matter.
 fn replace_if_first(first: &mut Option<(f64, usize)>, other: (f64, usize)) {
     if first.is_none_or(|first| other < first) {
         *first = Some(other);
@@ -255,8 +254,8 @@ fn check_distance(max_distance: f32) -> Result<()> {
     Ok(())
 }
 
-/// Whether a way from `start` on passes through a box.
-fn meets(bounds: &Bounds, start: DVec3, way: DVec3) -> bool {
+/// True if a segment from `start` passes through a box.
+fn meets(bounds: &Aabb, start: DVec3, way: DVec3) -> bool {
     let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
     for axis in 0..3 {
         let sides = [bounds.min, bounds.max].map(|corner| f64::from(corner[axis]) - start[axis]);

@@ -1,8 +1,8 @@
-//! Numbers for tests, the same on every run.
+//! Reproducible random numbers for tests.
 
 use glam::Vec3;
 
-/// A linear congruential generator (Knuth's MMIX), from this seed.
+/// A linear congruential generator (Knuth's MMIX) with this seed.
 pub(crate) struct Random(pub u64);
 
 impl Random {

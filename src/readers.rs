@@ -1,4 +1,4 @@
-//! Readers: what a body shows to other threads while its world steps.
+//! Readers: access from other threads to the positions of a body while its world steps.
 
 use std::sync::Arc;
 
@@ -10,13 +10,13 @@ use crate::soa::{TILE, tile_count, tile_nodes};
 use crate::sync::pool::{PoolReader, PoolWriter};
 use crate::threads::{Team, Tiles};
 
-/// So many readers of one body at a time.
-const MOST_READERS: usize = 126;
+/// The largest number of readers of a body.
+const MAX_READERS: usize = 126;
 
-/// A body as other threads see it: the latest complete positions, without a lock, while its world steps and changes.
+/// Lock-free access from another thread to the latest complete positions of a body, while its world steps and changes.
 ///
-/// Made by [`World::create_reader`](crate::World::create_reader), and owned by the thread that reads, to which it may be sent. It outlives the body
-/// and the world, and ends on any thread.
+/// Created by [`World::create_reader`](crate::World::create_reader), and owned by the reading thread. It can outlive the body
+/// and the world, and can be dropped on any thread.
 ///
 /// ```
 #[doc = include_str!("doctest/cloth.txt")]
@@ -34,7 +34,7 @@ pub struct BodyReader {
     has_read: bool,
 }
 
-/// What a reader sees of a body: all of one moment.
+/// A consistent frame of a body.
 ///
 /// ```
 #[doc = include_str!("doctest/cloth.txt")]
@@ -49,30 +49,30 @@ pub struct BodyReader {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame<'a> {
-    /// Where each node is, m, in the caller's order, with those that cuts have added: [`Body::positions`](crate::Body::positions).
+    /// The positions of the nodes, m, in the caller's order, including nodes that cuts have added: [`Body::positions`](crate::Body::positions).
     pub positions: &'a [Vec3],
-    /// The triangles that were drawn then: [`Body::surface`](crate::Body::surface). They change with `topology_version` alone.
+    /// The triangles of the render surface: [`Body::surface`](crate::Body::surface). They change only with `topology_version`.
     pub triangles: &'a [[u32; 3]],
-    /// Above that of earlier frames; the same as long as nothing has moved the body.
+    /// The version of the frame. It grows whenever the body moves.
     pub version: u64,
-    /// [`Body::topology_version`](crate::Body::topology_version) then.
+    /// [`Body::topology_version`](crate::Body::topology_version) at the time of the frame.
     pub topology_version: u64,
-    /// How many steps the world had taken.
+    /// The number of steps that the world had taken.
     pub step: u64,
-    /// The sum of their lengths, s.
+    /// The simulated time, s.
     pub time: f64,
-    /// Whether this reader did not read this frame before.
+    /// True if this reader reads the frame for the first time.
     pub is_new: bool,
-    /// Whether the body, or its world, is no more: this is its last frame.
+    /// True if the body or its world was destroyed: this is the last frame.
     pub is_over: bool,
 }
 
 impl BodyReader {
-    /// The latest frame, which stays as it is until the next call.
+    /// The latest frame. It does not change until the next call.
     ///
-    /// Nothing is copied, allocated or locked, and nobody waits: it is the same frame again where there is none later.
+    /// The call copies, allocates and locks nothing and never waits. Without a later frame it returns the same one again.
     pub fn read(&mut self) -> Frame<'_> {
-        // First: what is over does not change any more.
+        // This comes first: after the end nothing changes any more.
         let is_over = self.reader.is_over();
         let is_new = self.reader.take() || !self.has_read;
         self.has_read = true;
@@ -90,7 +90,7 @@ impl BodyReader {
     }
 }
 
-/// How far a world has come.
+/// The number of steps of a world, and the simulated time, s.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Clock {
     pub step: u64,
@@ -105,16 +105,16 @@ impl Clock {
         self.time += f64::from(dt);
     }
 
-    /// The mean length of the steps that were taken, s; `None` before the first.
+    /// The mean step length, s; `None` before the first step.
     pub fn mean_step(&self) -> Option<f32> {
         (self.step > 0).then(|| (self.time / self.step as f64) as f32)
     }
 }
 
-/// A buffer of a reader's.
+/// A buffer of published state.
 #[derive(Debug)]
 struct Snapshot {
-    /// With room for all that may come.
+    /// Has room for all spare nodes too.
     positions: Vec<Vec3>,
     triangles: Arc<Vec<[u32; 3]>>,
     topology_version: u64,
@@ -134,19 +134,19 @@ impl Snapshot {
     }
 }
 
-/// What a body keeps for its readers, from the first on.
+/// The buffers that a body publishes to its readers. They exist from the first reader on.
 #[derive(Debug)]
 pub(crate) struct Shown {
     writer: PoolWriter<Snapshot>,
     triangles: TriangleLists,
     pub clock: Clock,
-    /// What was shown last.
+    /// The topology version published last.
     topology_version: u64,
-    /// Whether it moved while nobody read.
+    /// True if the body has moved without being published.
     is_behind: bool,
 }
 
-/// What is shown of a body.
+/// The state of a body to be published.
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
     pub positions: &'a [Vec3],
@@ -155,12 +155,12 @@ pub(crate) struct View<'a> {
 }
 
 impl Shown {
-    /// For a body with these triangles, and room for so many nodes.
+    /// Buffers for a body with these triangles, and room for `room` nodes.
     pub fn new(room: usize, triangles: &[[u32; 3]]) -> Result<Self> {
         let triangles = TriangleLists::new(triangles)?;
         let snapshot = || Snapshot::new(room, triangles.current());
         Ok(Self {
-            writer: PoolWriter::new(MOST_READERS, [snapshot()?, snapshot()?])?,
+            writer: PoolWriter::new(MAX_READERS, [snapshot()?, snapshot()?])?,
             triangles,
             clock: Clock::default(),
             topology_version: 0,
@@ -171,9 +171,9 @@ impl Shown {
     pub fn create_reader(&mut self, room: usize, view: View) -> Result<BodyReader> {
         let triangles = self.triangles.current();
         let reader = self.writer.add_reader(|| Snapshot::new(room, triangles))?;
-        self.triangles.lend_to(self.writer.buffer_count())?;
+        self.triangles.reserve_lists(self.writer.buffer_count())?;
         let reader =
-            reader.ok_or_else(|| Error::Capacity(format!("the body has {MOST_READERS} readers: no more can be")))?;
+            reader.ok_or_else(|| Error::Capacity(format!("the body has {MAX_READERS} readers: no more can be")))?;
         if self.triangles.are_old {
             self.triangles.reserve(view.triangles.len())?;
         }
@@ -186,7 +186,7 @@ impl Shown {
         })
     }
 
-    /// Makes room for so many triangles, which are to be shown next.
+    /// Reserves room for `count` triangles, to be published next.
     pub fn reserve_triangles(&mut self, count: usize) -> Result<()> {
         if self.writer.reader_count() == 0 {
             return Ok(());
@@ -194,7 +194,7 @@ impl Shown {
         self.triangles.reserve(count)
     }
 
-    /// There are other triangles than those that were shown last.
+    /// Marks the published triangles as outdated.
     pub fn forget_triangles(&mut self) {
         self.triangles.are_old = true;
     }
@@ -203,7 +203,7 @@ impl Shown {
         self.topology_version
     }
 
-    /// Shows readers the body as it is now; nothing where there are none.
+    /// Publishes the current state of the body, if it has readers.
     pub fn show(&mut self, view: View, team: &Team) {
         self.is_behind = self.writer.reader_count() == 0;
         if self.is_behind {
@@ -219,7 +219,7 @@ impl Shown {
         let clock = self.clock;
         self.writer.write(|snapshot| {
             let count = positions.len();
-            // Within its room.
+            // Never beyond the reserved room.
             snapshot.positions.resize(count, Vec3::ZERO);
             let parts = Tiles::new(&mut snapshot.positions, TILE);
             team.pass(tile_count(count), parts, |tile, to| {
@@ -235,7 +235,7 @@ impl Shown {
     }
 }
 
-/// Lists of triangles that snapshots share: one more than there are snapshots, each used again when no snapshot has it, so that none ends in a step.
+/// Lists of triangles shared by snapshots: one more than there are snapshots. A list is reused once no snapshot has it, so that a step frees none.
 #[derive(Debug)]
 struct TriangleLists {
     lists: Vec<Arc<Vec<[u32; 3]>>>,
@@ -258,40 +258,40 @@ impl TriangleLists {
         &self.lists[self.current]
     }
 
-    /// The lists that no snapshot has, with their places.
+    /// The lists that no snapshot has, with their indices.
     fn unused(&mut self) -> impl Iterator<Item = (usize, &mut Vec<[u32; 3]>)> {
         let lists = self.lists.iter_mut().enumerate();
         let current = self.current;
-        lists.filter_map(move |(place, list)| (place != current).then_some(place).zip(Arc::get_mut(list)))
+        lists.filter_map(move |(index, list)| (index != current).then_some(index).zip(Arc::get_mut(list)))
     }
 
-    /// Makes lists for so many snapshots.
-    fn lend_to(&mut self, snapshots: usize) -> Result<()> {
+    /// Creates lists for `snapshots` snapshots.
+    fn reserve_lists(&mut self, snapshots: usize) -> Result<()> {
         while self.lists.len() <= snapshots {
             memory::push(&mut self.lists, Arc::new(Vec::new()))?;
         }
         Ok(())
     }
 
-    /// Makes room for so many triangles in the list that is the next.
+    /// Reserves room for `count` triangles in the next list.
     fn reserve(&mut self, count: usize) -> Result<()> {
         let next = self.unused().next();
         next.map_or(Ok(()), |(_, list)| memory::reserve(list, count))
     }
 
-    /// Makes the current list this one, if the triangles have changed; there is room.
+    /// Copies the triangles to a new current list, if they have changed. Room was reserved.
     fn renew(&mut self, triangles: &[[u32; 3]]) {
         if !self.are_old {
             return;
         }
         let mut unused = self.unused();
-        let Some((place, list)) = unused.find(|(_, list)| list.capacity() >= triangles.len()) else {
+        let Some((index, list)) = unused.find(|(_, list)| list.capacity() >= triangles.len()) else {
             return;
         };
         drop(unused);
         list.clear();
         list.extend_from_slice(triangles);
-        self.current = place;
+        self.current = index;
         self.are_old = false;
     }
 }

@@ -1,25 +1,25 @@
-//! Things named by ids that outlive them: an id of something destroyed is recognised, even when its place is used again.
+//! Lists of objects with generational ids: the id of a destroyed object is detected even after its slot is reused.
 
 use crate::base::{Error, Result, SlotId, WorldTag};
 use crate::codec::{Reader, Saved, Writer, saved};
 
-/// Things in places that are used again.
+/// A list of objects with generational ids. Slots of removed objects are reused.
 #[derive(Debug)]
 pub(crate) struct Slots<T> {
     slots: Vec<Slot<T>>,
-    /// No place before this one is free.
+    /// No slot before this one is free.
     first_free: usize,
-    /// How many live.
+    /// The number of objects.
     count: usize,
-    /// What they are, for messages.
+    /// The name of the objects, for error messages.
     noun: &'static str,
-    /// That of all ids here.
+    /// The tag of all ids of this list.
     tag: WorldTag,
 }
 
 #[derive(Debug)]
 pub(crate) struct Slot<T> {
-    /// How many things have lived here, below the tag of the world.
+    /// The generation of the slot, with the tag of the world above it.
     generation: u32,
     content: Option<T>,
 }
@@ -27,7 +27,7 @@ pub(crate) struct Slot<T> {
 saved! { [T: Saved] Slot<T> { generation, content } }
 
 impl<T: Saved> Slots<T> {
-    /// Writes all places.
+    /// Writes all slots.
     pub fn save(&self, to: &mut Writer) {
         let Self {
             slots,
@@ -39,12 +39,12 @@ impl<T: Saved> Slots<T> {
         slots.save(to);
     }
 
-    /// Reads all places.
+    /// Reads all slots.
     pub fn load(noun: &'static str, tag: WorldTag, from: &mut Reader) -> Result<Self> {
         let slots: Vec<Slot<T>> = Saved::load(from)?;
         let had_nothing = |slot: &Slot<T>| slot.had_nothing() || WorldTag::of(slot.generation) != Some(tag);
         if slots.len() >= u32::MAX as usize || slots.iter().any(had_nothing) {
-            return Err(from.refusal("a place that nothing ever had"));
+            return Err(from.refusal("a slot that nothing ever had"));
         }
         Ok(Self {
             first_free: slots.iter().position(is_usable).unwrap_or(slots.len()),
@@ -56,18 +56,18 @@ impl<T: Saved> Slots<T> {
     }
 }
 
-/// Whether something can be put here.
+/// True if the slot is free and its generation can still grow.
 fn is_usable<T>(slot: &Slot<T>) -> bool {
     slot.content.is_none() && slot.generation & WorldTag::COUNT < WorldTag::COUNT
 }
 
 impl<T> Slot<T> {
-    /// Whether no id of it was given.
+    /// True if no id of this slot was ever returned.
     fn had_nothing(&self) -> bool {
         self.generation & WorldTag::COUNT == 0
     }
 
-    /// What lives here.
+    /// The object in this slot.
     pub fn content_mut(&mut self) -> Option<&mut T> {
         self.content.as_mut()
     }
@@ -84,12 +84,12 @@ impl<T> Slots<T> {
         }
     }
 
-    /// How many places there are, free ones too.
-    pub fn places(&self) -> usize {
+    /// The number of slots, including free ones.
+    pub fn slot_count(&self) -> usize {
         self.slots.len()
     }
 
-    /// How many live.
+    /// The number of objects.
     pub fn count(&self) -> usize {
         self.count
     }
@@ -128,12 +128,12 @@ impl<T> Slots<T> {
         Ok(content)
     }
 
-    /// Takes back what was inserted, where nobody has seen its id: it is given again.
-    pub fn take_back(&mut self, id: SlotId) -> Result<T> {
+    /// Removes an object whose id nobody has seen, so that the id can be used again.
+    pub fn undo_insert(&mut self, id: SlotId) -> Result<T> {
         let content = self.remove(id)?;
         let index = id.index();
         self.slots[index].generation -= 1;
-        // A place that nothing ever had is none.
+        // Trailing slots that were never used are dropped.
         while self.slots.last().is_some_and(Slot::had_nothing) {
             self.slots.pop();
         }
@@ -155,27 +155,27 @@ impl<T> Slots<T> {
         slots[index].content.as_mut().ok_or_else(|| refused(noun, *tag, id))
     }
 
-    /// What lives at a place.
-    pub fn at(&self, place: usize) -> Option<&T> {
-        self.slots.get(place)?.content.as_ref()
+    /// The object in a slot.
+    pub fn at(&self, slot: usize) -> Option<&T> {
+        self.slots.get(slot)?.content.as_ref()
     }
 
-    /// The id of what lives at a place.
-    pub fn id_at(&self, place: usize) -> Option<SlotId> {
-        let slot = self.slots.get(place)?;
-        slot.content.as_ref()?;
+    /// The id of the object in a slot.
+    pub fn id_at(&self, slot: usize) -> Option<SlotId> {
+        let entry = self.slots.get(slot)?;
+        entry.content.as_ref()?;
         Some(SlotId {
-            index1: place as u32 + 1,
-            generation: slot.generation,
+            index1: slot as u32 + 1,
+            generation: entry.generation,
         })
     }
 
-    /// What lives at a place.
-    pub fn at_mut(&mut self, place: usize) -> Option<&mut T> {
-        self.slots.get_mut(place)?.content.as_mut()
+    /// The object in a slot.
+    pub fn at_mut(&mut self, slot: usize) -> Option<&mut T> {
+        self.slots.get_mut(slot)?.content.as_mut()
     }
 
-    /// Removes what is not to stay.
+    /// Removes the objects for which `stays` is false.
     pub fn retain(&mut self, stays: impl Fn(&T) -> bool) {
         for (index, slot) in self.slots.iter_mut().enumerate() {
             if slot.content.as_ref().is_some_and(|content| !stays(content)) {
@@ -186,7 +186,7 @@ impl<T> Slots<T> {
         }
     }
 
-    /// All that live, with their places.
+    /// All objects, with their slots.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &T)> {
         self.slots
             .iter()
@@ -194,7 +194,7 @@ impl<T> Slots<T> {
             .filter_map(|(index, slot)| slot.content.as_ref().map(|content| (index, content)))
     }
 
-    /// All that live, with their ids.
+    /// All objects, with their ids.
     pub fn iter_ids(&self) -> impl Iterator<Item = (SlotId, &T)> {
         (1..).zip(&self.slots).filter_map(|(index1, slot)| {
             let generation = slot.generation;
@@ -204,7 +204,7 @@ impl<T> Slots<T> {
         })
     }
 
-    /// All that live, with their places.
+    /// All objects, with their slots.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = (usize, &mut T)> {
         self.slots
             .iter_mut()
@@ -212,13 +212,13 @@ impl<T> Slots<T> {
             .filter_map(|(index, slot)| slot.content.as_mut().map(|content| (index, content)))
     }
 
-    /// All places, free ones too.
+    /// All slots, including free ones.
     pub fn slots_mut(&mut self) -> &mut [Slot<T>] {
         &mut self.slots
     }
 
-    /// Where something lives.
-    pub fn place(&self, id: SlotId) -> Result<usize> {
+    /// The slot of an object.
+    pub fn slot(&self, id: SlotId) -> Result<usize> {
         self.index(id)
     }
 
@@ -231,7 +231,7 @@ impl<T> Slots<T> {
     }
 }
 
-/// Why nothing of this id lives in a world.
+/// The error for an id that names no object of a world.
 fn refused(noun: &str, world: WorldTag, id: SlotId) -> Error {
     match WorldTag::of(id.generation) {
         Some(tag) if tag != world => Error::invalid(format!("{noun} is {id}: the id belongs to another world")),

@@ -1,11 +1,11 @@
-//! Strain: by how much parts of a body are longer or shorter than at rest, from where nodes are and where they are at rest.
+//! Strain of a mesh, from current positions and rest positions.
 //!
-//! A body keeps neither its rest positions nor its elements unless it needs them, so both are the caller's: any triangles, tetrahedra
-//! and pairs of nodes can be looked at, and a body that nobody looks at pays nothing. A rest shape that is not that of the definition,
-//! of another moment, tells the strain since then.
+//! A body keeps rest positions and elements only if it needs them, so the caller passes both. Any triangles, tetrahedra
+//! and pairs of nodes can be used. Bodies whose strain is never queried use no extra memory. With other rest positions, such as those of an earlier
+//! moment, the result is the strain since then.
 //!
-//! With F the deformation of a triangle or tetrahedron and U its stretch, `F = R U` with R a rotation, principal strains are what U has
-//! beyond 1 (engineering strain, Biot 1965): 0 wherever it is moved and turned, 0.1 where it is a tenth longer, -1 where it is flat.
+//! Let F be the deformation gradient of a triangle or tetrahedron and U its stretch, `F = R U` with a rotation R. The principal strains are the
+//! eigenvalues of `U - 1` (engineering strain, Biot 1965): 0 under rigid motion, 0.1 for an elongation by a tenth, -1 if flat.
 
 use glam::{DMat3, DVec3, Vec3};
 
@@ -14,7 +14,7 @@ use crate::base::Error;
 use crate::base::{Result, all_finite, memory};
 use crate::def::{Values, check_values, expect_count, finite_vectors, node_indices};
 
-/// How a triangle or tetrahedron is strained. What has no area or volume at rest has no strain: 0.
+/// The strain of a triangle or tetrahedron. Without area or volume at rest the strain is 0.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -29,19 +29,19 @@ use crate::def::{Values, check_values, expect_count, finite_vectors, node_indice
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Strain {
-    /// The largest principal strain: along the direction in which it is longest, by how much, as a part of its length at rest.
+    /// The largest principal strain: the relative elongation along the direction of largest stretch.
     pub largest: f32,
-    /// The smallest, from -1 on: along the direction in which it is shortest.
+    /// The smallest principal strain, at least -1.
     pub smallest: f32,
-    /// By how much its area or volume is larger, as a part of that at rest: J - 1, below -1 for a tetrahedron that is inside out.
+    /// The relative change of area or volume, J - 1; below -1 for an inverted tetrahedron.
     pub growth: f32,
 }
 
-/// Writes the strain `L/L0 - 1` of lines between pairs of nodes, such as springs, of these lengths at rest, in metres; 0 where that is 0.
+/// Writes the strain `L/L0 - 1` of lines between pairs of nodes, such as springs, with rest lengths in meters; 0 if the rest length is 0.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`]: not one rest length, or one place for the strain, for each pair, a pair names no two nodes, a position is
-/// not finite, or a rest length negative or not finite. Then nothing is written.
+/// [`Error::InvalidArgument`]: the lists differ in length, a pair does not name two nodes, a position is
+/// not finite, or a rest length is negative or not finite. After an error nothing is written.
 pub fn of_springs(positions: &[Vec3], pairs: &[[u32; 2]], rest_lengths: &[f32], strains: &mut [f32]) -> Result<()> {
     finite_vectors("positions", positions)?;
     node_indices("pairs", pairs, positions.len())?;
@@ -59,11 +59,11 @@ pub fn of_springs(positions: &[Vec3], pairs: &[[u32; 2]], rest_lengths: &[f32], 
     Ok(())
 }
 
-/// Writes the strain of triangles of nodes that are at rest in `rest_positions`.
+/// Writes the strain of triangles with these rest positions.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`]: `positions` are not as many as `rest_positions` or `strains` as `triangles`, a triangle names no three
-/// nodes, or a position is not finite. Then nothing is written.
+/// [`Error::InvalidArgument`]: `positions` and `rest_positions`, or `strains` and `triangles`, differ in length, a triangle does not name three
+/// nodes, or a position is not finite. After an error nothing is written.
 pub fn of_triangles(
     rest_positions: &[Vec3],
     positions: &[Vec3],
@@ -79,10 +79,10 @@ pub fn of_triangles(
     )
 }
 
-/// Writes the strain of tetrahedra of nodes that are at rest in `rest_positions`.
+/// Writes the strain of tetrahedra with these rest positions.
 ///
 /// # Errors
-/// As [`of_triangles`].
+/// Those of [`of_triangles`].
 pub fn of_tetrahedra(
     rest_positions: &[Vec3],
     positions: &[Vec3],
@@ -98,11 +98,11 @@ pub fn of_tetrahedra(
     )
 }
 
-/// Writes the mean of the values of each node's elements, as to draw strain; 0 for a node without one.
+/// Writes for each node the mean of the values of its elements, for example to draw strain; 0 for a node without elements.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`]: not one value for each element, an element names no `N` of as many nodes as there are means, or a value
-/// is not finite. [`Error::OutOfMemory`]. Then nothing is written.
+/// [`Error::InvalidArgument`]: `values` and elements differ in length, an element does not name `N` of the nodes, or a value
+/// is not finite. [`Error::OutOfMemory`]. After an error nothing is written.
 pub fn mean_at_nodes<const N: usize>(elements: &[[u32; N]], values: &[f32], means: &mut [f32]) -> Result<()> {
     node_indices("elements", elements, means.len())?;
     expect_count("values", values.len(), elements.len())?;
@@ -140,11 +140,11 @@ fn of_elements<const N: usize>(
     Ok(())
 }
 
-/// `None`: it has no area at rest.
+/// `None` without area at rest.
 fn of_triangle([rest, places]: [[DVec3; 3]; 2]) -> Option<Strain> {
     let edges = |[a, b, c]: [DVec3; 3]| [b - a, c - a];
     let ([a, b], [x, y]) = (edges(rest), edges(places));
-    // In a frame whose first axis is the first edge at rest.
+    // In a frame whose first axis is the first rest edge.
     let length = a.length();
     let along = b.dot(a) / length;
     let height = (b - a * (along / length)).length();
@@ -161,7 +161,7 @@ fn of_triangle([rest, places]: [[DVec3; 3]; 2]) -> Option<Strain> {
     let (xx, xy, yy) = (first.length_squared(), first.dot(second), second.length_squared());
     let (mean, spread) = (0.5 * (xx + yy), (0.25 * (xx - yy).powi(2) + xy * xy).sqrt());
     let area = first.cross(second).length();
-    // The product of both stretches is the area: their difference would lose what a thin triangle has left.
+    // The smaller stretch is the area over the larger one; a difference would cancel for thin triangles.
     let longest = (mean + spread).sqrt();
     Some(Strain::new(
         [longest, area / longest].map(|stretch| scale * stretch),
@@ -169,7 +169,7 @@ fn of_triangle([rest, places]: [[DVec3; 3]; 2]) -> Option<Strain> {
     ))
 }
 
-/// `None`: it has no volume at rest.
+/// `None` without volume at rest.
 fn of_tetrahedron([rest, places]: [[DVec3; 4]; 2]) -> Option<Strain> {
     let edges = |[a, b, c, d]: [DVec3; 4]| DMat3::from_cols(b - a, c - a, d - a);
     let gradient = edges(places) * edges(rest).inverse();
@@ -191,7 +191,7 @@ fn of_tetrahedron([rest, places]: [[DVec3; 4]; 2]) -> Option<Strain> {
 }
 
 impl Strain {
-    /// Of what has come together at a point.
+    /// The strain of an element that has collapsed to a point.
     const FLAT: Self = Self {
         largest: -1.0,
         smallest: -1.0,
@@ -224,7 +224,7 @@ pub(crate) fn eigenvalues(matrix: &DMat3) -> [f64; 3] {
     [smallest, 3.0 * mean - largest - smallest, largest]
 }
 
-/// As near as `f32` comes, never beyond it.
+/// Rounds to `f32`, without overflow.
 fn rounded(value: f64) -> f32 {
     value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32
 }

@@ -1,17 +1,17 @@
-//! A world: bodies and tools that are stepped together.
+//! A world: the bodies and tools that are stepped together.
 
-mod approach;
 mod attachments;
 mod blade;
+mod blade_advance;
+mod blade_coupling;
 mod blades;
 mod bodies;
 mod budget;
 mod dynamic;
 mod getters;
 mod haptics;
-mod holds;
 mod profile;
-mod push;
+mod proxy_motion;
 mod readers;
 mod recording;
 mod resistance;
@@ -47,10 +47,10 @@ use recording::Recorder;
 pub use recording::{ReplayDifference, ReplayReport};
 pub use sutures::{SutureDefinition, SutureReport};
 
-/// How long the steps of a world are taken to be before the first, s.
+/// The assumed step length before the first step, s.
 const FRAME: f32 = 1.0 / 60.0;
 
-/// How a world steps.
+/// The definition of a world.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -62,27 +62,27 @@ const FRAME: f32 = 1.0 / 60.0;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorldDefinition {
-    /// m/s².
+    /// The acceleration of gravity, m/s².
     pub gravity: Vec3,
-    /// 1: the caller's thread alone; 0: one per core; at most 256. What comes of a step is the same for any number.
+    /// The number of threads, at most 256. 1 uses the caller's thread only, 0 one thread per core. The result is the same for any number.
     pub thread_count: u32,
-    /// 0: as many as stability needs; n: exactly n per step, but for bodies of [`Solver::Implicit`](crate::Solver::Implicit) and
-    /// [`Solver::Newton`](crate::Solver::Newton) near a tool, whose substeps are of 1 ms at most there, or attached to a body, of 0.25 ms,
-    /// and where a substep of theirs gains energy: then they are cut again, to 4096 in all.
+    /// The number of substeps per step; 0 for as many as stability needs. [`Solver::Implicit`](crate::Solver::Implicit) and
+    /// [`Solver::Newton`](crate::Solver::Newton) take more: at most 1 ms near a tool and 0.25 ms when attached to a body. They also divide
+    /// a substep that gains energy, up to 4096 substeps per step.
     pub substeps: u32,
-    /// A step that needs more is [`Error::Unstable`]; at least 1. What is cut as above may be 4096 parts whatever this is, and one that would
-    /// take more of them, 4 s near a tool or 1 s attached to a body, is [`Error::Unstable`] too.
+    /// The largest number of substeps, at least 1. A step that needs more is [`Error::Unstable`]. The additional substeps of implicit solvers
+    /// are limited to 4096 instead: that is 4 s near a tool, or 1 s attached to a body.
     pub max_substeps: u32,
-    /// Metres; 0: off; above 0, with `substeps` 0: a step's own position error stays below it.
+    /// The largest position error of a single step, m; 0 turns the error control off. It requires `substeps` 0.
     pub tolerance: f32,
-    /// The instructions that springs and nodes are worked on with.
+    /// The SIMD level of the kernels.
     pub kernel: Kernel,
-    /// A job system whose threads are used instead of the world's own: it is given up to `thread_count` tasks a step.
+    /// The caller's job system, used instead of the world's own threads. It gets up to `thread_count` tasks per step.
     pub tasks: Option<RunTasks>,
 }
 
 impl Default for WorldDefinition {
-    /// Earth's gravity along -y, one thread, as many substeps as stability needs up to 1000, no tolerance.
+    /// Earth's gravity along -y, one thread, up to 1000 substeps as stability needs, no tolerance.
     fn default() -> Self {
         Self {
             gravity: Vec3::new(0.0, -9.81, 0.0),
@@ -112,44 +112,44 @@ impl Default for WorldDefinition {
 #[derive(Debug)]
 pub struct World {
     definition: WorldDefinition,
-    /// That of its ids.
+    /// The tag of its ids.
     tag: WorldTag,
     kernel: ChosenKernel,
     threads: Threads,
     bodies: Slots<Body>,
     tools: Slots<Tool>,
-    /// The ways of the tools in the step in progress.
+    /// The paths of the tools in the current step.
     paths: Vec<ToolPath>,
-    /// Those of them that are rigid bodies.
+    /// The dynamic tools in the current step.
     dynamic: Vec<DynamicTool>,
-    /// Contacts of tissue with tissue, where bodies ask for them.
+    /// Deformable contact and attachments between bodies; `None` while no body uses them.
     pub(crate) tissue: Option<Box<DeformableContact>>,
-    /// The bodies that take their substeps together, by their places; none where none can.
-    walks: Vec<Option<CoupledBody>>,
-    /// How the step in progress ended for each body, at its place.
+    /// The step state of coupled bodies, by slot; empty while no body can be coupled.
+    coupled: Vec<Option<CoupledBody>>,
+    /// The outcome of the current step for each body, by slot.
     outcomes: Vec<Option<Outcome>>,
-    /// What tools hold.
+    /// The attachments to tools and between bodies.
     attachments: Slots<Attachment>,
-    /// What of that ended with the last step.
+    /// The attachments that broke in the last step.
     slipped: Vec<AttachmentId>,
     blades: Slots<Blade>,
-    /// How many threads to blades there ever were.
+    /// The number of blade holds ever created.
     holds_made: u32,
-    /// Tools that devices lead.
+    /// The tools moved by haptic devices.
     haptics: Vec<haptics::HapticLink>,
-    /// The steps that were taken.
+    /// The number and duration of the steps taken.
     clock: Clock,
-    /// The most substeps of the step in progress, whatever the definition allows.
+    /// The work budget of the current step.
     work: u32,
-    /// What steps with a budget have not simulated yet, s.
+    /// The time that steps with a budget have not simulated yet, s.
     lag: f64,
-    /// How fast this machine works.
+    /// The recent speed of this machine.
     pace: WorkPace,
-    /// What the caller keeps with it.
+    /// The user data.
     user_data: usize,
-    /// What the stages of the last step took, where that is asked for.
+    /// The profile of the last step; `None` without profiling.
     profile: Option<Box<Profile>>,
-    /// Where steps are recorded, if they are.
+    /// The recorder, while steps are recorded.
     recorder: Option<Box<Recorder>>,
 }
 
@@ -157,8 +157,8 @@ impl World {
     /// An empty world.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a number is out of its range. [`Error::Unsupported`]: the processor does not offer the
-    /// kernel, or the system not so many threads.
+    /// [`Error::InvalidArgument`]: a number is out of range. [`Error::Unsupported`]: the processor does not support the
+    /// SIMD level, or the system cannot start so many threads.
     pub fn new(definition: WorldDefinition) -> Result<Self> {
         Self::with_tag(definition, WorldTag::next())
     }
@@ -170,7 +170,7 @@ impl World {
         Ok(Self {
             kernel: definition.kernel.choose()?,
             threads: match definition.tasks {
-                Some(tasks) => Threads::of_tasks(tasks, definition.thread_count)?,
+                Some(tasks) => Threads::with_tasks(tasks, definition.thread_count)?,
                 None => Threads::new(definition.thread_count)?,
             },
             definition,
@@ -180,7 +180,7 @@ impl World {
             paths: Vec::new(),
             dynamic: Vec::new(),
             tissue: None,
-            walks: Vec::new(),
+            coupled: Vec::new(),
             outcomes: Vec::new(),
             attachments: Slots::new("attachment", tag),
             slipped: Vec::new(),
@@ -197,15 +197,15 @@ impl World {
         })
     }
 
-    /// The acceleration of everything, m/s².
+    /// The acceleration of gravity, m/s².
     pub fn gravity(&self) -> Vec3 {
         self.definition.gravity
     }
 
-    /// Gives everything this acceleration, m/s², from the next step on.
+    /// Sets the acceleration of gravity, m/s², from the next step on.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: it is not finite.
+    /// [`Error::InvalidArgument`]: `gravity` is not finite.
     pub fn set_gravity(&mut self, gravity: Vec3) -> Result<()> {
         finite_vector("gravity", gravity)?;
         if std::mem::replace(&mut self.definition.gravity, gravity) == gravity {
@@ -215,7 +215,7 @@ impl World {
         Ok(())
     }
 
-    /// A hash over everything that the next step depends on; to be compared within one version.
+    /// A hash of all state that the next step depends on. Compare it within one version of the library.
     pub fn state_hash(&self) -> u64 {
         let definition = &self.definition;
         let mut hasher = StateHasher::new();
@@ -227,29 +227,29 @@ impl World {
         if self.lag > 0.0 {
             hasher.write_u64(self.lag.to_bits());
         }
-        for (place, body) in self.bodies.iter() {
-            hasher.write_u64(place as u64);
+        for (slot, body) in self.bodies.iter() {
+            hasher.write_u64(slot as u64);
             body.hash_state(&mut hasher);
         }
-        for (place, tool) in self.tools.iter() {
-            hasher.write_u64(place as u64);
+        for (slot, tool) in self.tools.iter() {
+            hasher.write_u64(slot as u64);
             tool.hash_state(&mut hasher);
         }
         if let Some(tissue) = &self.tissue {
-            tissue.bonds.hash(&mut hasher);
-            tissue.pushes.hash(&mut hasher);
+            tissue.attachments.hash(&mut hasher);
+            tissue.warm_start.hash(&mut hasher);
         }
-        for (place, blade) in self.blades.iter() {
-            hasher.write_u64(place as u64);
+        for (slot, blade) in self.blades.iter() {
+            hasher.write_u64(slot as u64);
             blade.hash(&mut hasher);
         }
         hasher.finish()
     }
 }
 
-/// Makes room for the body at this place to take its substeps together with others.
-fn make_walks(walks: &mut Vec<Option<CoupledBody>>, place: usize) -> Result<()> {
-    walks.try_reserve((place + 1).saturating_sub(walks.len()))?;
-    walks.resize((place + 1).max(walks.len()), None);
+/// Reserves room for the body in this slot to be coupled to others.
+fn reserve_coupling(coupled: &mut Vec<Option<CoupledBody>>, slot: usize) -> Result<()> {
+    coupled.try_reserve((slot + 1).saturating_sub(coupled.len()))?;
+    coupled.resize((slot + 1).max(coupled.len()), None);
     Ok(())
 }

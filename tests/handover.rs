@@ -1,5 +1,6 @@
-//! The hand-overs between threads under loom, which tries every order in which threads can go on and every value that they can see: the library's
-//! own files with loom's types in place of the standard library's; and again with each ordering too weak, which must be found.
+//! The lock-free hand-overs between threads under loom, which tries every thread interleaving and every visible value.
+//! It compiles the library's own files with loom's types instead of the standard library's. Each run with a weakened
+//! ordering must fail.
 #![allow(clippy::duplicate_mod, reason = "once for each set of orderings")]
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,8 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use loom::thread;
 
-/// What the library's `sync` has, of loom.
-mod sync {
+/// Loom's versions of what the library's `sync/atomics.rs` has.
+mod atomics {
     use std::sync::atomic::Ordering;
 
     pub use loom::cell::UnsafeCell;
@@ -23,15 +24,15 @@ mod sync {
     pub const TELL_BEFORE_LOOKING: Ordering = Ordering::SeqCst;
 }
 
-/// A module with the files, and orderings that differ from the library's.
+/// Declares a module with the library's files and the given orderings changed.
 macro_rules! with {
     ($name:ident $(, $ordering:ident = $weak:ident)*) => {
         #[path = "."]
         #[allow(dead_code)]
         mod $name {
-            mod sync {
+            mod atomics {
                 #[allow(unused_imports)]
-                pub use crate::sync::*;
+                pub use crate::atomics::*;
                 $(pub const $ordering: std::sync::atomic::Ordering = std::sync::atomic::Ordering::$weak;)*
             }
             #[path = "../src/sync/pool.rs"]
@@ -51,14 +52,14 @@ with!(let_go_too_early, LET_GO = Relaxed);
 with!(taken_back_too_early, TAKE_BACK = Release);
 with!(looked_before_told, TELL_BEFORE_LOOKING = AcqRel);
 
-/// Tries all orders with so many changes of thread where none is called for.
+/// Tries all interleavings with up to `changes` preemptions.
 fn model(changes: usize, run: impl Fn() + Sync + Send + 'static) {
     let mut builder = loom::model::Builder::new();
     builder.preemption_bound = Some(changes);
     builder.check(run);
 }
 
-/// Whether loom finds a fault.
+/// Returns true if loom finds a fault.
 fn is_found(model: impl FnOnce()) -> bool {
     catch_unwind(AssertUnwindSafe(model)).is_err()
 }
@@ -89,7 +90,7 @@ macro_rules! triple_buffer_test {
     };
 }
 
-/// Readers on threads of their own, and a writer.
+/// A writer, and readers on their own threads.
 macro_rules! pool_test {
     ($files:ident, $changes:expr, $readers:expr, $writes:expr, $reads:expr) => {
         model($changes, || {
@@ -133,7 +134,7 @@ macro_rules! pool_test {
 }
 
 #[test]
-fn a_triple_buffer_hands_over_whole_values_in_order_and_the_last() {
+fn a_triple_buffer_delivers_complete_values_in_order_up_to_the_last() {
     triple_buffer_test!(right);
 }
 
@@ -145,7 +146,7 @@ fn a_triple_buffer_needs_its_ordering() {
 }
 
 #[test]
-fn a_pool_hands_over_whole_values_in_order_and_the_last() {
+fn a_pool_delivers_complete_values_in_order_up_to_the_last() {
     pool_test!(right, 3, 1, 4, 3);
 }
 
@@ -167,9 +168,9 @@ fn a_pool_needs_each_of_its_orderings() {
     );
 }
 
-/// While one reader goes, another comes, to which the writer gives its buffer.
+/// One reader is dropped while another is added and reuses its buffer.
 #[test]
-fn readers_come_and_go() {
+fn readers_can_be_added_and_dropped() {
     static SHARED: AtomicBool = AtomicBool::new(false);
     model(3, || {
         let mut writer = right::pool::PoolWriter::new(1, [[1_u64; 2], [0; 2]]).expect("memory");
@@ -196,9 +197,9 @@ fn readers_come_and_go() {
     assert!(SHARED.load(Ordering::Relaxed), "one went before another came");
 }
 
-/// Sides end in any order on any thread, and what they share once, with the last.
+/// Both sides can be dropped in any order on any thread. Their shared data is freed once, with the last side.
 #[test]
-fn what_is_shared_ends_once() {
+fn shared_data_is_freed_once() {
     model(3, || {
         let value = Arc::new(());
         let [a, b, c] = [&value; 3].map(Arc::clone);

@@ -1,21 +1,21 @@
-//! Which of a few things hang together (union-find).
+//! Union-find.
 
 use super::{Result, memory};
 
-/// Disjoint sets of the numbers from 0 on.
+/// Disjoint sets of the numbers from 0.
 #[derive(Default)]
 pub(crate) struct DisjointSets {
     parents: Vec<u32>,
 }
 
 impl DisjointSets {
-    /// Each of `count` numbers is alone.
+    /// `count` sets of one number each.
     pub(crate) fn new(count: usize) -> Result<Self> {
         let parents = memory::collected(0..count as u32)?;
         Ok(Self { parents })
     }
 
-    /// Makes each of `count` numbers alone again.
+    /// Resets to `count` sets of one number each.
     pub(crate) fn reset(&mut self, count: usize) -> Result<()> {
         self.parents.clear();
         self.parents.try_reserve(count)?;
@@ -23,7 +23,7 @@ impl DisjointSets {
         Ok(())
     }
 
-    /// The lowest number of the set that `at` is in.
+    /// The lowest number of the set that contains `at`.
     pub(crate) fn lowest(&mut self, mut at: usize) -> usize {
         while self.parents[at] as usize != at {
             let parent = self.parents[at] as usize;
@@ -46,7 +46,7 @@ impl DisjointSets {
         self.parents
     }
 
-    /// Whether all are in one set.
+    /// True if there is a single set.
     pub(crate) fn is_one(&mut self) -> bool {
         (0..self.parents.len()).all(|at| self.lowest(at) == 0)
     }

@@ -1,8 +1,7 @@
-//! Why a call was refused or failed.
-
+//! Errors.
 use super::StepReport;
 
-/// Why a call was refused or failed. A call that answers with an error has changed nothing.
+/// Why a call was refused or failed. A call that returns an error has changed nothing.
 ///
 /// ```
 /// # use sinew::*;
@@ -14,24 +13,24 @@ use super::StepReport;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Error {
-    /// An argument is out of its range; the message names it and its value.
+    /// An argument is out of range; the message names it and its value.
     InvalidArgument(String),
-    /// The id names something that was destroyed, or nothing at all.
+    /// The id names a destroyed object, or no object at all.
     StaleId(String),
     /// A storage of fixed capacity is full.
     Capacity(String),
     /// Memory could not be reserved.
     OutOfMemory,
-    /// The step could not be taken: nothing moved, pending forces and poses stay pending.
+    /// The step was not taken: nothing moved, pending forces and poses stay pending.
     Unstable {
-        /// What is known about the step that was not taken.
+        /// The report of the refused step.
         report: StepReport,
-        /// How many substeps were allowed, or asked for.
+        /// The number of substeps that were allowed.
         allowed: u32,
     },
-    /// What was looked for was not found in the iterations allowed: nothing changed.
+    /// No solution within the allowed iterations: nothing changed.
     NotConverged(String),
-    /// Valid, but this build or this combination does not offer it.
+    /// Valid, but not supported by this build or in this combination.
     Unsupported(String),
     /// A file could not be read or written; the message names the file and the line or byte.
     Io(String),
@@ -39,7 +38,7 @@ pub enum Error {
     Internal(String),
 }
 
-/// What calls that can fail return.
+/// The result of calls that can fail.
 ///
 /// ```
 /// use sinew::{Result, mesh::Mesh};
@@ -51,7 +50,7 @@ pub enum Error {
 /// ```
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Refuses an argument unless this holds, with a message as of `format!`, or fails with an error.
+/// Returns an error unless the condition holds: an invalid argument with a `format!` message, or the given error.
 macro_rules! ensure {
     ($holds:expr, $format:literal $($arguments:tt)*) => {
         $crate::base::ensure!($holds, $crate::base::Error::invalid(format!($format $($arguments)*)))

@@ -1,9 +1,9 @@
-//! A hash over everything that the next step depends on, to the bit.
+//! The hash of the state of a world.
 
 use glam::Vec3;
 use xxhash_rust::xxh3::Xxh3Default;
 
-/// Adds up bits; equal states give equal hashes.
+/// Hashes the bits of values; equal states have equal hashes.
 pub(crate) struct StateHasher(Xxh3Default);
 
 impl StateHasher {

@@ -1,17 +1,17 @@
-//! The ids that callers hold, each of its own type.
+//! Generational ids, one type for each kind of object.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// A place, counted from 1, and which of the things that lived there is meant; all zero: none.
+/// A slot, counted from 1, and the generation of its object; all zero names nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct SlotId {
     pub index1: u32,
-    /// How many things have lived there, below the tag of the world.
+    /// The number of objects that the slot has had, with the tag of the world in the upper bits.
     pub generation: u32,
 }
 
 impl SlotId {
-    /// The place, counted from 0, of what is known to live.
+    /// The slot, counted from 0, of an existing object.
     pub fn index(self) -> usize {
         self.index1 as usize - 1
     }
@@ -23,35 +23,35 @@ impl std::fmt::Display for SlotId {
     }
 }
 
-/// What tells the ids of a world from those of others: the upper bits of every generation in it.
+/// Distinguishes the ids of different worlds: the upper bits of every generation.
 ///
-/// A slot is used a million times, and then another. A world that is loaded keeps the tag of the one that was saved, and so its ids.
+/// A slot is used a million times, then it is retired. A loaded world keeps the tag of the saved one, and so its ids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct WorldTag(u32);
 
 impl WorldTag {
-    /// So many bits of a generation count what has lived in a slot.
+    /// The number of bits of a generation that count the objects of a slot.
     const BITS: u32 = 20;
 
     pub const COUNT: u32 = (1 << Self::BITS) - 1;
 
-    /// Tags are 1 to this one: no id of small numbers has one, nor one of which all bits are set.
+    /// The largest tag. Tags start at 1, so that neither small numbers nor all bits set form a valid id.
     const LAST: u32 = (!Self::COUNT >> Self::BITS) - 1;
 
-    /// That of a new world, which the 4093 before it in this process do not have.
+    /// The tag of a new world. It differs from those of the previous 4093 worlds of the process.
     pub fn next() -> Self {
         static WORLDS: AtomicU32 = AtomicU32::new(0);
         let before = WORLDS.fetch_add(1, Ordering::Relaxed);
         Self(before % Self::LAST + 1)
     }
 
-    /// That of a generation, if some world gives such.
+    /// The tag in a generation, if it is valid.
     pub fn of(generation: u32) -> Option<Self> {
         let tag = generation >> Self::BITS;
         (1..=Self::LAST).contains(&tag).then_some(Self(tag))
     }
 
-    /// The generation of a slot that nothing had yet.
+    /// The generation of an unused slot.
     pub fn generation(self) -> u32 {
         self.0 << Self::BITS
     }
@@ -82,7 +82,7 @@ pub struct BodyId(pub(crate) SlotId);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ToolId(pub(crate) SlotId);
 
-/// What a tool holds of a body, or a body of another.
+/// An attachment of a body to a tool or to another body.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]

@@ -1,13 +1,13 @@
-//! Matrices that vectors make.
+//! Matrices built from vectors.
 
 use glam::{DMat3, DVec3};
 
-/// The matrix that takes a vector to `a` times its product with `b`.
+/// The outer product of two vectors.
 pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
-/// The matrix whose product with a vector is the cross product with it.
+/// The matrix of the cross product with a vector.
 pub(crate) fn cross_matrix(vector: DVec3) -> DMat3 {
     DMat3::from_cols(
         DVec3::new(0.0, vector.z, -vector.y),

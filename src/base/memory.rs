@@ -1,4 +1,4 @@
-//! Memory that grows with the caller's data, reserved so that running out of it is an answer, not an abort.
+//! Fallible allocation: running out of memory returns an error instead of aborting.
 
 use super::Result;
 
@@ -16,14 +16,14 @@ pub(crate) fn reserved<T>(count: usize) -> Result<Vec<T>> {
     Ok(values)
 }
 
-/// The values in a vector that has room for no more.
+/// The values in a vector of exact capacity.
 pub(crate) fn collected<T>(values: impl ExactSizeIterator<Item = T>) -> Result<Vec<T>> {
     let mut all = reserved(values.len())?;
     all.extend(values);
     Ok(all)
 }
 
-/// The same of values that may be refused, as the first of them that is.
+/// The values in a vector of exact capacity, or the first error.
 pub(crate) fn try_collected<T>(values: impl ExactSizeIterator<Item = Result<T>>) -> Result<Vec<T>> {
     let mut all = reserved(values.len())?;
     for value in values {
@@ -32,14 +32,14 @@ pub(crate) fn try_collected<T>(values: impl ExactSizeIterator<Item = Result<T>>)
     Ok(all)
 }
 
-/// The values, of which there are `most` at most, in a vector with room for those.
+/// At most `most` values, in a vector with that capacity.
 pub(crate) fn collected_within<T>(most: usize, values: impl Iterator<Item = T>) -> Result<Vec<T>> {
     let mut all = reserved(most)?;
     all.extend(values);
     Ok(all)
 }
 
-/// The values, however many they turn out to be.
+/// The values in a growing vector.
 pub(crate) fn gathered<T>(values: impl IntoIterator<Item = T>) -> Result<Vec<T>> {
     let mut all = Vec::new();
     extend(&mut all, values)?;
@@ -57,29 +57,28 @@ pub(crate) fn copied<T: Copy>(values: &[T]) -> Result<Vec<T>> {
 pub(crate) fn merge<T: Copy, K: Ord>(values: &mut Vec<T>, more: &[T], key: impl Fn(&T) -> K) {
     let mut known = values.len();
     values.extend_from_slice(more);
-    // From the end: what is moved is not needed any more where it was.
-    for (left, added) in more.iter().enumerate().rev() {
+    // From the end, so that no value is overwritten before it is moved.
+    for (remaining, added) in more.iter().enumerate().rev() {
         while known > 0 && key(&values[known - 1]) > key(added) {
             known -= 1;
-            values[known + left + 1] = values[known];
+            values[known + remaining + 1] = values[known];
         }
-        values[known + left] = *added;
+        values[known + remaining] = *added;
     }
 }
 
-/// Makes room for `count` values in all.
+/// Reserves room for `count` values in total.
 pub(crate) fn reserve<T>(values: &mut Vec<T>, count: usize) -> Result<()> {
     Ok(values.try_reserve_exact(count.saturating_sub(values.len()))?)
 }
 
-/// The same and up to an eighth more, for a list that grows with each body: it is copied now and then, not each time. The count alone
-/// tells how much room that is, so that a world that is loaded has as much.
+/// Reserves room for `count` values, rounded up by at most an eighth, so that a list that grows with each body is rarely copied. The capacity
+/// depends only on the count, so that a loaded world has the same.
 pub(crate) fn reserve_in_steps<T>(values: &mut Vec<T>, count: usize) -> Result<()> {
     reserve(values, count.next_multiple_of((count.next_power_of_two() / 8).max(1)))
 }
 
-/// Gives back the room beyond the values. By a copy: `shrink_to_fit` makes one too of what is aligned by more than memory is anyway, and ends the program
-/// where there is none for it.
+/// Frees unused capacity, by a copy. `shrink_to_fit` can copy too, and aborts the program if memory runs out.
 pub(crate) fn shrink<T: Copy>(values: &mut Vec<T>) -> Result<()> {
     if values.capacity() > values.len() {
         *values = copied(values)?;
@@ -87,29 +86,29 @@ pub(crate) fn shrink<T: Copy>(values: &mut Vec<T>) -> Result<()> {
     Ok(())
 }
 
-/// Sorts the values and leaves each once.
+/// Sorts the values and removes duplicates.
 pub(crate) fn sort_once<T: Ord>(values: &mut Vec<T>) {
     values.sort_unstable();
     values.dedup();
 }
 
-/// A value in a place of its own.
+/// A value in a box.
 #[allow(unsafe_code)]
 pub(crate) fn boxed<T>(value: T) -> Result<Box<T>> {
     let mut one = reserved(1)?;
     one.push(value);
     let first = Box::into_raw(one.into_boxed_slice()).cast::<T>();
-    // SAFETY: a slice of one lies in memory as what is in it, and nobody else has it.
+    // SAFETY: a slice of one value has the layout of that value, and nothing else refers to it.
     Ok(unsafe { Box::from_raw(first) })
 }
 
-/// What is there, or made in a place of its own.
-pub(crate) fn get_or_box<T: Default>(place: &mut Option<Box<T>>) -> Result<&mut T> {
-    let there = match place.take() {
-        Some(there) => there,
+/// The existing value, or a new default one in a box.
+pub(crate) fn get_or_box<T: Default>(slot: &mut Option<Box<T>>) -> Result<&mut T> {
+    let value = match slot.take() {
+        Some(value) => value,
         None => boxed(T::default())?,
     };
-    Ok(place.insert(there))
+    Ok(slot.insert(value))
 }
 
 /// Appends `value`, growing the vector fallibly.
@@ -119,7 +118,7 @@ pub(crate) fn push<T>(values: &mut Vec<T>, value: T) -> Result<()> {
     Ok(())
 }
 
-/// Appends all of these, growing the vector fallibly.
+/// Appends the values, growing the vector fallibly.
 pub(crate) fn extend<T>(values: &mut Vec<T>, more: impl IntoIterator<Item = T>) -> Result<()> {
     more.into_iter().try_for_each(|value| push(values, value))
 }

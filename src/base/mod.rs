@@ -1,4 +1,4 @@
-//! What every other module stands on: errors, ids, memory that may run out, a hash of state, exact signs, matrices of vectors, disjoint sets, times of stages.
+//! The lowest layer: errors, ids, fallible allocation, hashing, exact signs, matrices, disjoint sets, profiling.
 
 mod disjoint_sets;
 mod error;

@@ -16,46 +16,46 @@ pub(crate) enum Stage {
     Forces,
     /// IMPLICIT and NEWTON: equations and their solution, with the forces in them.
     Solver,
-    /// What is near a tool, or near other tissue.
+    /// Features near a tool or near another surface.
     BroadPhase,
-    /// Contacts between what is near.
+    /// Contacts between near features.
     NarrowPhase,
     /// Impulses of contacts, attachments and sutures.
     ContactSolver,
-    /// The new state and what readers and haptic handles see of it.
+    /// The new state, and publishing it to readers and haptic handles.
     Publish,
     /// Blades and tears.
     Cutting,
 }
 
-/// How many stages there are.
+/// The number of stages.
 const STAGES: usize = Stage::Cutting as usize + 1;
 
-/// Something that is counted in a step.
+/// A quantity that is counted in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Count {
     /// Bodies that were stepped.
     Bodies,
     /// Bodies that slept.
     Sleeping,
-    /// How often the step was tried.
+    /// Attempts of the step.
     Tries,
     /// Substeps of all bodies.
     Substeps,
-    /// Products of a matrix and a vector, of IMPLICIT and NEWTON.
+    /// Matrix-vector products of IMPLICIT and NEWTON.
     Products,
     /// Features near tools, over all substeps.
     Candidates,
     /// Contacts with tools, over all substeps.
     ToolContacts,
-    /// Contacts of tissue with tissue, over all substeps.
+    /// Contacts of bodies with bodies, over all substeps.
     TissueContacts,
 }
 
-/// How many counts there are.
+/// The number of counts.
 const COUNTS: usize = Count::TissueContacts as usize + 1;
 
-/// What the stages of a step took. Threads add to it at once; nothing that is computed depends on it.
+/// The times and counts of a step. Several threads add to it; no result depends on it.
 #[derive(Debug, Default)]
 pub(crate) struct Profile {
     nanoseconds: [AtomicU64; STAGES],
@@ -63,15 +63,15 @@ pub(crate) struct Profile {
 }
 
 impl Profile {
-    /// A step begins.
+    /// Clears all times and counts.
     pub fn begin(&self) {
         let all = self.nanoseconds.iter().chain(&self.counts);
         all.for_each(|sum| sum.store(0, Ordering::Relaxed));
     }
 
-    /// What a stage took, summed over the threads that took part in it, s.
+    /// The time of a stage, summed over the threads that took part, s.
     pub fn seconds(&self, stage: Stage) -> f64 {
-        // A stage that ran within another was taken off that before the other ended.
+        // A nested stage can be subtracted before the outer one has been added.
         let nanoseconds = self.nanoseconds[stage as usize].load(Ordering::Relaxed) as i64;
         nanoseconds.max(0) as f64 * 1e-9
     }
@@ -86,7 +86,7 @@ impl Profile {
     }
 }
 
-/// Refuses what reads a clock where there is none: WebAssembly without a system's interface.
+/// Refuses to read a clock on a platform without one: WebAssembly without a system interface.
 pub(crate) fn check_clock(reader: &str) -> Result<()> {
     if cfg!(all(target_family = "wasm", target_os = "unknown")) {
         return Err(Error::Unsupported(format!("{reader}: this platform has no clock")));
@@ -94,19 +94,19 @@ pub(crate) fn check_clock(reader: &str) -> Result<()> {
     Ok(())
 }
 
-/// The clock: where a stage began. It borrows nothing, so that what is timed may change the world.
+/// The start time of a stage. It borrows nothing, so that the timed code can change the world.
 #[derive(Clone, Copy, Debug)]
 #[must_use]
 pub(crate) struct Stopwatch(Option<Instant>);
 
 impl Stopwatch {
-    /// Begins; without a profile no clock is read.
+    /// Starts; without a profile no clock is read.
     #[inline]
     pub fn start(profile: Option<&Profile>) -> Self {
         Self(profile.map(|_| Instant::now()))
     }
 
-    /// Gives a stage the time since the start.
+    /// Adds the time since the start to a stage.
     #[inline]
     pub fn stop(self, profile: Option<&Profile>, stage: Stage) {
         if let (Some(profile), Some(start)) = (profile, self.0) {
@@ -115,9 +115,9 @@ impl Stopwatch {
         }
     }
 
-    /// Takes the time since the start off a stage that goes on around this: other stages had it.
+    /// Subtracts the time since the start from an outer stage, because a nested stage has it.
     #[inline]
-    pub fn take_off(self, profile: Option<&Profile>, stage: Stage) {
+    pub fn subtract_from(self, profile: Option<&Profile>, stage: Stage) {
         if let (Some(profile), Some(start)) = (profile, self.0) {
             let passed = start.elapsed().as_nanos() as u64;
             profile.nanoseconds[stage as usize].fetch_sub(passed, Ordering::Relaxed);
@@ -137,7 +137,7 @@ mod tests {
         let inner = Stopwatch::start(Some(&profile));
         std::thread::sleep(std::time::Duration::from_millis(2));
         inner.stop(Some(&profile), Stage::BroadPhase);
-        inner.take_off(Some(&profile), Stage::Solver);
+        inner.subtract_from(Some(&profile), Stage::Solver);
         outer.stop(Some(&profile), Stage::Solver);
         whole.stop(Some(&profile), Stage::Step);
         let of = |stage| profile.seconds(stage);

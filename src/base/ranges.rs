@@ -1,25 +1,25 @@
-//! What arguments that are numbers are refused for.
+//! Range checks of numeric arguments.
 
 use std::fmt::Display;
 
 use super::{Result, ensure};
 
-/// Refuses what is not above 0 and finite.
+/// Refuses a value that is not above 0 and finite.
 pub(crate) fn above_zero<N: Display + Copy + Into<f64>>(name: &str, value: N) -> Result<()> {
     in_range(name, value, |value| value > 0.0, "above 0 and finite")
 }
 
-/// Refuses what is not at least 0 and finite.
+/// Refuses a value that is not at least 0 and finite.
 pub(crate) fn not_negative<N: Display + Copy + Into<f64>>(name: &str, value: N) -> Result<()> {
     in_range(name, value, |value| value >= 0.0, "at least 0 and finite")
 }
 
-/// Refuses what is not finite.
+/// Refuses a value that is not finite.
 pub(crate) fn finite(name: &str, value: f32) -> Result<()> {
     in_range(name, value, |_| true, "finite")
 }
 
-/// Refuses values of which one is not finite.
+/// Refuses values if one is not finite.
 pub(crate) fn all_finite(name: &str, values: &[f32]) -> Result<()> {
     for (index, value) in values.iter().enumerate() {
         ensure!(value.is_finite(), "{name}[{index}] is {value}: must be finite");

@@ -1,8 +1,8 @@
-//! What a step did, and what one failed by that could not be taken.
+//! The report of a step, and the reason of a refused one.
 
 use super::ids::BodyId;
 
-/// What bounds the substeps of a body.
+/// The kind of force that limits the substeps of a body.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -22,14 +22,14 @@ pub enum LimitKind {
     Term,
     /// The pressure in a cavity.
     Cavity,
-    /// How many parts a step of IMPLICIT or NEWTON may have.
+    /// The largest number of substeps of IMPLICIT or NEWTON near tools and attachments.
     Parts,
     /// The tolerance of the world.
     Tolerance,
 }
 
 impl LimitKind {
-    /// What it is called in a message.
+    /// The name in error messages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             LimitKind::Spring => "the springs",
@@ -59,16 +59,16 @@ impl LimitKind {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SubstepLimit {
-    /// What it is.
+    /// The kind of force.
     pub kind: LimitKind,
-    /// Its nodes in the caller's numbers, that of the highest frequency first; the last is repeated.
+    /// The nodes in the caller's numbers, the one of the highest frequency first; the last is repeated.
     pub nodes: [u32; 4],
-    /// How many of them differ; 0: it is of no nodes.
+    /// The number of distinct nodes; 0 if the limit has no nodes.
     pub node_count: u32,
 }
 
 impl SubstepLimit {
-    /// One that is of no nodes.
+    /// A limit without nodes.
     pub(crate) fn of_all(kind: LimitKind) -> Self {
         Self {
             kind,
@@ -77,13 +77,13 @@ impl SubstepLimit {
         }
     }
 
-    /// Its nodes, each once.
+    /// The distinct nodes.
     pub fn nodes(&self) -> &[u32] {
         &self.nodes[..self.node_count as usize]
     }
 }
 
-/// What a step did.
+/// The report of a step.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -97,25 +97,24 @@ impl SubstepLimit {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
-    /// The most substeps that any body took.
+    /// The largest number of substeps of any body.
     pub substeps: u32,
-    /// The longest explicit substep that is stable now, over all bodies, s; infinity: no limit.
+    /// The longest explicit substep that is now stable for all bodies, s; infinity without a limit.
     pub stable_substep: f32,
-    /// Bodies that would have become non-finite: put back as they were, the others stepped.
+    /// The number of bodies that would have become non-finite. They were rolled back; the others were stepped.
     pub bodies_restored: u32,
-    /// How far a position of this step may be off, m; 0 where the tolerance is off, infinite where the step is refused before there is
-    /// anything to compare.
+    /// The estimated largest position error of the step, m; 0 without a tolerance, infinite if the step was refused before an estimate.
     pub error_estimate: f32,
-    /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
-    /// apart. Those of another body in one that is closed come out again by themselves.
+    /// The number of interpenetrating surface edges, between bodies or within a body with self-contact, that contact could not
+    /// prevent. Edges inside a closed body are pushed out again.
     pub crossings: u32,
-    /// What a step that is refused as unstable failed by.
+    /// The reason of an unstable step.
     pub limit: Option<StepLimit>,
-    /// The body that took the most substeps.
+    /// The body with the most substeps.
     pub substeps_body: Option<BodyId>,
-    /// A body that was put back.
+    /// A body that was rolled back.
     pub restored_body: Option<BodyId>,
-    /// The body with the most edges that pass through tissue.
+    /// The body with the most interpenetrating edges.
     pub crossing_body: Option<BodyId>,
 }
 
@@ -136,18 +135,18 @@ pub struct StepReport {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepLimit {
-    /// Which.
+    /// The body.
     pub body: BodyId,
-    /// What of it allows no longer substep, where its nodes were as the step began.
+    /// The force that limits its substep, at the positions before the step.
     pub of: SubstepLimit,
-    /// How many substeps the step would need, as far as that is known.
+    /// The estimated number of substeps that the step needs.
     pub needed: u32,
-    /// Whether [`Solver::Auto`](crate::Solver::Auto) chose the solver of the body: naming it again would not help.
+    /// True if [`Solver::Auto`](crate::Solver::Auto) chose the solver of the body, so that choosing AUTO would not help.
     pub is_chosen: bool,
 }
 
 impl std::fmt::Display for StepLimit {
-    /// Names the body, what limits it, and what helps.
+    /// Names the body, the limiting force, and options that help.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self {
             body,

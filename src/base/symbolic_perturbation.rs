@@ -1,11 +1,11 @@
-//! Signs that rounding does not decide, of a triple product and of what is shifted by next to nothing.
+//! Exact signs: of a triple product, and of values under symbolic perturbation.
 
 use glam::DVec3;
 
-/// What rounding may make of a triple product, as a part of the sum of its products' sizes.
+/// A bound on the rounding error of a triple product, relative to the sum of the magnitudes of its products.
 const ROUNDING: f64 = 1e-15;
 
-/// `a . (b x c)`, of which the sign is exact; of coordinates rounded to `f32` differences are exact too.
+/// `a . (b x c)` with an exact sign. Differences of coordinates that are rounded to `f32` are exact too.
 #[inline]
 pub(crate) fn triple(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let rounded = a.dot(b.cross(c));
@@ -33,7 +33,7 @@ fn exact_triple(a: DVec3, b: DVec3, c: DVec3) -> f64 {
         (four[0], four[1]) = two_product(high, c);
         (four[2], four[3]) = two_product(low, c);
     }
-    // Each is taken into a sum of numbers that do not overlap, of which the last that is not 0 has its sign (Shewchuk 1997).
+    // The terms are added to an expansion of nonoverlapping numbers. Its last nonzero number has the sign of the sum (Shewchuk 1997).
     let mut sum = [0.0; 24];
     for (count, &term) in terms.iter().enumerate() {
         let mut carried = term;
@@ -45,21 +45,21 @@ fn exact_triple(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     sum.into_iter().rev().find(|&part| part != 0.0).unwrap_or(0.0)
 }
 
-/// The product, and what rounding took from it.
+/// The product and its rounding error.
 fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     (product, a.mul_add(b, -product))
 }
 
-/// The sum, and what rounding took from it.
+/// The sum and its rounding error.
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let taken = sum - a;
     (sum, (a - (sum - taken)) + (b - taken))
 }
 
-/// Whether a value is above 0 once its matter is shifted along x, by far less along y and by far less again along z, with which it grows like this
-/// (Edelsbrunner, Muecke 1990).
+/// True if a value is above 0 after an infinitesimal shift along x, a far smaller one along y and again a far smaller one along z (simulation of
+/// simplicity: Edelsbrunner, Muecke 1990). `slope` is its derivative along the axes.
 pub(crate) fn is_above(value: f64, slope: DVec3) -> bool {
     [value, slope.x, slope.y, slope.z]
         .into_iter()

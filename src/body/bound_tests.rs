@@ -1,4 +1,4 @@
-//! Tools at surfaces whose corners are bound to nodes.
+//! Tools in contact with surfaces whose corners are bound to nodes.
 
 use std::collections::HashMap;
 
@@ -9,7 +9,7 @@ use crate::base::{BodyId, ToolId};
 use crate::contact::{Pose, Shape, SurfaceChange, ToolDefinition};
 use crate::def::{BodyDefinition, Solver, Storage, Values};
 use crate::mesh::Mesh;
-use crate::nodes::{Bound, NewNode};
+use crate::nodes::{NewNode, NodeBinding};
 use crate::springs::Rewiring;
 use crate::world::{World, WorldDefinition};
 
@@ -42,31 +42,31 @@ fn sphere(world: &mut World, radius: f32, position: Vec3, friction: f32) -> Tool
 }
 
 /// Takes a step in which a tool moves.
-fn step_to(world: &mut World, tool: ToolId, place: Vec3, dt: f32) {
-    world.set_pose(tool, place, None).expect("a tool");
+fn step_to(world: &mut World, tool: ToolId, position: Vec3, dt: f32) {
+    world.set_pose(tool, position, None).expect("a tool");
     world.step(dt).expect("a step");
 }
 
-/// A square in y = 0 about the origin, of `count` by `count` squares of two triangles each, outward along y.
+/// A square in the plane y = 0 around the origin, of `count` by `count` squares of two triangles each, outward along y.
 fn square(count: u32) -> Mesh {
     Mesh::cloth([0.2; 2], [count; 2]).expect("a mesh")
 }
 
-/// Where the middle of the first edge is of such a square of four by four.
+/// The midpoint of the first edge of such a square of four by four.
 fn middle_of_first_edge() -> Vec3 {
     let square = square(4);
     let [a, b, _] = square.triangles[0].map(|node| square.positions[node as usize]);
     a.midpoint(b)
 }
 
-/// How a sheet is drawn.
+/// The render surface of a sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Refinement {
-    /// By its nodes.
+    /// Its nodes.
     Plainly,
     /// Each triangle as four, whose inner corners are bound to the ends of edges.
     InFour,
-    /// Each corner bound to the node that is there.
+    /// Each corner is bound to the node at it.
     Twice,
 }
 
@@ -90,19 +90,19 @@ fn sheet(world: &mut World, solver: Solver, storage: Storage, count: u32, drag: 
     world.create_body(&definition).expect("a body")
 }
 
-/// A sheet of eight by eight squares that is held at its rim.
+/// A sheet of eight by eight squares that is held at its border.
 fn held_sheet(world: &mut World, solver: Solver) -> BodyId {
     let id = sheet(world, solver, Storage::Packed, 8, 40.0);
     let body = world.body_mut(id).expect("a body");
-    let is_rim = |place: u32| place == 0 || place == 8;
-    for node in (0..81).filter(|node| is_rim(node / 9) || is_rim(node % 9)) {
+    let is_border = |coordinate: u32| coordinate == 0 || coordinate == 8;
+    for node in (0..81).filter(|node| is_border(node / 9) || is_border(node % 9)) {
         body.pin(node).expect("a node");
     }
     id
 }
 
-/// Adds bound points, and has the surface change.
-fn change(body: &mut Body, bound: &[Bound], change: &SurfaceChange) {
+/// Adds bound points, and changes the surface.
+fn change(body: &mut Body, bound: &[NodeBinding], change: &SurfaceChange) {
     body.reserve_nodes(bound.len()).expect("room");
     body.reserve_surface(bound.len(), change.changed.len(), change.added.len())
         .expect("room");
@@ -117,17 +117,17 @@ fn change(body: &mut Body, bound: &[Bound], change: &SurfaceChange) {
     body.change_surface(change);
 }
 
-/// A point between two nodes, given in the caller's numbers.
-fn between(body: &Body, node: u32, ends: [u32; 2]) -> Bound {
+/// A point between two nodes, given by their caller's indices.
+fn between(body: &Body, node: u32, ends: [u32; 2]) -> NodeBinding {
     let [a, b] = ends.map(|end| body.system.order.own(end));
-    Bound {
+    NodeBinding {
         node,
         nodes: [a, b, a, a],
         weights: [0.5, 0.5, 0.0, 0.0],
     }
 }
 
-/// Draws triangles from number `first` on each as four.
+/// Divides each of a range of triangles in four.
 fn divide(body: &mut Body, triangles: std::ops::Range<usize>) {
     let mut middles = HashMap::new();
     let (mut bound, mut changed, mut added) = (Vec::new(), Vec::new(), Vec::new());
@@ -168,13 +168,13 @@ fn draw(world: &mut World, id: BodyId, drawn: Refinement) {
             let count = body.node_count() as u32;
             let twin = |node: u32| {
                 let own = body.system.order.own(node);
-                Bound {
+                NodeBinding {
                     node: count + own,
                     nodes: [own; 4],
                     weights: [1.0, 0.0, 0.0, 0.0],
                 }
             };
-            let mut bound: Vec<Bound> = (0..count).map(twin).collect();
+            let mut bound: Vec<NodeBinding> = (0..count).map(twin).collect();
             bound.sort_by_key(|bound| bound.node);
             let changed: Vec<(u32, [u32; 3])> = (0..)
                 .zip(body.surface())
@@ -191,7 +191,7 @@ fn draw(world: &mut World, id: BodyId, drawn: Refinement) {
     }
 }
 
-/// How deep the deepest corner of the surface is in a sphere, m.
+/// The depth of the deepest corner of the surface in a sphere, m.
 fn deepest(body: &Body, centre: Vec3, radius: f32) -> f32 {
     let corners = body.surface().iter().flatten();
     let depth = corners.map(|&corner| radius - body.positions()[corner as usize].distance(centre));
@@ -209,7 +209,7 @@ fn momentum(body: &Body) -> DVec3 {
 }
 
 #[test]
-fn a_sphere_carries_the_weight_of_a_sheet_however_it_is_drawn() {
+fn a_sphere_carries_the_weight_of_a_sheet_with_each_refinement() {
     for drawn in [Refinement::Plainly, Refinement::InFour, Refinement::Twice] {
         let mut world = world(Vec3::NEG_Y * 9.81, 0, 1);
         let tool = sphere(&mut world, 0.07, Vec3::NEG_Y * 0.0701, 0.5);
@@ -230,7 +230,7 @@ fn a_sphere_carries_the_weight_of_a_sheet_however_it_is_drawn() {
 }
 
 #[test]
-fn what_a_tool_gives_to_bound_points_is_the_momentum_of_nodes() {
+fn impulses_on_bound_points_are_the_momentum_of_nodes() {
     for solver in SOLVERS {
         for storage in [Storage::Packed, Storage::FastLink] {
             for drawn in [Refinement::Plainly, Refinement::InFour] {
@@ -242,13 +242,13 @@ fn what_a_tool_gives_to_bound_points_is_the_momentum_of_nodes() {
                 let mut given = DVec3::ZERO;
                 let dt = 1e-3_f32;
                 for step in 1..=30 {
-                    let place = start + Vec3::new(0.1, 0.4, 0.05) * (dt * step as f32);
-                    step_to(&mut world, tool, place, dt);
+                    let position = start + Vec3::new(0.1, 0.4, 0.05) * (dt * step as f32);
+                    step_to(&mut world, tool, position, dt);
                     given -= world.wrench(tool).expect("a tool").0.as_dvec3() * f64::from(dt);
                 }
                 let gained = momentum(body(&world, id));
                 let off = gained.distance(given) / given.length();
-                // IMPLICIT leaves as much unbalanced with a sheet that is drawn plainly.
+                // IMPLICIT leaves the same imbalance with a sheet that is not refined.
                 let allowed = if solver == Solver::Implicit { 2e-4 } else { 1e-6 };
                 assert!(given.length() > 1e-4, "{solver:?}: {given}");
                 assert!(
@@ -267,14 +267,14 @@ const TETRAHEDRON: [Vec3; 4] = [
     Vec3::new(0.01, -0.08, 0.0),
 ];
 
-/// Parts of its corners, for each corner of a triangle within it.
+/// The weights of its corners, for each corner of an inner triangle.
 const OF_FOUR: [[f32; 4]; 3] = [
     [0.5, 0.25, 0.25, 0.0],
     [0.125, 0.5, 0.125, 0.25],
     [0.25, 0.0, 0.5, 0.25],
 ];
 
-/// A body without springs of which a triangle is drawn whose corners have these parts of its nodes.
+/// A body without springs, with a render triangle whose corners have these weights of its nodes.
 fn free_nodes(world: &mut World, positions: &[Vec3], masses: &[f32], parts: [[f32; 4]; 3]) -> BodyId {
     let definition = BodyDefinition {
         positions,
@@ -287,9 +287,9 @@ fn free_nodes(world: &mut World, positions: &[Vec3], masses: &[f32], parts: [[f3
     let body = world.body_mut(id).expect("a body");
     let count = positions.len() as u32;
     let nodes = [0, 1, 2, 3].map(|node| body.system.order.own(node.min(count - 1)));
-    let bound: Vec<Bound> = (count..)
+    let bound: Vec<NodeBinding> = (count..)
         .zip(parts)
-        .map(|(node, weights)| Bound { node, nodes, weights })
+        .map(|(node, weights)| NodeBinding { node, nodes, weights })
         .collect();
     let hidden: Vec<u32> = (0..count).collect();
     let to = SurfaceChange {
@@ -302,28 +302,32 @@ fn free_nodes(world: &mut World, positions: &[Vec3], masses: &[f32], parts: [[f3
 }
 
 #[test]
-fn nodes_receive_what_weights_say() {
+fn nodes_receive_forces_by_weights() {
     let masses = [0.001, 0.002, 0.0007, 0.0013];
     let of_three = [[1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0], [0.5, 0.0, 0.5, 0.0]];
     for (positions, parts) in [(&TETRAHEDRON[..3], of_three), (&TETRAHEDRON[..], OF_FOUR)] {
         let mut world = world(Vec3::ZERO, 1, 1);
         let id = free_nodes(&mut world, positions, &masses[..positions.len()], parts);
-        // Where the sphere meets the triangle, by parts of its corners.
-        let met = [0.4_f64, 0.35, 0.25];
+        // The contact point of the sphere, by weights of the triangle's corners.
+        let contact_weights = [0.4_f64, 0.35, 0.25];
         let corners = parts.map(|parts| -> DVec3 {
             let nodes = positions.iter().zip(parts);
             nodes.map(|(node, part)| node.as_dvec3() * f64::from(part)).sum()
         });
-        let point: DVec3 = corners.iter().zip(met).map(|(corner, part)| *corner * part).sum();
+        let point: DVec3 = corners
+            .iter()
+            .zip(contact_weights)
+            .map(|(corner, part)| *corner * part)
+            .sum();
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
         let (radius, dt, speed) = (0.004_f32, 1e-4_f32, 0.01_f64);
         let start = (point - normal * f64::from(radius)).as_vec3();
         let tool = sphere(&mut world, radius, start, 0.0);
-        let way = normal * speed * f64::from(dt);
-        step_to(&mut world, tool, (start.as_dvec3() + way).as_vec3(), dt);
+        let displacement = normal * speed * f64::from(dt);
+        step_to(&mut world, tool, (start.as_dvec3() + displacement).as_vec3(), dt);
         let shares = [0, 1, 2, 3].map(|node| {
             (0..3)
-                .map(|corner| met[corner] * f64::from(parts[corner][node]))
+                .map(|corner| contact_weights[corner] * f64::from(parts[corner][node]))
                 .sum::<f64>()
         });
         let answers = [0, 1, 2, 3].map(|node| shares[node] / f64::from(masses[node]));
@@ -337,18 +341,18 @@ fn nodes_receive_what_weights_say() {
         let force = world.wrench(tool).expect("a tool").0.as_dvec3();
         let off = (force * f64::from(dt) + impulse).length();
         assert!(off < 2e-3 * impulse.length(), "{force}, {impulse}");
-        // What the caller sees is the triangle.
+        // The caller sees the triangle.
         let contact = world.contacts(tool).expect("a tool").next().expect("a contact");
         let count = positions.len() as u32;
         assert_eq!(contact.nodes, [count, count + 1, count + 2]);
-        for (weight, expected) in contact.weights.into_iter().zip(met) {
+        for (weight, expected) in contact.weights.into_iter().zip(contact_weights) {
             assert!((f64::from(weight) - expected).abs() < 2e-3, "{:?}", contact.weights);
         }
     }
 }
 
 #[test]
-fn what_nobody_draws_is_not_touched() {
+fn hidden_nodes_are_not_touched() {
     let mut world = world(Vec3::ZERO, 1, 1);
     free_nodes(&mut world, &TETRAHEDRON, &[0.001; 4], OF_FOUR);
     let plane = ToolDefinition {
@@ -359,7 +363,7 @@ fn what_nobody_draws_is_not_touched() {
         ..ToolDefinition::new(Shape::Plane)
     };
     let tool = world.create_tool(&plane).expect("a tool");
-    // The lowest node is at -0.08, the lowest corner that is drawn at -0.025.
+    // The lowest node is at -0.08, the lowest rendered corner at -0.025.
     for (height, touches) in [(-0.06, false), (-0.04, false), (-0.02, true)] {
         step_to(&mut world, tool, Vec3::Y * height, 1e-3);
         let force = world.wrench(tool).expect("a tool").0;
@@ -368,14 +372,14 @@ fn what_nobody_draws_is_not_touched() {
 }
 
 #[test]
-fn what_holds_a_node_takes_its_share() {
+fn pins_carry_their_share_of_forces_on_bound_points() {
     let positions = &TETRAHEDRON[..3];
     let parts = [[0.5, 0.5, 0.0, 0.0], [0.0, 0.5, 0.5, 0.0], [0.25, 0.0, 0.75, 0.0]];
     for axes in [[true; 3], [false, true, false]] {
         let mut world = world(Vec3::ZERO, 1, 1);
         let id = free_nodes(&mut world, positions, &[0.001, 0.002, 0.0007], parts);
         world.body_mut(id).expect("a body").pin_axes(0, axes).expect("a node");
-        let met = [0.5, 0.25, 0.25_f32];
+        let contact_weights = [0.5, 0.25, 0.25_f32];
         let corners = parts.map(|parts| {
             positions
                 .iter()
@@ -383,13 +387,17 @@ fn what_holds_a_node_takes_its_share() {
                 .map(|(node, part)| *node * part)
                 .sum::<Vec3>()
         });
-        let point: Vec3 = corners.iter().zip(met).map(|(corner, part)| *corner * part).sum();
+        let point: Vec3 = corners
+            .iter()
+            .zip(contact_weights)
+            .map(|(corner, part)| *corner * part)
+            .sum();
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
         let start = point - normal * 0.004;
         let tool = sphere(&mut world, 0.004, start, 0.0);
         step_to(&mut world, tool, start + normal * 1e-6, 1e-4);
         let force = world.wrench(tool).expect("a tool").0;
-        let share: f32 = (0..3).map(|corner| met[corner] * parts[corner][0]).sum();
+        let share: f32 = (0..3).map(|corner| contact_weights[corner] * parts[corner][0]).sum();
         let expected = Vec3::from(axes.map(|held| f32::from(u8::from(held)))) * force * share;
         let held = body(&world, id).pin_force(0).expect("a pin");
         assert!(force.length() > 1e-3, "{force}");
@@ -400,8 +408,14 @@ fn what_holds_a_node_takes_its_share() {
     }
 }
 
-/// Presses a ball into a sheet that is held at its rim, along it, and lets it settle: the force on it, and whatever `see` is shown.
-fn press(drawn: Refinement, solver: Solver, threads: u32, mut see: impl FnMut(&World, BodyId, Vec3)) -> (World, Vec3) {
+/// Presses a ball into and along a sheet that is held at its border, and lets it settle. Returns the force on it. Calls
+/// `visit` after each step.
+fn press(
+    drawn: Refinement,
+    solver: Solver,
+    threads: u32,
+    mut visit: impl FnMut(&World, BodyId, Vec3),
+) -> (World, Vec3) {
     let mut world = world(Vec3::ZERO, 0, threads);
     let id = held_sheet(&mut world, solver);
     let start = Vec3::new(0.004, 0.0255, -0.013);
@@ -409,21 +423,21 @@ fn press(drawn: Refinement, solver: Solver, threads: u32, mut see: impl FnMut(&W
     draw(&mut world, id, drawn);
     for step in 1..=150 {
         let part = (step as f32 / 100.0).min(1.0);
-        let place = start + Vec3::new(0.01, -0.03, 0.005) * part;
-        step_to(&mut world, tool, place, 2e-3);
-        see(&world, id, place);
+        let position = start + Vec3::new(0.01, -0.03, 0.005) * part;
+        step_to(&mut world, tool, position, 2e-3);
+        visit(&world, id, position);
     }
     let force = world.wrench(tool).expect("a tool").0;
     (world, force)
 }
 
 #[test]
-fn solvers_agree_on_a_sheet_drawn_finely() {
+fn solvers_agree_on_a_refined_sheet() {
     let (_, plain) = press(Refinement::Plainly, Solver::Verlet, 1, |_, _, _| ());
     assert!(plain.y > 0.1, "{plain}");
     for solver in SOLVERS {
-        let (_, force) = press(Refinement::InFour, solver, 1, |world, id, place| {
-            let depth = deepest(body(world, id), place, 0.025);
+        let (_, force) = press(Refinement::InFour, solver, 1, |world, id, position| {
+            let depth = deepest(body(world, id), position, 0.025);
             assert!(depth < 1e-4, "{solver:?}: {depth} m");
         });
         let off = force.distance(plain) / plain.length();
@@ -432,7 +446,7 @@ fn solvers_agree_on_a_sheet_drawn_finely() {
 }
 
 #[test]
-fn threads_make_no_difference_to_bound_points() {
+fn bound_points_are_identical_with_any_thread_count() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let [one, two] = [1, 2].map(|threads| press(Refinement::InFour, solver, threads, |_, _, _| ()));
         assert_eq!(one.0.state_hash(), two.0.state_hash(), "{solver:?}");
@@ -440,7 +454,7 @@ fn threads_make_no_difference_to_bound_points() {
 }
 
 #[test]
-fn a_point_that_is_all_one_node_is_touched_as_that_is() {
+fn a_point_bound_to_one_node_is_touched_like_that_node() {
     let [plain, twice] = [Refinement::Plainly, Refinement::Twice].map(|drawn| {
         let mut id = None;
         let (world, force) = press(drawn, Solver::Verlet, 1, |_, body, _| id = Some(body));
@@ -450,39 +464,45 @@ fn a_point_that_is_all_one_node_is_touched_as_that_is() {
     assert_eq!(plain.1, twice.1);
     let count = plain.0.len();
     assert_eq!(plain.0, twice.0[..count]);
-    // Some order, as the body keeps its nodes.
+    // The order in which the body stores its nodes.
     assert!(twice.0[count..].iter().all(|bound| plain.0.contains(bound)));
 }
 
-/// What a change leaves on the list of what is near is what is found when it is made anew.
+/// Candidates after a change of the surface are those of a new search.
 #[test]
-fn a_surface_that_changes_under_a_tool_is_met_as_it_is_then() {
+fn a_surface_that_changes_under_a_tool_collides_in_its_new_shape() {
     for solver in [Solver::Verlet, Solver::Implicit] {
-        let [kept, anew] = [false, true].map(|anew| {
+        let [updated, rebuilt] = [false, true].map(|rebuilt| {
             let mut world = world(Vec3::ZERO, 0, 1);
             let id = held_sheet(&mut world, solver);
             let start = Vec3::new(0.004, 0.0252, -0.013);
             let tool = sphere(&mut world, 0.025, start, 0.3);
             let mut drawn = 0;
             for step in 1..=60 {
-                let place = start + Vec3::new(0.2, -0.2, 0.1) * (step as f32 * 6e-4);
-                step_to(&mut world, tool, place, 2e-3);
+                let position = start + Vec3::new(0.2, -0.2, 0.1) * (step as f32 * 6e-4);
+                step_to(&mut world, tool, position, 2e-3);
                 let body = world.body_mut(id).expect("a body");
                 if step % 4 == 0 && drawn < 120 {
-                    // Whole squares, so that what is beside them may have gaps, but no two see the same edge divided twice.
+                    // Whole squares, so that gaps can lie next to them, but no two divide the same edge.
                     divide(body, drawn..drawn + 10);
                     drawn += 10;
-                    assert!(!body.system.contacts.as_ref().is_some_and(|contacts| contacts.are_far()));
-                    if anew {
-                        body.system.contacts.as_mut().expect("contacts").look_again();
+                    assert!(
+                        !body
+                            .system
+                            .contacts
+                            .as_ref()
+                            .is_some_and(|contacts| contacts.is_clear_of_tools())
+                    );
+                    if rebuilt {
+                        body.system.contacts.as_mut().expect("contacts").invalidate_candidates();
                     }
                 }
             }
             let positions = body(&world, id).positions().to_vec();
             (positions, world.wrench(tool).expect("a tool"))
         });
-        assert!(kept.1.0.length() > 0.003, "{:?}", kept.1);
-        assert_eq!(kept, anew, "{solver:?}");
+        assert!(updated.1.0.length() > 0.003, "{:?}", updated.1);
+        assert_eq!(updated, rebuilt, "{solver:?}");
     }
 }
 
@@ -551,8 +571,8 @@ fn a_tool_that_holds_a_bound_point_holds_its_nodes() {
         let before = middle_of_first_edge();
         for step in 1..=400 {
             let part = (step as f32 / 50.0).min(1.0);
-            let place = Vec3::new(0.03, 0.02, 0.0) * part + Vec3::Y * 0.02 * (1.0 - part);
-            step_to(&mut world, tool, place, 0.005);
+            let position = Vec3::new(0.03, 0.02, 0.0) * part + Vec3::Y * 0.02 * (1.0 - part);
+            step_to(&mut world, tool, position, 0.005);
         }
         let after = body(&world, id).positions()[middle as usize];
         let way = after - before;
@@ -563,7 +583,7 @@ fn a_tool_that_holds_a_bound_point_holds_its_nodes() {
             (force.y - weight).abs() < 0.01 * weight,
             "{solver:?}: {force} of {weight}"
         );
-        // Nobody else can.
+        // No other caller can.
         let other = sphere(&mut world, 0.01, Vec3::Y, 0.0);
         let refused = world
             .attach_node(id, middle, other, 0.0)
@@ -571,20 +591,20 @@ fn a_tool_that_holds_a_bound_point_holds_its_nodes() {
             .to_string();
         assert!(refused.contains("bound to a node that is"), "{refused}");
         world.release(attachment).expect("an attachment");
-        assert!(!world.body(id).expect("a body").system.is_grasped());
+        assert!(!world.body(id).expect("a body").system.has_tool_attachments());
         world.attach_node(id, middle, other, 0.0).expect("an attachment");
     }
 }
 
-/// Whether the tool holds the middle of an edge as such, or as a corner of the surface.
+/// A tool holds the midpoint of an edge, either as such or as a corner of the surface.
 #[test]
-fn what_a_tool_holds_at_a_bound_point_it_does_not_touch() {
+fn a_tool_does_not_touch_what_it_holds_at_a_bound_point() {
     let [plain, bound] = [Refinement::Plainly, Refinement::InFour].map(|drawn| {
         let mut world = world(Vec3::NEG_Y * 9.81, 0, 1);
         let id = sheet(&mut world, Solver::Verlet, Storage::Packed, 4, 20.0);
         draw(&mut world, id, drawn);
         let middle = middle_of_first_edge();
-        // Beside it, where faces are met that are bound to what it holds.
+        // Next to it, the tool touches faces that are bound to the held nodes.
         let tool = sphere(&mut world, 0.012, middle + Vec3::new(0.006, -0.008, 0.002), 0.5);
         if drawn == Refinement::Plainly {
             let point = crate::def::SurfacePoint {

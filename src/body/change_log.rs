@@ -1,10 +1,11 @@
-//! What cuts have changed, in order, for renderers that follow.
+//! The changes by cuts, in order, for renderers.
 
 use crate::base::{Error, Result, ensure};
 use crate::codec::saved;
 use crate::cutting::Changes;
 
-/// Where a node that a cut added comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
+/// The origin of a node that a cut added. Attributes of vertices, such as texture coordinates and skinning weights, are
+/// interpolated with these weights.
 ///
 /// ```
 /// # use glam::vec3;
@@ -26,18 +27,18 @@ use crate::cutting::Changes;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewNodeSource {
-    /// The new node: one more than that of the entry before.
+    /// The new node. Its index is one more than that of the entry before.
     pub node: u32,
-    /// Those that it lies between, each of a lower number than its own; those beyond the first may repeat it with weight 0. A copy has the
-    /// node that it was copied from alone.
+    /// The nodes that it lies between, each with a lower index than its own. A copy has one source. Further entries may
+    /// repeat the first one with weight 0.
     pub sources: [u32; 3],
-    /// How much of each, at least 0, 1 in all.
+    /// The weights of the sources. They are at least 0 and add up to 1.
     pub weights: [f32; 3],
 }
 
 saved! { NewNodeSource { node, sources, weights } }
 
-/// An edge of the rim of a cut. Each edge that was cut is two of them, one on either side.
+/// A cut-boundary edge. A cut edge becomes two of them, one on each side.
 ///
 /// ```
 /// # use glam::vec3;
@@ -59,15 +60,15 @@ saved! { NewNodeSource { node, sources, weights } }
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewRimEdge {
-    /// Its ends, in the order in which its triangle has them.
+    /// The ends, in the order of the corners of the triangle.
     pub nodes: [u32; 2],
-    /// The triangle of the surface that it is a side of.
+    /// The triangle of the surface that has this edge.
     pub triangle: u32,
 }
 
 saved! { NewRimEdge { nodes, triangle } }
 
-/// What has come, changed or gone since a version.
+/// The changes of a body's topology since a version.
 ///
 /// ```
 /// # use glam::vec3;
@@ -86,38 +87,39 @@ saved! { NewRimEdge { nodes, triangle } }
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TopologyChanges<'a> {
-    /// What the body's topology has now; to be asked with next time.
+    /// The current version of the topology. Pass it to the next call.
     pub version: u64,
-    /// All new nodes, in the order of their numbers.
+    /// All new nodes, in the order of their indices.
     pub nodes: &'a [NewNodeSource],
-    /// Triangles of [`Body::surface`](crate::Body::surface) whose corners changed or that are new; one may be named several times.
+    /// Triangles of [`Body::surface`](crate::Body::surface) that are new or have other corners. A triangle may occur
+    /// more than once.
     pub triangles: &'a [u32],
-    /// Springs that are gone: taken away by a blade or by hand, or replaced by springs of copies.
+    /// Springs that have been removed: by a blade, by the caller, or replaced by springs of copies.
     pub removed_springs: &'a [[u32; 2]],
-    /// New edges of the rim, as they were when they came: later cuts may have split or renumbered them.
+    /// New cut-boundary edges, as they were when they were created. Later cuts may have split or renumbered them.
     pub rim: &'a [NewRimEdge],
 }
 
-/// How long the lists were when a version came.
+/// The lengths of the lists before a version.
 #[derive(Clone, Copy, Debug)]
-struct Lengths {
+struct ListLengths {
     nodes: usize,
     triangles: usize,
     removed_springs: usize,
     rim: usize,
 }
 
-saved! { Lengths { nodes, triangles, removed_springs, rim } }
+saved! { ListLengths { nodes, triangles, removed_springs, rim } }
 
-/// All that has changed since the body was made.
+/// All changes since the body was created.
 #[derive(Debug, Default)]
 pub(super) struct ChangeLog {
     nodes: Vec<NewNodeSource>,
     triangles: Vec<u32>,
     removed_springs: Vec<[u32; 2]>,
     rim: Vec<NewRimEdge>,
-    /// For each version but the first.
-    versions: Vec<Lengths>,
+    /// One entry for each version but the first.
+    versions: Vec<ListLengths>,
 }
 
 saved! { ChangeLog { nodes, triangles, removed_springs, rim, versions } }
@@ -127,8 +129,8 @@ impl ChangeLog {
         self.versions.len() as u64
     }
 
-    fn lengths(&self) -> Lengths {
-        Lengths {
+    fn lengths(&self) -> ListLengths {
+        ListLengths {
             nodes: self.nodes.len(),
             triangles: self.triangles.len(),
             removed_springs: self.removed_springs.len(),
@@ -136,7 +138,7 @@ impl ChangeLog {
         }
     }
 
-    /// Makes room for a version with these changes, and so many springs that are gone.
+    /// Reserves space for a version with these changes and this many removed springs.
     pub fn reserve(&mut self, changes: &Changes, removed_springs: usize) -> Result<()> {
         self.nodes.try_reserve(changes.nodes.len() + changes.sources.len())?;
         self.triangles.try_reserve(changes.triangles.len())?;
@@ -145,16 +147,16 @@ impl ChangeLog {
         Ok(self.versions.try_reserve(1)?)
     }
 
-    /// Begins a version with these changes, for which there is room.
+    /// Begins a version with these changes, for which space is reserved.
     pub fn add(&mut self, changes: &Changes, removed_springs: &[[u32; 2]]) {
         let before = self.lengths();
         self.versions.push(before);
-        let drawn = changes.sources.iter().map(|source| NewNodeSource {
+        let rendered = changes.sources.iter().map(|source| NewNodeSource {
             node: source.point,
             sources: source.sources,
             weights: source.weights.map(|weight| weight as f32),
         });
-        self.nodes.extend(drawn);
+        self.nodes.extend(rendered);
         let is_undrawn = |node: &u32| changes.undrawn.binary_search(node).is_ok();
         for piece in changes.nodes.iter().filter(|piece| is_undrawn(&piece.node)) {
             self.nodes.push(NewNodeSource {
@@ -172,39 +174,39 @@ impl ChangeLog {
         }));
     }
 
-    /// Makes room for a spring that is removed by hand.
-    pub fn reserve_one(&mut self) -> Result<()> {
+    /// Reserves space for a spring that the caller removes.
+    pub fn reserve_removed_spring(&mut self) -> Result<()> {
         self.removed_springs.try_reserve(1)?;
         Ok(self.versions.try_reserve(1)?)
     }
 
-    /// Begins a version with a spring less, for which there is room.
+    /// Begins a version without this spring, for which space is reserved.
     pub fn add_removed_spring(&mut self, spring: [u32; 2]) {
         self.versions.push(self.lengths());
         self.removed_springs.push(spring);
     }
 
-    /// What came after a version.
+    /// The changes after a version.
     pub fn since(&self, version: u64) -> Result<TopologyChanges<'_>> {
         let now = self.version();
-        ensure!(version <= now, to_come(version, now));
-        let from = usize::try_from(version)
+        ensure!(version <= now, future_version_error(version, now));
+        let lengths_before = usize::try_from(version)
             .ok()
             .and_then(|version| self.versions.get(version));
-        let from = from.copied().unwrap_or(self.lengths());
+        let lengths_before = lengths_before.copied().unwrap_or(self.lengths());
         Ok(TopologyChanges {
             version: now,
-            nodes: &self.nodes[from.nodes..],
-            triangles: &self.triangles[from.triangles..],
-            removed_springs: &self.removed_springs[from.removed_springs..],
-            rim: &self.rim[from.rim..],
+            nodes: &self.nodes[lengths_before.nodes..],
+            triangles: &self.triangles[lengths_before.triangles..],
+            removed_springs: &self.removed_springs[lengths_before.removed_springs..],
+            rim: &self.rim[lengths_before.rim..],
         })
     }
 }
 
-/// What there is of a body that cannot be cut.
+/// The changes of a body that cannot be cut: none.
 pub(super) fn unchanged(version: u64) -> Result<TopologyChanges<'static>> {
-    ensure!(version == 0, to_come(version, 0));
+    ensure!(version == 0, future_version_error(version, 0));
     Ok(TopologyChanges {
         version,
         nodes: &[],
@@ -214,6 +216,6 @@ pub(super) fn unchanged(version: u64) -> Result<TopologyChanges<'static>> {
     })
 }
 
-fn to_come(version: u64, now: u64) -> Error {
+fn future_version_error(version: u64, now: u64) -> Error {
     Error::invalid(format!("version is {version}: the body's topology has version {now}"))
 }

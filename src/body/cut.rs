@@ -1,21 +1,21 @@
-//! A cut: what the blade parted falls apart in everything that a body is moved with.
+//! Applies a cut to a body: springs, elements, masses, pins and the surface follow the new topology.
 
 use super::Body;
 use super::change_log::{TopologyChanges, unchanged};
-use super::cuttable::Cuttable;
+use super::cut_state::CutState;
 use crate::base::{Error, Result, memory};
 use crate::contact::SurfaceChange;
 use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, Sweep};
-use crate::deformable_contact::{Skin, SkinChange, SurfaceToBe};
-use crate::elements::PieceOfElement;
-use crate::forces::Parts;
-use crate::nodes::{Bound, NewNode};
+use crate::deformable_contact::{CollisionSurface, NewCollisionSurface, PreparedSurfaceChange};
+use crate::elements::ElementPiece;
+use crate::forces::ForcePieces;
+use crate::nodes::{NewNode, NodeBinding};
 use crate::soa::NodeOrder;
-use crate::solver::{Changed, System, close_beside};
+use crate::solver::{Changed, System, preview_flush};
 use crate::springs::{Rewiring, SpringChange};
-use crate::terms::Parting;
+use crate::terms::TermPieces;
 
-/// What a cut did.
+/// The result of a cut.
 ///
 /// ```
 /// # use glam::vec3;
@@ -33,171 +33,181 @@ use crate::terms::Parting;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CutReport {
-    /// Nodes that are new: copies of others, and points of the surface that are bound to nodes.
+    /// The number of new nodes: copies of nodes, and points of the surface that are bound to nodes.
     pub new_nodes: u32,
-    /// Triangles of the surface that are new.
+    /// The number of new triangles of the surface.
     pub new_triangles: u32,
-    /// Springs that are gone: taken away by the blade, or replaced by springs of copies.
+    /// The number of springs that were removed by the blade or replaced by springs of copies.
     pub springs_removed: u32,
-    /// How many more pieces the surface has.
+    /// The number of connected components that the surface has gained.
     pub pieces_parted: u32,
-    /// How long the cut is, in the rest shape, m; of solids on their skin.
+    /// The length of the cut in the rest shape, m; for solids, along their skin.
     pub length: f64,
-    /// Of solids: how large the faces are that have opened, in the rest shape, each on one of its sides, m².
-    /// A cell in which the cut ends holds: this can be less than what the blade swept.
+    /// For solids, the area of the faces that opened, in the rest shape, counted on one side, m². A cell in which the
+    /// cut ends does not open, so the area can be less than the blade swept.
     pub area: f64,
 }
 
 impl Body {
-    /// See [`World::cut`](crate::World::cut), which has what is attached follow; its skin follows here, if it meets
-    /// tissue. Changes nothing where it fails.
-    pub(crate) fn cut(&mut self, sweep: &Sweep, skin: Option<&mut Skin>) -> Result<CutReport> {
-        let mut cuttable = self
-            .cuttable
+    /// Cuts the body: see [`World::cut`](crate::World::cut), which updates attachments. The skin is updated here, if
+    /// the body collides with tissue. An error leaves everything unchanged.
+    pub(crate) fn cut(&mut self, sweep: &Sweep, skin: Option<&mut CollisionSurface>) -> Result<CutReport> {
+        let mut cut_state = self
+            .cut_state
             .take()
             .ok_or_else(|| Error::Unsupported("spare_nodes is 0: the body was not made to be cut".into()))?;
-        let stroke = cuttable.material.stroke();
-        let report = self.cut_from(&mut cuttable, *sweep, skin);
+        let stroke = cut_state.material.stroke();
+        let report = self.cut_material(&mut cut_state, *sweep, skin);
         if report.is_err() {
-            cuttable.material.take_back(stroke);
+            cut_state.material.restore_stroke(stroke);
         }
-        self.cuttable = Some(cuttable);
+        self.cut_state = Some(cut_state);
         report
     }
 
-    /// What has changed since a version of the topology, 0 when the body was made, for a renderer that follows.
+    /// The changes since a version of the topology, for renderers. Version 0 is that of the new body.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: the version is to come.
+    /// [`Error::InvalidArgument`]: the topology has not reached this version.
     pub fn changes_since(&self, version: u64) -> Result<TopologyChanges<'_>> {
-        match &self.cuttable {
-            Some(cuttable) => cuttable.log.since(version),
+        match &self.cut_state {
+            Some(cut_state) => cut_state.log.since(version),
             None => unchanged(version),
         }
     }
 
-    /// For each triangle of its surface whether a cut has bared it; nothing where none can be.
-    pub(crate) fn bared(&self) -> impl Iterator<Item = bool> {
-        let material = self.cuttable.as_ref().map(|cuttable| &cuttable.material);
-        material.into_iter().flat_map(CutMaterial::bared)
+    /// For each triangle of the surface, true if a cut exposed it. Empty if the body cannot be cut.
+    pub(crate) fn exposed(&self) -> impl Iterator<Item = bool> {
+        let material = self.cut_state.as_ref().map(|cut_state| &cut_state.material);
+        material.into_iter().flat_map(CutMaterial::exposed)
     }
 
-    /// What a body is made of that may be cut.
+    /// The material, if the body can be cut.
     pub(crate) fn material(&self) -> Option<&CutMaterial> {
-        self.cuttable.as_ref().map(|cuttable| &cuttable.material)
+        self.cut_state.as_ref().map(|cut_state| &cut_state.material)
     }
 
-    /// How many nodes it may have after cuts and tears: those that it was made with, and [`BodyDefinition::spare_nodes`].
+    /// The maximum number of nodes after cuts and tears: the nodes at creation plus [`BodyDefinition::spare_nodes`].
     ///
     /// [`BodyDefinition::spare_nodes`]: crate::BodyDefinition::spare_nodes
     pub fn max_nodes(&self) -> usize {
-        self.system.node_room.max(self.node_count())
+        self.system.node_capacity.max(self.node_count())
     }
 
-    /// How many triangles its surface may have after cuts and tears: those that it was made with, and for each of
-    /// [`BodyDefinition::spare_nodes`] two, of a solid six. What would take more is [`Error::Capacity`].
+    /// The maximum number of triangles of the surface after cuts and tears: the triangles at creation plus two for each
+    /// of [`BodyDefinition::spare_nodes`], for a solid six. A cut that needs more fails with [`Error::Capacity`].
     ///
     /// [`BodyDefinition::spare_nodes`]: crate::BodyDefinition::spare_nodes
     pub fn max_triangles(&self) -> usize {
-        let of_cuts = self.cuttable.as_ref().map_or(0, |cuttable| cuttable.max_triangles);
-        self.surface().len().max(of_cuts as usize)
+        let limit = self.cut_state.as_ref().map_or(0, |cut_state| cut_state.max_triangles);
+        self.surface().len().max(limit as usize)
     }
 
-    /// What a cut or tear may make of it.
-    pub(super) fn limits(&self, cuttable: &Cuttable) -> Limits {
+    /// The limits of what a cut or tear may add.
+    pub(super) fn cut_limits(&self, cut_state: &CutState) -> Limits {
         Limits {
-            nodes: self.system.node_room as u32,
-            triangles: cuttable.max_triangles,
+            nodes: self.system.node_capacity as u32,
+            triangles: cut_state.max_triangles,
             ..Limits::NONE
         }
     }
 
-    /// Which version its topology has: 0 when it was made.
+    /// The version of the topology. A new body has version 0.
     pub fn topology_version(&self) -> u64 {
-        self.cuttable.as_ref().map_or(0, |cuttable| cuttable.log.version())
+        self.cut_state.as_ref().map_or(0, |cut_state| cut_state.log.version())
     }
 
-    /// The same with what it is cut by, which has another stroke where it fails.
-    fn cut_from(&mut self, cuttable: &mut Cuttable, mut sweep: Sweep, skin: Option<&mut Skin>) -> Result<CutReport> {
-        if let Some(start) = cuttable.stroke.carried(&sweep, &cuttable.material, self.positions()) {
+    /// Cuts with a material whose stroke differs after an error.
+    fn cut_material(
+        &mut self,
+        cut_state: &mut CutState,
+        mut sweep: Sweep,
+        skin: Option<&mut CollisionSurface>,
+    ) -> Result<CutReport> {
+        if let Some(start) = cut_state
+            .stroke
+            .carried_edge(&sweep, &cut_state.material, self.positions())
+        {
             sweep.start = start;
-            cuttable.material.carry(start);
+            cut_state.material.set_edge(start);
         }
         let mut near = Vec::new();
-        self.items_near(cuttable, &sweep, &mut near)?;
-        let limits = self.limits(cuttable);
-        let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
-        let mut changes = cuttable.material.cut(&sweep, self.positions(), &near, limits)?;
-        let shared = self.share_by_stiffness(&cuttable.material, &mut changes);
-        let room = shared.and_then(|()| cuttable.stroke.reserve(cuttable.material.most_ends(&changes, &near)));
-        let applied = room.and_then(|()| self.apply(cuttable, skin, (&sweep, &near), &changes, counts));
-        match applied {
-            Ok(_) => self.stop(cuttable, &sweep, &near, &changes),
-            Err(_) => cuttable.material.undo(),
+        self.items_near_sweep(cut_state, &sweep, &mut near)?;
+        let limits = self.cut_limits(cut_state);
+        let counts = [cut_state.material.triangle_count(), cut_state.material.item_count()];
+        let mut changes = cut_state.material.cut(&sweep, self.positions(), &near, limits)?;
+        let shared_mass = self.shift_mass_by_stiffness(&cut_state.material, &mut changes);
+        let room = shared_mass.and_then(|()| cut_state.stroke.reserve(cut_state.material.max_ends(&changes, &near)));
+        let result = room.and_then(|()| self.apply(cut_state, skin, (&sweep, &near), &changes, counts));
+        match result {
+            Ok(_) => self.end_stroke(cut_state, &sweep, &near, &changes),
+            Err(_) => cut_state.material.undo(),
         }
-        applied
+        result
     }
 
-    /// Makes the body what the changes say, of so many triangles and items that there were before. Changes nothing where it fails.
+    /// Applies changes, given the numbers of triangles and of items before them. An error leaves the body unchanged.
     pub(super) fn apply(
         &mut self,
-        cuttable: &mut Cuttable,
-        skin: Option<&mut Skin>,
-        way: (&Sweep, &[u32]),
+        cut_state: &mut CutState,
+        skin: Option<&mut CollisionSurface>,
+        swept: (&Sweep, &[u32]),
         changes: &Changes,
         before: [u32; 2],
     ) -> Result<CutReport> {
-        let applied = self.try_apply(cuttable, skin, way, changes, before);
-        if applied.is_err() {
-            self.system.forces.forget_parts();
+        let result = self.try_apply(cut_state, skin, swept, changes, before);
+        if result.is_err() {
+            self.system.forces.discard_cut();
         }
-        applied
+        result
     }
 
     fn try_apply(
         &mut self,
-        cuttable: &mut Cuttable,
-        mut skin: Option<&mut Skin>,
+        cut_state: &mut CutState,
+        mut skin: Option<&mut CollisionSurface>,
         (sweep, near): (&Sweep, &[u32]),
         changes: &Changes,
         [first_triangle, first_item]: [u32; 2],
     ) -> Result<CutReport> {
-        let material = &cuttable.material;
-        let known = self.node_count();
-        // What may fail comes first.
+        let material = &cut_state.material;
+        let node_count_before = self.node_count();
+        // Everything that can fail comes first.
         let pieces_parted = material.parted(changes, usize::MAX)?.unwrap_or(0);
         let mut rewiring = self.rewiring(changes)?;
-        if !cuttable.springs_are_edges {
-            self.take_away(material, sweep, near, changes, &mut rewiring)?;
+        if !cut_state.springs_are_edges {
+            self.rewire_non_edges(material, sweep, near, changes, &mut rewiring)?;
         }
         if changes.is_empty() && rewiring.is_empty() {
             return Ok(CutReport::default());
         }
-        let mut closed = None;
+        let mut half_kick = None;
         let is_held = |source: u32| self.system.inverse_masses[self.system.order.own(source) as usize] == 0.0;
-        if self.system.carry.masses_for > 0.0 || changes.nodes.iter().any(|piece| is_held(piece.source)) {
-            // What closes the last step is made with the masses that it was taken with, and gives nothing to copies of what was held.
-            if let Some(beside) = close_beside(&mut self.system) {
-                let forces = beside.forces(&self.system)?;
-                closed = Some((beside, forces));
+        if self.system.carry.scaling_substep > 0.0 || changes.nodes.iter().any(|piece| is_held(piece.source)) {
+            // The last step is closed with the masses that it was taken with. It gives nothing to copies of held nodes.
+            if let Some(flushed) = preview_flush(&mut self.system) {
+                let forces = flushed.forces(&self.system)?;
+                half_kick = Some((flushed, forces));
             }
         }
         let nodes = self.new_nodes(changes)?;
-        let parts = self.parts(material, changes, &rewiring)?;
-        let touched = self.touched(changes, &rewiring)?;
-        let copies = changes.cells.iter().filter(|piece| piece.cell != piece.source);
+        let force_changes = self.force_changes(material, changes, &rewiring)?;
+        let affected = self.affected_nodes(changes, &rewiring)?;
+        let cell_copies = changes.cells.iter().filter(|piece| piece.cell != piece.source);
         let items = material.items_changed(changes)?;
-        cuttable.search.reserve(material, copies.clone().count(), &items)?;
-        let gone = memory::collected(
+        cut_state
+            .search
+            .reserve(material, cell_copies.clone().count(), &items)?;
+        let removed_springs = memory::collected(
             rewiring
                 .removed
                 .iter()
                 .map(|spring| spring.nodes.map(|node| self.system.order.caller(node))),
         )?;
-        cuttable.log.reserve(changes, gone.len())?;
-        let (known_triangles, new) = split_at(&changes.triangles, first_triangle);
+        cut_state.log.reserve(changes, removed_springs.len())?;
+        let (old_triangles, new) = split_at(&changes.triangles, first_triangle);
         let changed = memory::collected(
-            known_triangles
+            old_triangles
                 .iter()
                 .map(|&triangle| (triangle, material.corner_points(triangle))),
         )?;
@@ -212,83 +222,87 @@ impl Body {
             Some(skin) => self.prepare_skin(skin, material, changes, (&change, &nodes))?,
             None => None,
         };
-        self.system.pins.reserve(nodes.len(), known + nodes.len())?;
+        self.system.pins.reserve(nodes.len(), node_count_before + nodes.len())?;
         if let Some(scaling) = &mut self.system.scaling {
-            scaling.reserve(touched.len())?;
+            scaling.reserve(affected.len())?;
         }
-        let changing = memory::collected(touched.iter().map(|touched| touched.node))?;
-        let candidates = memory::reserved(touched.len())?;
-        let of_pieces = parts.elements.iter().flat_map(|piece| piece.nodes);
-        let mut at_pieces = memory::reserved(4 * parts.elements.len() + touched.len())?;
+        let affected_indices = memory::collected(affected.iter().map(|affected| affected.node))?;
+        let candidates = memory::reserved(affected.len())?;
+        let piece_nodes = force_changes.elements.iter().flat_map(|piece| piece.nodes);
+        let mut element_nodes = memory::reserved(4 * force_changes.elements.len() + affected.len())?;
         if self.system.forces.has_elements() {
-            at_pieces.extend(of_pieces.chain(changing.iter().copied()));
-            memory::sort_once(&mut at_pieces);
+            element_nodes.extend(piece_nodes.chain(affected_indices.iter().copied()));
+            memory::sort_once(&mut element_nodes);
         }
-        self.system.forces.prepare_parts(&parts, known + nodes.len())?;
-        if let Some(tears) = &mut self.tears {
-            tears.reserve(changes.springs.len().max(rewiring.added.len()))?;
+        self.system
+            .forces
+            .prepare_cut(&force_changes, node_count_before + nodes.len())?;
+        if let Some(tear_queue) = &mut self.tear_queue {
+            tear_queue.reserve(changes.springs.len().max(rewiring.added.len()))?;
         }
-        self.system.forces.springs.resize(known + nodes.len())?;
-        let rewired = self.system.rewire(&rewiring, 6 * parts.elements.len());
+        self.system.forces.springs.resize(node_count_before + nodes.len())?;
+        let rewired = self.system.rewire(&rewiring, 6 * force_changes.elements.len());
         if rewired.is_err() {
-            self.system.forces.springs.resize(known)?;
+            self.system.forces.springs.resize(node_count_before)?;
             return rewired.map(|()| CutReport::default());
         }
-        // From here on nothing fails.
-        if let Some((beside, forces)) = closed {
+        // Nothing fails from here on.
+        if let Some((flushed, forces)) = half_kick {
             let pins = self.system.pins.iter_mut().zip(forces);
             pins.for_each(|(pin, force)| pin.force = force);
-            beside.commit(&mut self.system);
+            flushed.commit(&mut self.system);
         }
-        // Damping is to be that of masses as they are.
+        // Damping is computed from the masses without scaling.
         self.system.scale_masses(0.0);
         self.add_nodes(&nodes);
-        self.system.forces.take_parts(&parts, known + nodes.len());
-        if let Some(tears) = &mut self.tears {
-            tears.grow(known + nodes.len());
-            tears.follow(changes, &rewiring, &self.system.order);
+        self.system
+            .forces
+            .apply_cut(&force_changes, node_count_before + nodes.len());
+        if let Some(tear_queue) = &mut self.tear_queue {
+            tear_queue.resize_nodes(node_count_before + nodes.len());
+            tear_queue.apply_cut(changes, &rewiring, &self.system.order);
         }
-        self.rebind(changes);
-        self.part_rings(&cuttable.material, changes);
-        self.share_masses(cuttable, changes)?;
-        self.follow_elements(&cuttable.material, changes, &at_pieces);
-        self.go_on(&touched, &changing, candidates);
+        self.rebind_points(changes);
+        self.separate_nodal_pressures(&cut_state.material, changes);
+        self.distribute_masses(cut_state, changes)?;
+        self.update_elements(&cut_state.material, changes, &element_nodes);
+        self.finish_cut(&affected, &affected_indices, candidates);
         self.open_cavities(&changed);
         self.change_surface(&change);
         if let (Some(skin), Some(change)) = (skin, skin_change) {
-            skin.change(change);
+            skin.apply_change(change);
         }
-        cuttable.search.add_cells(copies.map(|piece| piece.source));
-        cuttable.search.see(&cuttable.material, &items, first_item);
-        if !changes.is_empty() || !gone.is_empty() {
-            cuttable.log.add(changes, &gone);
+        cut_state.search.add_cells(cell_copies.map(|piece| piece.source));
+        cut_state.search.update_items(&cut_state.material, &items, first_item);
+        if !changes.is_empty() || !removed_springs.is_empty() {
+            cut_state.log.add(changes, &removed_springs);
         }
-        self.publish_new(known);
+        self.publish_new_nodes(node_count_before);
         Ok(CutReport {
             new_nodes: nodes.len() as u32,
             new_triangles: added.len() as u32,
-            springs_removed: gone.len() as u32,
+            springs_removed: removed_springs.len() as u32,
             pieces_parted,
             length: 0.5 * changes.rim.iter().map(|edge| edge.length).sum::<f64>(),
             area: changes.faces.iter().map(|face| face.area).sum(),
         })
     }
 
-    /// Parts the rings of nodes that fell apart.
-    fn part_rings(&mut self, material: &CutMaterial, changes: &Changes) {
+    /// Separates the nodal pressures of the copies of each node.
+    fn separate_nodal_pressures(&mut self, material: &CutMaterial, changes: &Changes) {
         let system = &mut self.system;
         let Some(elements) = system.forces.elements_mut() else {
             return;
         };
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
-            let copies = pieces.iter().map(|piece| system.order.own(piece.node));
+            let node_copies = pieces.iter().map(|piece| system.order.own(piece.node));
             let cells_at = |node: u32| material.tetrahedra_at(system.order.caller(node));
             let source = system.order.own(pieces[0].source);
-            elements.part_ring(source, copies, cells_at, system.state.positions());
+            elements.split_nodal_volume(source, node_copies, cells_at, system.state.positions());
         }
     }
 
-    /// Opens the cavities of which triangles, given as they are now, had other corners.
+    /// Opens the cavities that had other triangles, given the triangles as they are now.
     fn open_cavities(&mut self, changed: &[(u32, [u32; 3])]) {
         let System {
             forces, order, surface, ..
@@ -300,136 +314,143 @@ impl Body {
             (before != corners).then(|| before.map(|node| order.own(node)))
         });
         if forces.open_cavities(before) {
-            // What a step of second order takes from the last, pressure gave.
-            self.system.changed(Changed::Course);
+            // A second-order step extrapolates from the last one, in which the pressure acted.
+            self.system.changed(Changed::Trajectory);
         }
     }
 
-    /// Remembers where the blade stands in the material.
-    fn stop(&self, cuttable: &mut Cuttable, sweep: &Sweep, near: &[u32], changes: &Changes) {
-        let Cuttable { stroke, material, .. } = cuttable;
-        if stroke.stop(sweep) {
+    /// Stores where the blade stopped in the material.
+    fn end_stroke(&self, cut_state: &mut CutState, sweep: &Sweep, near: &[u32], changes: &Changes) {
+        let CutState { stroke, material, .. } = cut_state;
+        if stroke.end_sweep(sweep) {
             let positions = self.positions();
-            material.ends(changes, sweep, positions, near, |end| {
-                stroke.stands_at(end, material, positions)
+            material.visit_ends(changes, sweep, positions, near, |end| {
+                stroke.add_end(end, material, positions)
             });
             stroke.sort_ends();
         }
     }
 
-    /// What becomes of elements and terms.
-    fn parts(&self, material: &CutMaterial, changes: &Changes, rewiring: &Rewiring) -> Result<Parts> {
+    /// The changes of elements and terms.
+    fn force_changes(&self, material: &CutMaterial, changes: &Changes, rewiring: &Rewiring) -> Result<ForcePieces> {
         let System { forces, order, .. } = &self.system;
-        let mut parts = Parts {
+        let mut force_changes = ForcePieces {
             ring_count: changes.nodes.len(),
-            ..Parts::default()
+            ..ForcePieces::default()
         };
         if forces.has_elements() {
-            parts.elements = memory::reserved(changes.cells.len())?;
-            parts.elements.extend(changes.cells.iter().map(|piece| PieceOfElement {
-                cell: piece.cell,
-                source: piece.source,
-                nodes: material.nodes_of(piece.cell).map(|node| order.own(node)),
-                part: piece.part as f32,
-            }));
+            force_changes.elements = memory::reserved(changes.cells.len())?;
+            force_changes
+                .elements
+                .extend(changes.cells.iter().map(|piece| ElementPiece {
+                    cell: piece.cell,
+                    source: piece.source,
+                    nodes: material.nodes_of(piece.cell).map(|node| order.own(node)),
+                    part: piece.part as f32,
+                }));
         }
-        if forces.beside.terms.is_some() {
-            parts.terms = parting(order, material, changes, rewiring)?;
+        if forces.auxiliary.terms.is_some() {
+            force_changes.terms = term_changes(order, material, changes, rewiring)?;
         }
-        Ok(parts)
+        Ok(force_changes)
     }
 
-    /// What becomes of its skin.
+    /// The change of the skin.
     fn prepare_skin(
         &self,
-        skin: &mut Skin,
+        skin: &mut CollisionSurface,
         material: &CutMaterial,
         changes: &Changes,
         (change, nodes): (&SurfaceChange, &[NewNode]),
-    ) -> Result<Option<SkinChange>> {
-        let bared = memory::collected(changes.triangles.iter().map(|&triangle| material.is_bared(triangle)))?;
-        let bound = memory::collected(changes.bound.iter().map(|bound| self.bound(bound)))?;
-        let to_be = SurfaceToBe {
+    ) -> Result<Option<PreparedSurfaceChange>> {
+        let exposed = memory::collected(changes.triangles.iter().map(|&triangle| material.is_exposed(triangle)))?;
+        let bindings = memory::collected(changes.bound.iter().map(|binding| self.binding(binding)))?;
+        let to_be = NewCollisionSurface {
             change,
-            bared: &bared,
+            exposed: &exposed,
             nodes,
-            bound: &bound,
+            bound: &bindings,
             is_open: material.surface().is_some() && !changes.rim.is_empty(),
         };
         skin.prepare(&self.system, &to_be)
     }
 
-    /// The new nodes in the order of their numbers.
+    /// The new nodes in the order of their indices.
     fn new_nodes(&self, changes: &Changes) -> Result<Vec<NewNode>> {
-        let known = self.node_count() as u32;
+        let node_count_before = self.node_count() as u32;
         let mut nodes = memory::reserved(changes.nodes.len() + changes.bound.len())?;
         for piece in &changes.nodes {
-            if piece.node >= known {
+            if piece.node >= node_count_before {
                 nodes.push((piece.node, NewNode::Copy(self.system.order.own(piece.source))));
             }
         }
-        for bound in &changes.bound {
-            if bound.point >= known {
-                nodes.push((bound.point, NewNode::Bound(self.bound(bound))));
+        for binding in &changes.bound {
+            if binding.point >= node_count_before {
+                nodes.push((binding.point, NewNode::Bound(self.binding(binding))));
             }
         }
         nodes.sort_unstable_by_key(|&(node, _)| node);
         memory::collected(nodes.into_iter().map(|(_, new)| new))
     }
 
-    /// Binds points to the copies that move them now.
-    fn rebind(&mut self, changes: &Changes) {
-        for of in &changes.bound {
-            let bound = self.bound(of);
+    /// Binds points of the surface to the copies that move them now.
+    fn rebind_points(&mut self, changes: &Changes) {
+        for point in &changes.bound {
+            let binding = self.binding(point);
             let bindings = self.system.bindings.as_mut();
-            if let Some(known) = bindings.and_then(|bindings| bindings.get_mut(of.point)) {
-                *known = bound;
+            if let Some(current) = bindings.and_then(|bindings| bindings.get_mut(point.point)) {
+                *current = binding;
             }
         }
     }
 
-    fn bound(&self, bound: &BoundPoint) -> Bound {
+    fn binding(&self, binding: &BoundPoint) -> NodeBinding {
         let own = |node: u32| self.system.order.own(node);
-        Bound {
-            node: bound.point,
-            nodes: bound.nodes.map(own),
-            weights: bound.weights.map(|weight| weight as f32),
+        NodeBinding {
+            node: binding.point,
+            nodes: binding.nodes.map(own),
+            weights: binding.weights.map(|weight| weight as f32),
         }
     }
 }
 
-/// What becomes of what terms are of.
-fn parting(order: &NodeOrder, material: &CutMaterial, changes: &Changes, rewiring: &Rewiring) -> Result<Parting> {
+/// The changes of the nodes, springs and cells that terms depend on.
+fn term_changes(
+    order: &NodeOrder,
+    material: &CutMaterial,
+    changes: &Changes,
+    rewiring: &Rewiring,
+) -> Result<TermPieces> {
     let own = |nodes: [u32; 2]| nodes.map(|node| order.own(node));
-    let mut parting = Parting::default();
+    let mut term_changes = TermPieces::default();
     for piece in &changes.nodes {
-        parting.add_node(order.own(piece.source), order.own(piece.node), piece.part)?;
+        term_changes.add_node(order.own(piece.source), order.own(piece.node), piece.part)?;
     }
     for piece in &changes.springs {
-        parting.add_spring(own(piece.source), own(piece.nodes), piece.part)?;
+        term_changes.add_spring(own(piece.source), own(piece.nodes), piece.part)?;
     }
-    let known = parting.know_springs();
+    let listed = term_changes.sort_springs();
     for spring in &rewiring.removed {
-        parting.add_other_spring(spring.nodes, known, 0.0)?;
+        term_changes.add_other_spring(spring.nodes, listed, 0.0)?;
     }
     for SpringChange { node, before, after } in &rewiring.changed {
         let part = f64::from(after.stiffness) / f64::from(before.stiffness);
-        parting.add_other_spring(
-            [*node, before.neighbour],
-            known,
+        term_changes.add_other_spring(
+            [*node, before.neighbor],
+            listed,
             if part.is_finite() { part } else { 1.0 },
         )?;
     }
-    let sources = parting.know_nodes()?;
+    let sources = term_changes.sorted_nodes()?;
     for piece in &changes.cells {
         let nodes = material.nodes_of_cell(piece.cell).iter();
-        parting.add_cell(nodes.map(|&node| order.own(node)), piece.part, &sources)?;
+        term_changes.add_cell(nodes.map(|&node| order.own(node)), piece.part, &sources)?;
     }
-    parting.complete()?;
-    Ok(parting)
+    term_changes.complete()?;
+    Ok(term_changes)
 }
 
-/// Those below a number, and the others, of numbers in order.
+/// Splits sorted indices into those below an index and the others.
 fn split_at(numbers: &[u32], first: u32) -> (&[u32], &[u32]) {
     numbers.split_at(numbers.partition_point(|&number| number < first))
 }

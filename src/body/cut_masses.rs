@@ -1,39 +1,40 @@
-//! How nodes go on after a cut: with their parts of masses, and so that the step that is still open gives them what it would have given.
+//! Masses and velocities of nodes after a cut: copies share the mass, and the deferred half kick of the last step stays
+//! the same.
 
 use glam::{BVec3, DVec3, Vec3};
 
 use super::Body;
-use super::cuttable::Cuttable;
+use super::cut_state::CutState;
 use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial};
-use crate::def::SMALLEST_MASS;
-use crate::soa::Masses;
-use crate::solver::{Candidate, Changed, make_up_for};
+use crate::def::MIN_MASS;
+use crate::soa::NodalMasses;
+use crate::solver::{Changed, CriticalNode, correct_deferred_kick};
 use crate::springs::Rewiring;
 
 /// A node whose springs or mass a cut changes.
-pub(super) struct Touched {
-    /// In its own number.
+pub(super) struct AffectedNode {
+    /// The internal index.
     pub node: u32,
     source: u32,
-    /// Its part of the mass that it, or its source, had.
-    part: f32,
-    /// What springs did to its source, N.
+    /// The part of the mass that the node, or its source, had.
+    mass_fraction: f32,
+    /// The force of springs on the source before the cut, N.
     before: Vec3,
 }
 
 impl Body {
-    /// All nodes whose springs or mass are to change, in order, with what springs do to them now.
-    pub(super) fn touched(&self, changes: &Changes, rewiring: &Rewiring) -> Result<Vec<Touched>> {
-        let known = self.node_count() as u32;
-        let mut touched: Vec<Touched> = Vec::new();
+    /// All nodes whose springs or masses will change, in order, with the current force of their springs.
+    pub(super) fn affected_nodes(&self, changes: &Changes, rewiring: &Rewiring) -> Result<Vec<AffectedNode>> {
+        let node_count_before = self.node_count() as u32;
+        let mut affected: Vec<AffectedNode> = Vec::new();
         for piece in &changes.nodes {
             memory::push(
-                &mut touched,
-                Touched {
+                &mut affected,
+                AffectedNode {
                     node: self.system.order.own(piece.node),
                     source: self.system.order.own(piece.source),
-                    part: piece.part as f32,
+                    mass_fraction: piece.part as f32,
                     before: Vec3::ZERO,
                 },
             )?;
@@ -41,34 +42,34 @@ impl Body {
         let changed = rewiring
             .changed
             .iter()
-            .flat_map(|change| [change.node, change.before.neighbour]);
+            .flat_map(|change| [change.node, change.before.neighbor]);
         let ends = rewiring.removed.iter().flat_map(|spring| spring.nodes).chain(changed);
         let added = rewiring.added.iter().flat_map(|spring| spring.nodes);
-        for node in ends.chain(added.filter(|&node| node < known)) {
-            let (source, part, before) = (node, 1.0, Vec3::ZERO);
+        for node in ends.chain(added.filter(|&node| node < node_count_before)) {
+            let (source, mass_fraction, before) = (node, 1.0, Vec3::ZERO);
             memory::push(
-                &mut touched,
-                Touched {
+                &mut affected,
+                AffectedNode {
                     node,
                     source,
-                    part,
+                    mass_fraction,
                     before,
                 },
             )?;
         }
-        // Of a node that fell apart what is known of that comes first.
-        touched.sort_unstable_by(|a, b| a.node.cmp(&b.node).then(a.part.total_cmp(&b.part)));
-        touched.dedup_by_key(|touched| touched.node);
-        for touched in &mut touched {
-            touched.before = self.spring_force(touched.source);
+        // The entry of a node that fell apart comes first.
+        affected.sort_unstable_by(|a, b| a.node.cmp(&b.node).then(a.mass_fraction.total_cmp(&b.mass_fraction)));
+        affected.dedup_by_key(|affected| affected.node);
+        for affected in &mut affected {
+            affected.before = self.spring_force(affected.source);
         }
-        Ok(touched)
+        Ok(affected)
     }
 
-    /// What springs do to a node where it is, but for their damping, N; nothing where nobody asks.
+    /// The force of springs on a node without their damping, N. 0 if no half kick is deferred.
     fn spring_force(&self, node: u32) -> Vec3 {
         let mut force = Vec3::ZERO;
-        if self.system.carry.closing.is_some() {
+        if self.system.carry.deferred_kick.is_some() {
             let positions = self.system.state.positions();
             self.system
                 .forces
@@ -77,13 +78,14 @@ impl Body {
         force
     }
 
-    /// Gives nodes that fell apart their parts of the mass, and holds copies of held nodes that are drawn.
-    pub(super) fn share_masses(&mut self, cuttable: &Cuttable, changes: &Changes) -> Result<()> {
+    /// Distributes the mass of each node that fell apart to its copies. Pins the copies of pinned nodes that are
+    /// rendered.
+    pub(super) fn distribute_masses(&mut self, cut_state: &CutState, changes: &Changes) -> Result<()> {
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
             let source = self.system.order.own(pieces[0].source);
-            let whole = f64::from(self.system.masses[source as usize]);
-            // Of what a tool holds no copies are held.
-            let axes = if self.system.is_held_by_tool(source) {
+            let total = f64::from(self.system.masses[source as usize]);
+            // Copies of nodes that a tool holds are not held.
+            let axes = if self.system.is_attached_node(source) {
                 BVec3::FALSE
             } else {
                 self.system.pins.axes_of(source)
@@ -93,14 +95,14 @@ impl Body {
                 let node = self.system.order.own(piece.node);
                 let is_drawn = changes.undrawn.binary_search(&piece.node).is_err();
                 let is_copy = piece.node != piece.source;
-                let mass = if whole > 0.0 {
-                    whole * piece.part
+                let mass = if total > 0.0 {
+                    total * piece.part
                 } else if is_drawn {
                     0.0
                 } else {
-                    cuttable.density * cuttable.material.share_at(piece.node)
+                    cut_state.density * cut_state.material.material_at(piece.node)
                 } as f32;
-                let mass = if mass > 0.0 { mass.max(SMALLEST_MASS) } else { mass };
+                let mass = if mass > 0.0 { mass.max(MIN_MASS) } else { mass };
                 if is_copy && is_drawn && axes.any() {
                     let target = self.system.pins.get(source).and_then(|pin| pin.target);
                     self.system.pins.hold(node, axes)?;
@@ -123,13 +125,13 @@ impl Body {
         Ok(())
     }
 
-    /// The same for elements, at all nodes of pieces and all others of which masses or springs have changed.
-    pub(super) fn follow_elements(&mut self, material: &CutMaterial, changes: &Changes, nodes: &[u32]) {
+    /// Updates elements at the given nodes, and corrects the deferred half kick for their forces.
+    pub(super) fn update_elements(&mut self, material: &CutMaterial, changes: &Changes, nodes: &[u32]) {
         let order = &self.system.order;
-        let masses = Masses::new(&self.system.masses, &self.system.inverse_masses);
+        let masses = NodalMasses::new(&self.system.masses, &self.system.inverse_masses);
         let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
         self.system.forces.find_rates_at(nodes, cells_at, &masses);
-        if self.system.carry.closing.is_none() || !self.system.forces.has_elements() {
+        if self.system.carry.deferred_kick.is_none() || !self.system.forces.has_elements() {
             return;
         }
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
@@ -140,32 +142,39 @@ impl Body {
                     elements.force_at(system.order.own(node), cells, system.state.positions())
                 })
             };
-            let whole: DVec3 = pieces.iter().map(|piece| force_on(self, piece.node)).sum();
+            let total: DVec3 = pieces.iter().map(|piece| force_on(self, piece.node)).sum();
             for piece in pieces {
-                let more = whole * piece.part - force_on(self, piece.node);
+                let correction = total * piece.part - force_on(self, piece.node);
                 let own = self.system.order.own(piece.node);
-                make_up_for(&mut self.system, own, more.as_vec3());
+                correct_deferred_kick(&mut self.system, own, correction.as_vec3());
             }
         }
     }
 
-    /// Has nodes go on after their springs and masses have changed: closing the last step gives them what it would have given.
-    pub(super) fn go_on(&mut self, touched: &[Touched], nodes: &[u32], candidates: Vec<Candidate>) {
+    /// Updates the state after springs and masses have changed. The deferred half kick is corrected, so that velocities
+    /// stay the same.
+    pub(super) fn finish_cut(&mut self, affected: &[AffectedNode], nodes: &[u32], candidates: Vec<CriticalNode>) {
         self.system.changed(Changed::Topology);
-        self.forget_velocities();
-        self.system.scale_for_springs(nodes);
-        for touched in touched {
-            let force = self.spring_force(touched.node);
-            make_up_for(&mut self.system, touched.node, touched.before * touched.part - force);
+        self.discard_velocities();
+        self.system.update_added_masses(nodes);
+        for affected in affected {
+            let force = self.spring_force(affected.node);
+            correct_deferred_kick(
+                &mut self.system,
+                affected.node,
+                affected.before * affected.mass_fraction - force,
+            );
         }
-        self.system.follow_nodes();
-        let masses = Masses::new(&self.system.masses, &self.system.inverse_masses);
-        let watched = (&mut self.system.watched, candidates);
+        self.system.update_bound_points();
+        let masses = NodalMasses::new(&self.system.masses, &self.system.inverse_masses);
+        let watched_and_candidates = (&mut self.system.critical_nodes, candidates);
         let positions = self.system.state.positions();
-        self.system.carry.stability =
-            self.system
-                .carry
-                .stability
-                .cut(nodes, &*self.system.forces.springs, masses, positions, watched);
+        self.system.carry.stability = self.system.carry.stability.cut(
+            nodes,
+            &*self.system.forces.springs,
+            masses,
+            positions,
+            watched_and_candidates,
+        );
     }
 }

@@ -1,14 +1,15 @@
-//! Springs of a body that is cut: parts of those along edges of cells, and those along none that the blade passes through.
+//! Springs of a body that is cut: those along edges of cells are divided, others are removed if the blade passes
+//! through them.
 
 use super::Body;
-use super::cuttable::passes;
+use super::cut_state::segment_crosses_triangle;
 use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial, PieceOfSpring, Sweep};
 use crate::def::Spring;
 use crate::springs::{Link, Rewiring, SpringChange};
 
 impl Body {
-    /// What becomes of springs along edges of cells.
+    /// The changes of the springs along edges of cells.
     pub(super) fn rewiring(&self, changes: &Changes) -> Result<Rewiring> {
         let mut rewiring = Rewiring::default();
         let own = |nodes: [u32; 2]| nodes.map(|node| self.system.order.own(node));
@@ -19,19 +20,19 @@ impl Body {
             };
             let is_source = |piece: &&PieceOfSpring| piece.nodes == piece.source;
             match pieces.iter().find(is_source) {
-                Some(piece) => memory::push(&mut rewiring.changed, part_of(source[0], link, piece.part))?,
-                None => memory::push(&mut rewiring.removed, spring_of(source, &link, 1.0))?,
+                Some(piece) => memory::push(&mut rewiring.changed, scaled_change(source[0], link, piece.part))?,
+                None => memory::push(&mut rewiring.removed, scaled_spring(source, &link, 1.0))?,
             }
             let others = pieces.iter().filter(|piece| !is_source(piece));
-            let others = others.map(|piece| spring_of(own(piece.nodes), &link, piece.part));
+            let others = others.map(|piece| scaled_spring(own(piece.nodes), &link, piece.part));
             memory::extend(&mut rewiring.added, others)?;
         }
         Ok(rewiring)
     }
 
-    /// Springs along no edge of a cell: those that the blade passed through go, and those of nodes that fell apart become as much softer as
-    /// the lighter of their nodes becomes lighter.
-    pub(super) fn take_away(
+    /// Adds the changes of springs along no edge of a cell. Those that the blade passes through are removed. Those of
+    /// nodes that fell apart are scaled by the smaller mass ratio of their two nodes.
+    pub(super) fn rewire_non_edges(
         &self,
         material: &CutMaterial,
         sweep: &Sweep,
@@ -43,64 +44,67 @@ impl Body {
         for &item in near {
             nodes.extend(material.nodes_of(item).map(|node| self.system.order.own(node)));
         }
-        // New ones have no springs yet.
-        let known = self.node_count() as u32;
-        nodes.retain(|&node| node < known);
-        let parted = changes.nodes.iter().filter(|piece| piece.node == piece.source);
-        let parts = parted.map(|piece| (self.system.order.own(piece.node), piece.part));
+        // New nodes have no springs yet.
+        let node_count_before = self.node_count() as u32;
+        nodes.retain(|&node| node < node_count_before);
+        let sources = changes.nodes.iter().filter(|piece| piece.node == piece.source);
+        let parts = sources.map(|piece| (self.system.order.own(piece.node), piece.part));
         let mut parts = memory::collected_within(changes.nodes.len(), parts)?;
         parts.sort_unstable_by_key(|&(node, _)| node);
         nodes.try_reserve(parts.len())?;
         nodes.extend(parts.iter().map(|&(node, _)| node));
         memory::sort_once(&mut nodes);
-        let part_of_node = |node: u32| match parts.binary_search_by_key(&node, |&(node, _)| node) {
-            Ok(place) => parts[place].1,
+        let mass_ratio = |node: u32| match parts.binary_search_by_key(&node, |&(node, _)| node) {
+            Ok(index) => parts[index].1,
             Err(_) => 1.0,
         };
-        let mut known_ends = memory::reserved(rewiring.removed.len() + rewiring.changed.len())?;
+        let mut handled_pairs = memory::reserved(rewiring.removed.len() + rewiring.changed.len())?;
         let ordered = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
-        known_ends.extend(rewiring.removed.iter().map(|spring| ordered(spring.nodes)));
-        known_ends.extend(
+        handled_pairs.extend(rewiring.removed.iter().map(|spring| ordered(spring.nodes)));
+        handled_pairs.extend(
             rewiring
                 .changed
                 .iter()
-                .map(|change| ordered([change.node, change.before.neighbour])),
+                .map(|change| ordered([change.node, change.before.neighbor])),
         );
-        known_ends.sort_unstable();
+        handled_pairs.sort_unstable();
         let (positions, swept) = (self.positions(), sweep.triangles());
-        let mut found = Vec::new();
+        let mut candidates = Vec::new();
         for &node in &nodes {
-            let mut room = Ok(());
+            let mut pushed = Ok(());
             self.system.forces.springs.visit(node as usize, &mut |link| {
-                let ends = ordered([node, link.neighbour]);
-                // Of two nodes that are both looked at the lower sees to it.
-                let is_seen = ends[0] != node && nodes.binary_search(&ends[0]).is_ok();
-                if !is_seen && room.is_ok() && known_ends.binary_search(&ends).is_err() {
-                    room = memory::push(&mut found, (node, link));
+                let ends = ordered([node, link.neighbor]);
+                // Of two nodes in the list, the lower one handles their spring.
+                let is_handled_by_other = ends[0] != node && nodes.binary_search(&ends[0]).is_ok();
+                if !is_handled_by_other && pushed.is_ok() && handled_pairs.binary_search(&ends).is_err() {
+                    pushed = memory::push(&mut candidates, (node, link));
                 }
             });
-            room?;
+            pushed?;
         }
-        for (node, link) in found {
-            let ends = [node, link.neighbour];
+        for (node, link) in candidates {
+            let ends = [node, link.neighbor];
             let callers = ends.map(|node| self.system.order.caller(node));
             if material.has_edge(callers) {
                 continue;
             }
             let segment = callers.map(|node| positions[node as usize]);
-            let part = part_of_node(node).min(part_of_node(link.neighbour));
-            if swept.into_iter().any(|triangle| passes(segment, triangle)) {
-                memory::push(&mut rewiring.removed, spring_of(ends, &link, 1.0))?;
+            let part = mass_ratio(node).min(mass_ratio(link.neighbor));
+            if swept
+                .into_iter()
+                .any(|triangle| segment_crosses_triangle(segment, triangle))
+            {
+                memory::push(&mut rewiring.removed, scaled_spring(ends, &link, 1.0))?;
             } else if part < 1.0 {
-                memory::push(&mut rewiring.changed, part_of(node, link, part))?;
+                memory::push(&mut rewiring.changed, scaled_change(node, link, part))?;
             }
         }
         Ok(())
     }
 }
 
-/// A spring of the ends of a link, with a part of its stiffness and damping.
-fn spring_of(nodes: [u32; 2], link: &Link, part: f64) -> Spring {
+/// A spring between the ends of a link, with a part of its stiffness and damping.
+fn scaled_spring(nodes: [u32; 2], link: &Link, part: f64) -> Spring {
     Spring {
         nodes,
         stiffness: (f64::from(link.stiffness) * part) as f32,
@@ -109,7 +113,7 @@ fn spring_of(nodes: [u32; 2], link: &Link, part: f64) -> Spring {
     }
 }
 
-fn part_of(node: u32, link: Link, part: f64) -> SpringChange {
+fn scaled_change(node: u32, link: Link, part: f64) -> SpringChange {
     SpringChange {
         node,
         before: link,

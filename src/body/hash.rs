@@ -1,4 +1,4 @@
-//! The bits of a body that its next step depends on.
+//! The hash of all state of a body that its next step depends on.
 
 use super::Body;
 use crate::base::StateHasher;
@@ -35,50 +35,50 @@ impl Body {
         }
         system.forces.hash(hasher);
         for pin in system.pins.iter() {
-            let led = u64::from(pin.target.is_some());
-            hasher.write_u64(u64::from(pin.node) << 4 | u64::from(pin.axes.bitmask()) << 1 | led);
+            let has_target = u64::from(pin.target.is_some());
+            hasher.write_u64(u64::from(pin.node) << 4 | u64::from(pin.axes.bitmask()) << 1 | has_target);
             if let Some(target) = pin.target {
                 hasher.write_floats(&target.to_array());
             }
         }
-        if let Some(cuttable) = &self.cuttable {
+        if let Some(cut_state) = &self.cut_state {
             hasher.write_floats(self.toughness().as_slice());
-            cuttable.stroke.hash(hasher);
-            cuttable.material.hash(hasher);
+            cut_state.stroke.hash(hasher);
+            cut_state.material.hash(hasher);
         }
         if let Some(bindings) = &system.bindings {
             bindings.hash(hasher);
         }
-        if let Some(tears) = &self.tears {
-            tears.bearing.hash(hasher);
+        if let Some(tear_queue) = &self.tear_queue {
+            tear_queue.strength.hash(hasher);
         }
-        if let Some(grasps) = &system.grasps {
-            grasps.hash(hasher);
+        if let Some(tool_attachments) = &system.tool_attachments {
+            tool_attachments.hash(hasher);
         }
         hasher.write_floats(&system.carry.stability.floats());
         if system.carry.stability.limit().is_some() {
             self.system
-                .watched
+                .critical_nodes
                 .floats()
                 .for_each(|limit| hasher.write_floats(&[limit]));
         }
-        if let Some(closing) = &system.carry.closing {
+        if let Some(closing) = &system.carry.deferred_kick {
             hasher.write_floats(&[closing.substep]);
             hasher.write_floats(&closing.gravity.to_array());
         }
-        hasher.write_floats(&[system.carry.masses_for]);
+        hasher.write_floats(&[system.carry.scaling_substep]);
         system.carry.energy.hash(hasher);
-        system.carry.pace.hash(hasher);
-        for sliver in system.scaling.iter().flat_map(|scaling| scaling.slivers()) {
+        system.carry.substep_history.hash(hasher);
+        for sliver in system.scaling.iter().flat_map(|scaling| scaling.candidates()) {
             hasher.write_u64(u64::from(sliver.node));
         }
         system.integrator.hash(hasher);
-        if let Some(sleeper) = &system.sleeper {
-            sleeper.hash(hasher);
+        if let Some(sleep_state) = &system.sleep_state {
+            sleep_state.hash(hasher);
         }
         system.contact.hash(hasher);
         if let Some(contacts) = &system.contacts {
-            contacts.holds.hash(hasher);
+            contacts.multipliers.hash(hasher);
         }
         for bits in system.carry.gravity.bits() {
             hasher.write_u64(bits);

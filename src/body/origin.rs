@@ -1,18 +1,19 @@
-//! Where a body's local coordinates begin: near the body, so that small motions survive in `f32` anywhere in the world.
+//! The origin of a body's local coordinates. It is near the body, so that `f32` resolves small motions anywhere in the
+//! world.
 
 use glam::DVec3;
 
-use crate::geometry::Bounds;
+use crate::geometry::Aabb;
 
-/// The smallest grid on which an origin is chosen, in metres; a body of one node has no extent of its own.
+/// The smallest grid spacing of origins, m. A body with one node has no extent.
 const SMALLEST_GRID: f64 = 1.0 / 1024.0;
 
-/// The shift of the origin that brings what lies within `bounds` near it; zero while that is near enough.
+/// The shift that moves the origin near the bounds; zero if it is near enough.
 ///
-/// The shift is a multiple of a power of two that is not smaller than the body's extent, and made only when the body's
-/// centre is at least that far away. Then every coordinate minus the shift is exact in `f32`: a position that comes
-/// in goes out unchanged, and moving the origin moves nothing.
-pub(crate) fn shift_towards(bounds: Bounds) -> DVec3 {
+/// The shift is a multiple of a power of two that is at least the body's extent. It is made only if the center of the
+/// body is at least that far away. Every coordinate minus the shift is then exact in `f32`, so that moving the origin
+/// changes no position.
+pub(crate) fn shift_towards(bounds: Aabb) -> DVec3 {
     let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
     let extent = (max - min).max_element().max(SMALLEST_GRID);
     let grid = power_of_two_from(extent);
@@ -21,7 +22,7 @@ pub(crate) fn shift_towards(bounds: Bounds) -> DVec3 {
     DVec3::select(far, steps.round() * grid, DVec3::ZERO)
 }
 
-/// The smallest power of two that is at least `value`, for a positive normal number.
+/// The smallest power of two that is at least `value`, a positive normal number.
 fn power_of_two_from(value: f64) -> f64 {
     let mantissa = (1_u64 << 52) - 1;
     let bits = value.to_bits();
@@ -46,7 +47,7 @@ mod tests {
             let points: Vec<Vec3> = (0..20)
                 .map(|_| offset + extent * Vec3::new(random(), random(), random()))
                 .collect();
-            let bounds = Bounds::of(points.iter().copied());
+            let bounds = Aabb::of(points.iter().copied());
             let origin = shift_towards(bounds);
             for point in points {
                 let local = (point.as_dvec3() - origin).as_vec3();

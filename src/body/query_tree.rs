@@ -1,4 +1,5 @@
-//! Trees over a body's surface for queries: built by the first, and refitted by the first after its nodes have moved.
+//! Trees over a body's surface for queries. The first query builds them, and the first query after nodes moved refits
+//! them.
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
@@ -8,18 +9,19 @@ use super::Body;
 use crate::base::{Result, memory};
 use crate::geometry::Forest;
 
-/// Nothing while nobody asks. A step only marks it as outdated: it neither waits, refits nor allocates.
+/// The trees, or nothing before the first query. A step only marks them as outdated: it does not wait, refit or
+/// allocate.
 #[derive(Debug, Default)]
 pub(super) struct QueryTree {
-    /// Fitted to the published positions.
+    /// Trees that fit the published positions.
     current: OnceLock<Box<Forest>>,
-    /// As it was before they changed. Locked by queries alone: one of them refits it, and others wait for that.
+    /// Trees that must be refitted. Only queries lock it: one of them refits the trees, and others wait.
     outdated: Mutex<Option<Box<Forest>>>,
 }
 
 impl QueryTree {
-    /// To be called when published positions or the surface change.
-    pub fn outdate(&mut self) {
+    /// Marks the trees as outdated. Call it when published positions or the surface change.
+    pub fn mark_outdated(&mut self) {
         if let Some(trees) = self.current.take() {
             *self.outdated.get_mut().unwrap_or_else(PoisonError::into_inner) = Some(trees);
         }
@@ -27,7 +29,7 @@ impl QueryTree {
 }
 
 impl Body {
-    /// Trees over its surface as it is published.
+    /// The trees over the published surface.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
@@ -37,7 +39,7 @@ impl Body {
             return Ok(trees);
         }
         let mut outdated = outdated.lock().unwrap_or_else(PoisonError::into_inner);
-        // Another thread may have been first.
+        // Another thread can be first.
         if let Some(trees) = current.get() {
             return Ok(trees);
         }
@@ -45,9 +47,9 @@ impl Body {
         let corners = |triangle: u32| -> [Vec3; 3] { surface[triangle as usize].map(|node| positions[node as usize]) };
         let trees = match outdated.take() {
             Some(mut trees) => {
-                // Triangles are changed and added, never taken away.
+                // Triangles are changed and added, never removed.
                 let added = surface.len() - trees.triangle_count();
-                if let Some(more) = trees.with_more(added, corners)? {
+                if let Some(more) = trees.build_added(added, corners)? {
                     trees.add(more);
                 }
                 trees.refit(corners);

@@ -1,4 +1,4 @@
-//! A stroke: a blade that goes on where it stopped, in tissue that has moved since.
+//! A stroke: a blade continues from where it stopped, in tissue that has moved since.
 
 use glam::Vec3;
 
@@ -6,42 +6,42 @@ use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::cutting::{CutEnd, CutMaterial, SolidStroke, Sweep};
 
-/// Points that reach along less than this part of an edge do not tell how it turns.
-const LITTLE: f32 = 0.02;
+/// Points that cover less than this part of an edge do not determine its rotation.
+const MIN_SPREAD: f32 = 0.02;
 
-/// Tissue that goes over a blade at rest is cut by no less than this part of a cell at once.
-const AT_ONCE: f32 = 0.2;
+/// A resting blade cuts tissue that moves over it only after a displacement of this part of a cell.
+const MIN_CUT: f32 = 0.2;
 
-/// Where a blade stopped.
+/// The position where a blade stopped, in space and in the tissue.
 #[derive(Debug)]
-pub(crate) struct Stroke {
+pub(crate) struct BladeStroke {
     /// The blade's edge.
     edge: Option<[Vec3; 2]>,
-    /// Points of the tissue where it stood, which may lie a little beside it, and its points next to them.
+    /// Points of the tissue at the blade, and the nearest points of the edge. The two can differ a little.
     ends: Vec<(CutEnd, Vec3)>,
-    /// What a solid knows of it while another is made in it.
-    pub of_solid: SolidStroke,
+    /// The state of a solid's stroke while another one is in use.
+    pub solid_stroke: SolidStroke,
 }
 
-saved! { Stroke { edge, ends, of_solid } }
+saved! { BladeStroke { edge, ends, solid_stroke } }
 
-impl Default for Stroke {
+impl Default for BladeStroke {
     fn default() -> Self {
         Self {
             edge: None,
             ends: Vec::new(),
-            of_solid: SolidStroke::NONE,
+            solid_stroke: SolidStroke::NONE,
         }
     }
 }
 
-impl Stroke {
-    /// Points of the tissue where it stands, and its points next to them.
+impl BladeStroke {
+    /// Points of the tissue at the blade, and the nearest points of the edge.
     pub fn ends(&self) -> &[(CutEnd, Vec3)] {
         &self.ends
     }
 
-    /// Adds the bits that where a cut goes on depends on.
+    /// Hashes the state that the next cut depends on.
     pub fn hash(&self, hasher: &mut StateHasher) {
         for point in self
             .edge
@@ -51,16 +51,16 @@ impl Stroke {
         {
             hasher.write_floats(&point.to_array());
         }
-        self.of_solid.hash(hasher);
+        self.solid_stroke.hash(hasher);
         for (end, _) in &self.ends {
             end.nodes.iter().for_each(|&node| hasher.write_u64(u64::from(node)));
             hasher.write_doubles(&end.weights);
         }
     }
 
-    /// Where the edge that a sweep begins with is in the tissue now, if the sweep begins just where the last ended: as far back that nothing lies
-    /// between it and what was cut, wherever the tissue went.
-    pub fn carried(&self, sweep: &Sweep, material: &CutMaterial, positions: &[Vec3]) -> Option<[Vec3; 2]> {
+    /// The current position in the tissue of the edge at which a sweep begins, if the last sweep ended there. It is
+    /// moved back far enough that no uncut tissue lies between it and the cut, whatever the motion of the tissue.
+    pub fn carried_edge(&self, sweep: &Sweep, material: &CutMaterial, positions: &[Vec3]) -> Option<[Vec3; 2]> {
         if self.edge != Some(sweep.start) || self.ends.is_empty() {
             return None;
         }
@@ -68,48 +68,60 @@ impl Stroke {
         let length = from.distance(to);
         let along = (to - from).normalize_or_zero();
         let ends = || {
-            self.ends
-                .iter()
-                .map(|(end, before)| ((before - from).dot(along), material.place_of(end, positions) - before))
+            self.ends.iter().map(|(end, before)| {
+                (
+                    (before - from).dot(along),
+                    material.position_of_end(end, positions) - before,
+                )
+            })
         };
         let count = self.ends.len() as f32;
-        let (place, gone) = ends().fold((0.0, Vec3::ZERO), |(place, gone), end| (place + end.0, gone + end.1));
-        let (place, gone) = (place / count, gone / count);
-        // The tissue along the edge goes straight on and turns with it; where little of it tells, it does not turn.
-        let (mut spread, mut turn) = (count * (LITTLE * length).powi(2), Vec3::ZERO);
-        for (at, of) in ends() {
-            spread += (at - place).powi(2);
-            turn += (of - gone) * (at - place);
+        let (mean_coordinate, shift) = ends().fold((0.0, Vec3::ZERO), |(mean_coordinate, shift), end| {
+            (mean_coordinate + end.0, shift + end.1)
+        });
+        let (mean_coordinate, shift) = (mean_coordinate / count, shift / count);
+        // The edge is translated and rotated with the tissue. A short part of it does not determine a rotation.
+        let (mut spread, mut slope) = (count * (MIN_SPREAD * length).powi(2), Vec3::ZERO);
+        for (coordinate, displacement) in ends() {
+            spread += (coordinate - mean_coordinate).powi(2);
+            slope += (displacement - shift) * (coordinate - mean_coordinate);
         }
-        let turn = if spread > 0.0 { turn / spread } else { Vec3::ZERO };
-        let way = (sweep.end[0] + sweep.end[1] - from - to).normalize_or_zero();
-        let off = |(at, of): (f32, Vec3)| (gone + turn * (at - place) - of).dot(way);
+        let slope = if spread > 0.0 { slope / spread } else { Vec3::ZERO };
+        let sweep_direction = (sweep.end[0] + sweep.end[1] - from - to).normalize_or_zero();
+        let lag = |(coordinate, displacement): (f32, Vec3)| {
+            (shift + slope * (coordinate - mean_coordinate) - displacement).dot(sweep_direction)
+        };
         let slacks = self.ends.iter().map(|(end, _)| end.slack as f32);
         let furthest = ends()
             .zip(slacks)
-            .map(|(end, slack)| off(end) + slack)
+            .map(|(end, slack)| lag(end) + slack)
             .fold(0.0, f32::max);
-        Some([0.0, length].map(|at| from + along * at + gone + turn * (at - place) - way * furthest))
+        Some([0.0, length].map(|coordinate| {
+            from + along * coordinate + shift + slope * (coordinate - mean_coordinate) - sweep_direction * furthest
+        }))
     }
 
-    /// Whether the tissue where it stands has gone on by as much as is to be cut at once.
-    pub fn has_tissue_gone(&self, material: &CutMaterial, positions: &[Vec3]) -> bool {
-        let gone = |(end, before): &(CutEnd, Vec3)| {
-            // An edge that tissue goes along cuts nothing.
+    /// True if the tissue at the blade has moved far enough to be cut.
+    pub fn has_tissue_moved(&self, material: &CutMaterial, positions: &[Vec3]) -> bool {
+        let has_moved = |(end, before): &(CutEnd, Vec3)| {
+            // Tissue that moves along the edge is not cut.
             let [from, to] = self.edge.unwrap_or([*before; 2]);
-            let way = material.place_of(end, positions) - before;
-            way.reject_from_normalized((to - from).normalize_or(Vec3::X)).length() > AT_ONCE * end.size as f32
+            let displacement = material.position_of_end(end, positions) - before;
+            displacement
+                .reject_from_normalized((to - from).normalize_or(Vec3::X))
+                .length()
+                > MIN_CUT * end.size as f32
         };
-        self.ends.iter().any(gone)
+        self.ends.iter().any(has_moved)
     }
 
-    /// Makes room for so many ends.
+    /// Reserves space for this many ends.
     pub fn reserve(&mut self, count: usize) -> Result<()> {
         memory::reserve(&mut self.ends, count)
     }
 
-    /// The blade has come to its end; answers whether it moved: one that stood still is where it was.
-    pub fn stop(&mut self, sweep: &Sweep) -> bool {
+    /// Ends a sweep. Returns true if the blade has moved: otherwise its position in the tissue stays.
+    pub fn end_sweep(&mut self, sweep: &Sweep) -> bool {
         let has_moved = sweep.start != sweep.end || self.edge != Some(sweep.end);
         if has_moved {
             self.edge = Some(sweep.end);
@@ -118,7 +130,7 @@ impl Stroke {
         has_moved
     }
 
-    /// Has the points of a solid be in their order along the edge.
+    /// Sorts the points of a solid along the edge.
     pub fn sort_ends(&mut self) {
         let Some([from, to]) = self.edge else {
             return;
@@ -130,13 +142,13 @@ impl Stroke {
         }
     }
 
-    /// It stands in the tissue at this point.
-    pub fn stands_at(&mut self, end: CutEnd, material: &CutMaterial, positions: &[Vec3]) {
+    /// Adds a point of the tissue at the blade.
+    pub fn add_end(&mut self, end: CutEnd, material: &CutMaterial, positions: &[Vec3]) {
         let Some([from, to]) = self.edge else {
             return;
         };
-        let place = material.place_of(&end, positions);
-        let along = (place - from).dot(to - from) / from.distance_squared(to);
+        let position = material.position_of_end(&end, positions);
+        let along = (position - from).dot(to - from) / from.distance_squared(to);
         let nearest = if along.is_finite() {
             from.lerp(to, along.clamp(0.0, 1.0))
         } else {

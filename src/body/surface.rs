@@ -1,4 +1,4 @@
-//! The surface where a body is drawn and touched, as it is made and as it changes.
+//! The render surface of a body, at creation and after cuts.
 
 use super::Body;
 use crate::base::{Result, memory};
@@ -6,7 +6,8 @@ use crate::contact::SurfaceChange;
 use crate::def::BodyDefinition;
 use crate::mesh::{cell_boundary, outer_faces, turn_outward};
 
-/// The surface that a definition gives, or the outer faces of its elements; outward however its tetrahedra are turned.
+/// The surface of a definition, or the outer faces of its elements. It faces outward, whatever the orientation of
+/// tetrahedra.
 pub(super) fn surface_of(definition: &BodyDefinition) -> Result<Vec<[u32; 3]>> {
     let (triangles, tetrahedra) = (definition.triangles, definition.tetrahedra);
     if triangles.is_empty() && tetrahedra.is_empty() {
@@ -23,11 +24,11 @@ pub(super) fn surface_of(definition: &BodyDefinition) -> Result<Vec<[u32; 3]>> {
 }
 
 impl Body {
-    /// Makes room for a change of its surface with which so many nodes come, and so many triangles change and are added.
+    /// Reserves space for a change of the surface: new nodes, and changed and added triangles.
     pub(crate) fn reserve_surface(&mut self, nodes: usize, changed: usize, added: usize) -> Result<()> {
         self.system.surface.try_reserve(added)?;
-        if let Some(shown) = self.shown.as_mut().filter(|_| changed + added > 0) {
-            shown.reserve_triangles(self.system.surface.capacity())?;
+        if let Some(frames) = self.frames.as_mut().filter(|_| changed + added > 0) {
+            frames.reserve_triangles(self.system.surface.capacity())?;
         }
         let node_count = self.node_count() + nodes;
         self.system.bindings.get_or_insert_default().reserve(0, node_count)?;
@@ -37,16 +38,16 @@ impl Body {
         self.system.reserve_holds()
     }
 
-    /// Changes its surface, for which there is room; all that is named is there, and nodes that have come since the surface last changed
-    /// are touched unless they are hidden.
+    /// Changes the surface, for which space is reserved. All nodes of the change exist. Nodes added since the last
+    /// change become touchable unless they are hidden.
     pub(crate) fn change_surface(&mut self, change: &SurfaceChange) {
         for &(index, corners) in change.changed {
             self.system.surface[index as usize] = corners;
         }
         self.system.surface.extend_from_slice(change.added);
-        self.query_tree.outdate();
-        if let Some(shown) = &mut self.shown {
-            shown.forget_triangles();
+        self.query_tree.mark_outdated();
+        if let Some(frames) = &mut self.frames {
+            frames.forget_triangles();
         }
         let bindings = self.system.bindings.get_or_insert_default();
         let order = &self.system.order;
@@ -56,13 +57,13 @@ impl Body {
         let corners = changed.chain(change.added).flatten();
         for &corner in corners.clone() {
             bindings.show(own(corner));
-            if let Some(word) = self.corners.get_mut(corner as usize / 64) {
+            if let Some(word) = self.surface_corners.get_mut(corner as usize / 64) {
                 *word |= 1 << (corner % 64);
             }
         }
         if let Some(contacts) = &mut self.system.contacts {
-            let places = (self.system.state.positions(), &*bindings);
-            contacts.change_surface(change, corners.map(|&corner| own(corner)), own, places);
+            let positions_and_bindings = (self.system.state.positions(), &*bindings);
+            contacts.change_surface(change, corners.map(|&corner| own(corner)), own, positions_and_bindings);
         }
     }
 }

@@ -1,9 +1,11 @@
-//! Pressure inside closed surfaces: a cavity of volume V, V0 at rest, has the energy `kappa/2 V0 (V/V0 - 1)² - p (V - V0)`.
+//! Pressure in closed surfaces. A cavity of volume V, V0 at rest, has the energy `kappa/2 V0 (V/V0 - 1)² - p (V -
+//! V0)`.
 //!
-//! A cavity's volume depends on all of its nodes, so forces take two passes. The first goes over blocks of triangles of one cavity: it leaves
-//! the vector of each triangle, twice its area along its normal, and the sums of blocks, which are added up in their order. The second
-//! is that of the tiles of nodes: each adds up the vectors about its own nodes, times the pressure. So there are no buffers that two threads
-//! write to, and results are the same for any number of threads.
+//! The volume of a cavity depends on all its nodes, so forces take two passes. The first pass processes blocks of
+//! triangles of one cavity. It stores each triangle's vector, which is twice its area along its normal, and sums the
+//! blocks in order. The second pass processes tiles of nodes: each node sums the vectors of its triangles and
+//! multiplies by the pressure. No two threads write to the same buffer, and results do not depend on the number of
+//! threads.
 
 mod exact;
 mod rates;
@@ -14,21 +16,21 @@ use glam::{DVec3, Vec3};
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::def::BodyDefinition;
-use crate::soa::{NodeOrder, Rates, TileForces, Vectors};
+use crate::soa::{FrequencyBound, NodeOrder, TileForces, Vectors};
 use crate::threads::{Items, Ragged, Team};
-pub(crate) use exact::{At, Gradients};
+pub(crate) use exact::{PositionVectors, VolumeGradients};
 use surface::{CavitySurface, SurfaceBlock};
 
-/// What is inside of one closed surface.
+/// The inside of one closed surface.
 #[derive(Clone, Copy, Debug)]
 struct Cavity {
     /// m³, above 0.
     rest_volume: f64,
-    /// Where its triangles begin, and the end of the last.
+    /// The index of its first triangle, and the index after its last.
     triangles: [u32; 2],
-    /// Whether it was cut open.
+    /// True if it has been cut open.
     is_open: bool,
-    /// Pa, where forces were last worked out.
+    /// The pressure at the last computed forces, Pa.
     pressure: f64,
 }
 
@@ -36,61 +38,63 @@ saved! { Cavity { rest_volume, triangles, is_open, pressure } }
 
 /// The cavities of a body.
 #[derive(Debug)]
-pub(crate) struct Enclosed {
+pub(crate) struct Cavities {
     /// kappa and p, Pa.
     stiffness: f32,
     pressure: f32,
     cavities: Vec<Cavity>,
     surface: CavitySurface,
-    /// The vectors of triangles where forces were last worked out, m².
+    /// The vectors of the triangles at the last computed forces, m².
     vectors: Vec<Vec3>,
     sums: Vec<BlockSums>,
-    /// Pressures, over 6: what a triangle's vector gives to each of its nodes.
+    /// A sixth of each cavity's pressure: a triangle's vector times this is its force on each of its nodes.
     factors: Vec<f64>,
-    /// For each triangle, what its vector and its longest edge count for in the bound on frequencies.
+    /// The weights of each triangle in the rate bound.
     weights: Vec<rates::Weights>,
-    /// That of springs beside, and all of it where forces were last worked out, and at the current state.
-    of_springs: Rates,
-    highest: f32,
-    settled: f32,
+    /// The bound of the springs at cavity nodes, and the cavities' bounds at the last computed forces and at the
+    /// current state.
+    spring_rates: FrequencyBound,
+    rate_bound: f32,
+    committed_rate_bound: f32,
     rates_known: bool,
 }
 
-saved! { Enclosed {
-    stiffness, pressure, cavities, surface, vectors, sums, factors, weights, of_springs, highest, settled, rates_known,
+saved! { Cavities {
+    stiffness, pressure, cavities, surface, vectors, sums, factors, weights, spring_rates, rate_bound,
+    committed_rate_bound, rates_known,
 } }
 
-/// What there is to know of the triangles of a block.
+/// The sums over the triangles of a block.
 #[derive(Clone, Copy, Debug, Default)]
 struct BlockSums {
-    /// Six times their volume, m³.
+    /// Six times the volume, m³.
     volume: f64,
     bounds: rates::CavityBounds,
 }
 
 saved! { BlockSums { volume, bounds } }
 
-/// How pressures change where nodes go some ways.
+/// The change of pressures for given displacements.
 #[derive(Debug)]
-pub(crate) struct PressureChanges {
+pub(crate) struct PressureDifferentials {
     sums: Vec<f64>,
     factors: Vec<f64>,
 }
 
-saved! { PressureChanges { sums, factors } }
+saved! { PressureDifferentials { sums, factors } }
 
-/// What the nodes of a tile are given.
+/// The pressure forces on the nodes of a tile.
 #[derive(Clone, Copy)]
-pub(crate) struct PressureShares<'a> {
+pub(crate) struct PressureForces<'a> {
     surface: &'a CavitySurface,
     vectors: &'a [Vec3],
     factors: &'a [f64],
 }
 
-impl PressureShares<'_> {
-    /// Adds what pressures give to the nodes of a tile.
+impl PressureForces<'_> {
+    /// Adds the pressure forces on the nodes of a tile to `forces`.
     pub fn add(&self, tile: usize, forces: &mut TileForces) {
-        self.surface.visit_tile(tile, &mut |place, cavity, triangles| {
+        self.surface.visit_tile(tile, &mut |tile_slot, cavity, triangles| {
             let factor = self.factors[cavity];
             if factor == 0.0 {
                 return;
@@ -99,18 +103,19 @@ impl PressureShares<'_> {
                 .iter()
                 .map(|&triangle| self.vectors[triangle as usize].as_dvec3())
                 .sum();
-            forces.set(place, forces.get(place) + (sum * factor).as_vec3());
+            forces.set(tile_slot, forces.get(tile_slot) + (sum * factor).as_vec3());
         });
     }
 }
 
-impl Enclosed {
-    /// What a definition asks for of a body with these triangles, in the caller's numbers. `None`: it asks for nothing.
+impl Cavities {
+    /// Creates the cavities of a definition, for triangles in the caller's indices. `None` if it has no pressure and
+    /// no volume stiffness.
     pub fn new(definition: &BodyDefinition, triangles: &[[u32; 3]], order: &NodeOrder) -> Result<Option<Box<Self>>> {
         if definition.enclosed_stiffness == 0.0 && definition.pressure == 0.0 {
             return Ok(None);
         }
-        let (surface, cavities) = surface::close(definition, triangles, order)?;
+        let (surface, cavities) = surface::build(definition, triangles, order)?;
         let triangle_count = surface.triangles.len();
         Ok(Some(memory::boxed(Self {
             stiffness: definition.enclosed_stiffness,
@@ -121,32 +126,32 @@ impl Enclosed {
             weights: memory::filled(rates::Weights::default(), triangle_count)?,
             cavities,
             surface,
-            of_springs: Rates::ZERO,
-            highest: f32::INFINITY,
-            settled: f32::INFINITY,
+            spring_rates: FrequencyBound::ZERO,
+            rate_bound: f32::INFINITY,
+            committed_rate_bound: f32::INFINITY,
             rates_known: false,
         })?))
     }
 
-    /// Room for what pressures change by.
-    pub fn room_for_changes(&self) -> Result<PressureChanges> {
-        Ok(PressureChanges {
+    /// Allocates the buffers for changes of pressures.
+    pub fn new_differentials(&self) -> Result<PressureDifferentials> {
+        Ok(PressureDifferentials {
             sums: memory::filled(0.0, self.sums.len())?,
             factors: memory::filled(0.0, self.cavities.len())?,
         })
     }
 
-    /// The pressure of cavities that have their volume at rest, Pa.
+    /// The pressure of cavities at rest volume, Pa.
     pub fn pressure(&self) -> f32 {
         self.pressure
     }
 
-    /// Makes the pressure of cavities that have their volume at rest this, Pa.
+    /// Sets the pressure of cavities at rest volume, Pa.
     pub fn set_pressure(&mut self, pressure: f32) {
         self.pressure = pressure;
     }
 
-    /// Works out the forces with nodes at `positions`.
+    /// Computes forces and the rate bound with nodes at `positions`.
     pub fn find_forces(&mut self, positions: &Vectors, team: &Team) {
         let positions = positions.view();
         let (surface, cavities, weights) = (&self.surface, &self.cavities, &self.weights);
@@ -161,37 +166,37 @@ impl Enclosed {
                 return;
             }
             let at = |node: u32| positions.get(node as usize).as_dvec3();
-            // Volumes are those of the tetrahedra with one of the surface's own nodes, so that nothing is lost far away.
+            // Volumes are sums over tetrahedra with a node of the surface as apex: a distant surface loses no digits.
             let apex = at(surface.triangles[cavity.triangles[0] as usize][0]);
             *sums = BlockSums::default();
             let triangles = surface.triangles[start..end].iter().zip(&weights[start..end]);
             for (vector, (corners, weights)) in vectors.iter_mut().zip(triangles) {
                 let [a, b, c] = corners.map(at);
                 let [ab, ac] = [b - a, c - a];
-                let exact = ab.cross(ac);
-                *vector = exact.as_vec3();
-                sums.volume += (a - apex).dot(exact);
-                sums.bounds.add(weights, exact, [ab, ac]);
+                let vector_f64 = ab.cross(ac);
+                *vector = vector_f64.as_vec3();
+                sums.volume += (a - apex).dot(vector_f64);
+                sums.bounds.add(weights, vector_f64, [ab, ac]);
             }
         });
-        self.press();
+        self.update_pressures();
     }
 
-    /// Makes pressures of the sums of blocks.
-    fn press(&mut self) {
+    /// Computes pressures and the rate bound from the sums of blocks.
+    fn update_pressures(&mut self) {
         let mut bounds = rates::RateBound::new(self.surface.nodes_are_shared);
         let mut blocks = self.surface.blocks.iter().zip(&self.sums).peekable();
         for (index, cavity) in self.cavities.iter_mut().enumerate() {
             let mut sums = BlockSums::default();
-            while let Some((_, of_block)) = blocks.next_if(|(block, _)| block.cavity == index) {
-                sums.volume += of_block.volume;
-                sums.bounds.and(&of_block.bounds);
+            while let Some((_, block_sums)) = blocks.next_if(|(block, _)| block.cavity == index) {
+                sums.volume += block_sums.volume;
+                sums.bounds.merge(&block_sums.bounds);
             }
             if cavity.is_open {
                 (cavity.pressure, self.factors[index]) = (0.0, 0.0);
                 continue;
             }
-            cavity.pressure = pressure_of(self.stiffness, self.pressure, cavity, sums.volume / 6.0);
+            cavity.pressure = cavity_pressure(self.stiffness, self.pressure, cavity, sums.volume / 6.0);
             self.factors[index] = cavity.pressure / 6.0;
             bounds.add(
                 f64::from(self.stiffness) / cavity.rest_volume,
@@ -199,70 +204,74 @@ impl Enclosed {
                 &sums.bounds,
             );
         }
-        self.highest = bounds.total() as f32;
+        self.rate_bound = bounds.total() as f32;
     }
 
-    /// Works out how forces change, to first order, where nodes go these ways from where forces were last worked out. What pressure
-    /// itself does as a surface turns is left out: it pushes one way as much as another.
-    pub fn find_changes(&self, ways: &Vectors, changes: &mut PressureChanges, team: &Team) {
+    /// Computes the force differentials for these displacements from the last computed forces. The rotation of a
+    /// surface under pressure is left out, because its part of the tangent is indefinite.
+    pub fn find_differentials(&self, displacements: &Vectors, differentials: &mut PressureDifferentials, team: &Team) {
         if self.stiffness == 0.0 {
             return;
         }
-        let ways = ways.view();
+        let displacements = displacements.view();
         let (surface, cavities) = (&self.surface, &self.cavities);
-        team.pass(surface.blocks.len(), Items::new(&mut changes.sums), |block, sum| {
-            let SurfaceBlock { cavity, start, end } = surface.blocks[block];
-            *sum = 0.0;
-            if cavities[cavity].is_open {
-                return;
-            }
-            for (corners, vector) in surface.triangles[start..end].iter().zip(&self.vectors[start..end]) {
-                let [a, b, c] = corners.map(|node| ways.get(node as usize).as_dvec3());
-                *sum += vector.as_dvec3().dot(a + b + c);
-            }
-        });
-        let mut blocks = surface.blocks.iter().zip(&changes.sums).peekable();
-        for (index, (cavity, factor)) in cavities.iter().zip(&mut changes.factors).enumerate() {
-            let mut growth = 0.0;
+        team.pass(
+            surface.blocks.len(),
+            Items::new(&mut differentials.sums),
+            |block, sum| {
+                let SurfaceBlock { cavity, start, end } = surface.blocks[block];
+                *sum = 0.0;
+                if cavities[cavity].is_open {
+                    return;
+                }
+                for (corners, vector) in surface.triangles[start..end].iter().zip(&self.vectors[start..end]) {
+                    let [a, b, c] = corners.map(|node| displacements.get(node as usize).as_dvec3());
+                    *sum += vector.as_dvec3().dot(a + b + c);
+                }
+            },
+        );
+        let mut blocks = surface.blocks.iter().zip(&differentials.sums).peekable();
+        for (index, (cavity, factor)) in cavities.iter().zip(&mut differentials.factors).enumerate() {
+            let mut volume_change = 0.0;
             while let Some((_, sum)) = blocks.next_if(|(block, _)| block.cavity == index) {
-                growth += sum / 6.0;
+                volume_change += sum / 6.0;
             }
-            *factor = -f64::from(self.stiffness) * (growth / cavity.rest_volume) / 6.0;
+            *factor = -f64::from(self.stiffness) * (volume_change / cavity.rest_volume) / 6.0;
         }
     }
 
-    /// Where forces were worked out last is the current state.
-    pub fn settle(&mut self) {
-        self.settled = self.highest;
+    /// Makes the rate bound of the last computed forces that of the current state.
+    pub fn commit_rate_bound(&mut self) {
+        self.committed_rate_bound = self.rate_bound;
     }
 
-    /// What these changes give to nodes; `None`: the forces that were worked out last.
-    pub fn shares<'a>(&'a self, changes: Option<&'a PressureChanges>) -> PressureShares<'a> {
-        PressureShares {
+    /// The pressure forces for `differentials`, or the last computed ones for `None`.
+    pub fn node_forces<'a>(&'a self, differentials: Option<&'a PressureDifferentials>) -> PressureForces<'a> {
+        PressureForces {
             surface: &self.surface,
             vectors: &self.vectors,
-            factors: changes.map_or(&self.factors, |changes| &changes.factors),
+            factors: differentials.map_or(&self.factors, |differentials| &differentials.factors),
         }
     }
 
-    /// Opens the cavities whose surface has an edge between two nodes: how many.
+    /// Opens the cavities whose surface has the edge between two nodes. Returns their number.
     pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
         self.open_where(a, |corners| corners.contains(&b))
     }
 
-    /// Opens the cavities with a triangle of these nodes: whether any was closed.
+    /// Opens the cavities with a triangle of these nodes. Returns true if any was closed.
     pub fn open_at(&mut self, [a, b, c]: [u32; 3]) -> bool {
         self.open_where(a, |corners| corners.contains(&b) && corners.contains(&c)) > 0
     }
 
-    /// Opens the cavities that have such a triangle about a node: how many.
-    fn open_where(&mut self, node: u32, is_it: impl Fn(&[u32; 3]) -> bool) -> usize {
+    /// Opens the cavities with a triangle at `node` that satisfies `matches`. Returns their number.
+    fn open_where(&mut self, node: u32, matches: impl Fn(&[u32; 3]) -> bool) -> usize {
         let (surface, cavities) = (&self.surface, &mut self.cavities);
         let mut opened = 0;
         surface.visit_node(node as usize, &mut |cavity, triangles| {
             let cavity = &mut cavities[cavity];
             let mut corners = triangles.iter().map(|&triangle| &surface.triangles[triangle as usize]);
-            if !cavity.is_open && corners.any(&is_it) {
+            if !cavity.is_open && corners.any(&matches) {
                 cavity.is_open = true;
                 opened += 1;
             }
@@ -270,7 +279,7 @@ impl Enclosed {
         opened
     }
 
-    /// What may change of it.
+    /// Hashes the state that can change.
     pub fn hash(&self, hasher: &mut StateHasher) {
         hasher.write_floats(&[self.stiffness, self.pressure]);
         for cavity in &self.cavities {
@@ -280,6 +289,6 @@ impl Enclosed {
 }
 
 /// The pressure of a cavity of this volume, Pa.
-fn pressure_of(stiffness: f32, pressure: f32, cavity: &Cavity, volume: f64) -> f64 {
+fn cavity_pressure(stiffness: f32, pressure: f32, cavity: &Cavity, volume: f64) -> f64 {
     f64::from(pressure) - f64::from(stiffness) * ((volume - cavity.rest_volume) / cavity.rest_volume)
 }

@@ -1,57 +1,58 @@
-//! What bounds the frequencies of nodes under pressure.
+//! A bound on the angular frequencies of nodes under pressure.
 //!
-//! With g the gradient of a volume V, the second derivatives are `kappa/V0 g g^T - P H`. The highest squared frequency of the first is
-//! `kappa/V0 sum |g_i|²/m_i`; g_i is a sixth of the sum of the vectors n of its v_i triangles, so that it is at most
-//! `kappa/V0 sum_t |n|² sum_corners v_i / (36 m_i)`, and just that where the triangles about a node are alike. In H, a node's row has for
-//! each neighbour a sixth of the vector between the two nodes beside that edge: by Gershgorin's theorem its part is at most
-//! `|P| v_i l / (3 m_i)`, l the longest edge there.
+//! With g the gradient of a volume V, the second derivatives of the energy are `kappa/V0 g g^T - P H`. The highest
+//! squared frequency of the first term is `kappa/V0 sum |g_i|²/m_i`. Here g_i is a sixth of the sum of the vectors n
+//! of the node's v_i triangles. The term is therefore at most `kappa/V0 sum_t |n|² sum_corners v_i / (36 m_i)`, with
+//! equality if the triangles around a node are equal. A node's row of H has, for each neighbor, a sixth of the vector
+//! between the two nodes opposite that edge. By Gershgorin's theorem its part is at most `|P| v_i l / (3 m_i)`, with l
+//! the longest edge there.
 
 use glam::DVec3;
 
-use super::Enclosed;
+use super::Cavities;
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::def::{Carried, Viscosity};
-use crate::soa::{Masses, Rates, Vectors};
-use crate::springs::{Springs, rates_anywhere};
+use crate::def::{NodalStiffness, Viscosity};
+use crate::soa::{FrequencyBound, NodalMasses, Vectors};
+use crate::springs::{Springs, spring_rates};
 
-/// What a triangle counts for: the factors of the square of its vector, and of its longest edge, 1/kg.
+/// The weights of a triangle in the rate bound: of its vector's square and of its longest edge, 1/kg.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Weights {
-    of_square: f32,
-    of_length: f32,
+    vector_weight: f32,
+    edge_weight: f32,
 }
 
-saved! { Weights { of_square, of_length } }
+saved! { Weights { vector_weight, edge_weight } }
 
-/// What the triangles of a block, or of a cavity, add up to.
+/// Sums over the triangles of a block or a cavity.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CavityBounds {
     /// The sum of `|g|²/m`, m⁴/kg.
-    of_squares: f64,
-    /// The largest square of `v l / 3 m`.
-    of_lengths: f64,
+    gradient_sum: f64,
+    /// The largest square of `v l / 3 m`, m²/kg².
+    edge_square: f64,
 }
 
-saved! { CavityBounds { of_squares, of_lengths } }
+saved! { CavityBounds { gradient_sum, edge_square } }
 
 impl CavityBounds {
-    /// Adds a triangle with this vector, and these edges and the one between their ends.
+    /// Adds a triangle with this vector and these two edges from its first corner.
     #[inline(always)]
     pub fn add(&mut self, weights: &Weights, vector: DVec3, [ab, ac]: [DVec3; 2]) {
-        self.of_squares += f64::from(weights.of_square) * vector.length_squared();
+        self.gradient_sum += f64::from(weights.vector_weight) * vector.length_squared();
         let square = ab.length_squared().max(ac.length_squared());
         let square = square.max((ac - ab).length_squared());
-        self.of_lengths = self.of_lengths.max(square * f64::from(weights.of_length).powi(2));
+        self.edge_square = self.edge_square.max(square * f64::from(weights.edge_weight).powi(2));
     }
 
-    pub fn and(&mut self, other: &Self) {
-        self.of_squares += other.of_squares;
-        self.of_lengths = self.of_lengths.max(other.of_lengths);
+    pub fn merge(&mut self, other: &Self) {
+        self.gradient_sum += other.gradient_sum;
+        self.edge_square = self.edge_square.max(other.edge_square);
     }
 }
 
-/// The bound of all cavities: the largest, as no node moves with two of them, or where nodes are shared the sum.
+/// The rate bound of all cavities: their maximum, or their sum if any node belongs to two cavities.
 pub(super) struct RateBound {
     nodes_are_shared: bool,
     total: f64,
@@ -65,13 +66,13 @@ impl RateBound {
         }
     }
 
-    /// Adds a cavity of this stiffness over its volume at rest, Pa/m³, and this pressure, Pa.
+    /// Adds a cavity with this stiffness over rest volume, Pa/m³, and pressure, Pa.
     pub fn add(&mut self, stiffness: f64, pressure: f64, bounds: &CavityBounds) {
-        let stiffest = stiffness * bounds.of_squares + pressure.abs() * bounds.of_lengths.sqrt();
+        let rate = stiffness * bounds.gradient_sum + pressure.abs() * bounds.edge_square.sqrt();
         self.total = if self.nodes_are_shared {
-            self.total + stiffest
+            self.total + rate
         } else {
-            self.total.max(stiffest)
+            self.total.max(rate)
         };
     }
 
@@ -80,9 +81,10 @@ impl RateBound {
     }
 }
 
-impl Enclosed {
-    /// Makes the bound that of these masses, with these springs if they are not part of another bound: whether it was before.
-    pub fn find_rates(&mut self, springs: Option<&dyn Springs>, masses: &Masses) -> bool {
+impl Cavities {
+    /// Computes the weights for these masses, and the bound of `springs` if no other bound includes it. Returns true
+    /// if they were up to date.
+    pub fn find_rates(&mut self, springs: Option<&dyn Springs>, masses: &NodalMasses) -> bool {
         if self.rates_known {
             return true;
         }
@@ -91,43 +93,44 @@ impl Enclosed {
             *weights = Weights::default();
         }
         surface.visit(&mut |node, _, triangles| {
-            let mobility = triangles.len() as f32 * masses.inverse(node);
+            let triangle_mobility = triangles.len() as f32 * masses.inverse(node);
             for &triangle in triangles {
                 let weights = &mut self.weights[triangle as usize];
-                weights.of_square += mobility / 36.0;
-                weights.of_length = weights.of_length.max(mobility / 3.0);
+                weights.vector_weight += triangle_mobility / 36.0;
+                weights.edge_weight = weights.edge_weight.max(triangle_mobility / 3.0);
             }
         });
-        self.of_springs = Rates::ZERO;
+        self.spring_rates = FrequencyBound::ZERO;
         if let Some(springs) = springs {
             for node in 0..masses.masses.len() {
-                let rates = rates_anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
-                self.of_springs.stiffest = self.of_springs.stiffest.max(rates.stiffest);
-                self.of_springs.most_damped = self.of_springs.most_damped.max(rates.most_damped);
+                let spring_rates = spring_rates(node, springs, masses).unwrap_or(FrequencyBound::ZERO);
+                self.spring_rates.omega_sq = self.spring_rates.omega_sq.max(spring_rates.omega_sq);
+                self.spring_rates.damping_rate = self.spring_rates.damping_rate.max(spring_rates.damping_rate);
             }
         }
         self.rates_known = true;
         false
     }
 
-    /// Adds what the nodes that are free carry of cavities, as they are with nodes at `positions`, by the parts that they have in volumes.
-    pub fn add_to(&self, positions: &Vectors, masses: &Masses, all: &mut [Carried]) -> Result<()> {
+    /// Adds the volume stiffness at each free node, with nodes at `positions`, distributed by the nodes' shares of the
+    /// gradient.
+    pub fn add_to(&self, positions: &Vectors, masses: &NodalMasses, carried: &mut [NodalStiffness]) -> Result<()> {
         let mut sums = memory::filled(0.0, self.cavities.len())?;
-        let size = |triangles: &[u32]| {
+        let gradient_length = |triangles: &[u32]| {
             let at = |node: usize| positions.get(node).as_dvec3();
             self.surface.gradient(triangles, &at).length()
         };
         let is_free = |node: usize| masses.inverse(node) > 0.0;
         self.surface.visit(&mut |node, cavity, triangles| {
             if is_free(node) {
-                sums[cavity] += size(triangles);
+                sums[cavity] += gradient_length(triangles);
             }
         });
         self.surface.visit(&mut |node, cavity, triangles| {
             if is_free(node) {
                 let stiffness = f64::from(self.stiffness) / self.cavities[cavity].rest_volume;
-                all[node].add(
-                    (stiffness * size(triangles) * sums[cavity]) as f32,
+                carried[node].add(
+                    (stiffness * gradient_length(triangles) * sums[cavity]) as f32,
                     Viscosity::default(),
                 );
             }
@@ -135,16 +138,21 @@ impl Enclosed {
         Ok(())
     }
 
-    /// Masses, pins or springs have changed.
+    /// Invalidates the bounds, after a change of masses, pins or springs.
     pub fn forget_rates(&mut self) {
         self.rates_known = false;
     }
 
-    /// What bounds frequencies with the nodes at the current state, where `is_settled`, or where forces were last worked out.
-    pub fn rates(&self, is_settled: bool) -> Rates {
-        Rates {
-            stiffest: self.of_springs.stiffest + if is_settled { self.settled } else { self.highest },
-            ..self.of_springs
+    /// The rate bounds at the current state, if `is_settled`, or at the last computed forces.
+    pub fn rates(&self, is_settled: bool) -> FrequencyBound {
+        FrequencyBound {
+            omega_sq: self.spring_rates.omega_sq
+                + if is_settled {
+                    self.committed_rate_bound
+                } else {
+                    self.rate_bound
+                },
+            ..self.spring_rates
         }
     }
 }

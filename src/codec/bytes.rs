@@ -1,19 +1,19 @@
-//! Bytes that values are written to, and read from as if somebody had made them up.
+//! Writing values to bytes, and reading them from bytes that can be forged.
 
 use crate::base::{Error, Result};
 use crate::simd::ChosenKernel;
 
-/// What a world may take beside its bytes: rooms that are kept for what may come.
+/// The memory that a world can reserve beyond a multiple of its snapshot, bytes.
 const ROOM: usize = 1 << 30;
 
-/// A world may take so many times its bytes in memory.
+/// The largest ratio of memory to bytes of the snapshot.
 const GROWTH: usize = 64;
 
-/// What is written; without a place for it, only counted.
+/// Writes to a buffer, or only counts bytes.
 pub(crate) struct Writer<'a> {
     to: Option<&'a mut [u8]>,
     size: usize,
-    /// What a reader will reserve for the section.
+    /// The memory that a reader will reserve for the section.
     memory: usize,
     is_too_large: bool,
 }
@@ -28,63 +28,63 @@ impl<'a> Writer<'a> {
         }
     }
 
-    pub fn put(&mut self, bytes: &[u8]) {
-        if let Some(place) = self.place(bytes.len()) {
-            place.copy_from_slice(bytes);
+    pub fn write(&mut self, bytes: &[u8]) {
+        if let Some(buffer) = self.buffer(bytes.len()) {
+            buffer.copy_from_slice(bytes);
         }
     }
 
-    /// Where the next so many bytes go, if anywhere.
-    pub fn place(&mut self, count: usize) -> Option<&mut [u8]> {
+    /// The buffer for the next `count` bytes; `None` if bytes are only counted.
+    pub fn buffer(&mut self, count: usize) -> Option<&mut [u8]> {
         let start = self.size;
         self.size += count;
         self.to.as_deref_mut()?.get_mut(start..start + count)
     }
 
-    /// How many bytes were written.
+    /// The number of bytes written.
     pub fn size(&self) -> usize {
         self.size
     }
 
-    /// Writes over what was put.
-    pub fn put_at(&mut self, start: usize, bytes: &[u8]) {
-        let place = self
+    /// Overwrites earlier bytes.
+    pub fn overwrite(&mut self, start: usize, bytes: &[u8]) {
+        let buffer = self
             .to
             .as_deref_mut()
             .and_then(|to| to.get_mut(start..start + bytes.len()));
-        if let Some(place) = place {
-            place.copy_from_slice(bytes);
+        if let Some(buffer) = buffer {
+            buffer.copy_from_slice(bytes);
         }
     }
 
-    /// A reader will reserve so many bytes of memory here.
+    /// Notes that a reader will reserve `memory` bytes here.
     pub fn needs(&mut self, memory: usize) {
         self.memory = self.memory.saturating_add(memory);
     }
 
-    /// A section of so many bytes is written, for which by itself a reader reserves no more than [`most_memory`].
+    /// Ends a section of `size` bytes and checks that a reader will not refuse its memory ([`max_memory`]).
     pub fn end_section(&mut self, size: usize) {
-        self.is_too_large |= std::mem::take(&mut self.memory) > most_memory(size);
+        self.is_too_large |= std::mem::take(&mut self.memory) > max_memory(size);
     }
 
-    /// Whether a reader will refuse to reserve what it takes.
+    /// True if a reader will refuse to reserve the memory.
     pub fn is_too_large(&self) -> bool {
         self.is_too_large
     }
 }
 
-/// What so many bytes may take of memory.
-fn most_memory(size: usize) -> usize {
+/// The largest memory for a section of `size` bytes.
+fn max_memory(size: usize) -> usize {
     size.saturating_mul(GROWTH).saturating_add(ROOM)
 }
 
-/// What is read.
+/// Reads values from bytes.
 pub(crate) struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// What may still be reserved.
+    /// The memory that can still be reserved.
     memory: usize,
-    /// Of all that is read.
+    /// The SIMD level of all loaded objects.
     pub kernel: ChosenKernel,
 }
 
@@ -93,12 +93,12 @@ impl<'a> Reader<'a> {
         Self {
             bytes,
             at: 0,
-            memory: most_memory(bytes.len()),
+            memory: max_memory(bytes.len()),
             kernel,
         }
     }
 
-    /// The next so many bytes.
+    /// The next `count` bytes.
     pub fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         let end = self.at.checked_add(count);
         let Some(taken) = end.and_then(|end| self.bytes.get(self.at..end)) else {
@@ -114,25 +114,25 @@ impl<'a> Reader<'a> {
         Ok(array)
     }
 
-    /// How many bytes are left.
+    /// The number of bytes left.
     pub fn left(&self) -> usize {
         self.bytes.len() - self.at
     }
 
-    /// Refuses to take more memory than such a world does; `None`: more than there is.
-    pub fn will_take(&mut self, size: Option<usize>) -> Result<()> {
+    /// Refuses to reserve more memory than a world of this size can have; `None` stands for an overflow.
+    pub fn reserve_memory(&mut self, size: Option<usize>) -> Result<()> {
         let left = size.and_then(|size| self.memory.checked_sub(size));
         self.memory = left.ok_or_else(|| self.refusal("more room is announced than such a world has"))?;
         Ok(())
     }
 
-    /// An empty list with room for so many values.
+    /// An empty list with room for `count` values.
     pub fn reserved<T>(&mut self, count: usize) -> Result<Vec<T>> {
-        self.will_take(count.checked_mul(size_of::<T>()))?;
+        self.reserve_memory(count.checked_mul(size_of::<T>()))?;
         crate::base::memory::reserved(count)
     }
 
-    /// Why the bytes are refused.
+    /// The error for bytes that are refused.
     pub fn refusal(&self, why: &str) -> Error {
         Error::invalid(format!("bytes are no world: {why}, at byte {}", self.at))
     }

@@ -1,4 +1,4 @@
-//! A world says once with which kernel it is to be gone on, its parts not at all.
+//! Saves the SIMD level: a world saves it once, its parts do not.
 
 use super::{Reader, Saved, Writer, saved_enum};
 use crate::base::Result;
@@ -6,7 +6,7 @@ use crate::simd::{ChosenKernel, Kernel};
 
 saved_enum!(Kernel { 0 => Best, 1 => Avx512, 2 => Avx2, 3 => Neon, 4 => Portable });
 
-/// A world says once which it is.
+/// Saved by the world only.
 impl Saved for ChosenKernel {
     const SHAPE: u64 = 0;
     const LEAST: usize = 0;

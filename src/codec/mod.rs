@@ -1,13 +1,13 @@
-//! A world as bytes: a header, and sections of what is written field by field next to where it is defined.
+//! The format of snapshots: a header, and sections. Each type saves its fields next to its definition.
 //!
 //! | bytes | what |
 //! |---|---|
 //! | 0..8 | [`MAGIC`] |
 //! | 8..12 | [`VERSION`] |
 //! | 12..20 | the shape: a hash over the names and types of all fields |
-//! | 20..28 | how many bytes there are in all |
-//! | 28..36 | XXH3 of all that is before and behind it |
-//! | 36.. | sections: a tag of four bytes, eight bytes of how long it is, and what it holds |
+//! | 20..28 | the total number of bytes |
+//! | 28..36 | XXH3 of all other bytes |
+//! | 36.. | sections: a tag of four bytes, the length in eight bytes, and the content |
 //!
 //! All numbers are little-endian.
 
@@ -25,18 +25,18 @@ pub(crate) use saved::{
 use crate::base::{Error, Result, ensure};
 use crate::simd::ChosenKernel;
 
-/// No text begins so, and none comes through a transfer of text as it was.
+/// No text begins with these bytes, and a transfer in text mode changes them.
 const MAGIC: [u8; 8] = *b"\x93sinew\r\n";
 
-/// To be raised where a field means something else than before, of the same name and type.
+/// Raise this when a field changes its meaning but not its name and type.
 const VERSION: u32 = 3;
 
 const CHECKSUM: usize = 28;
 const HEADER: usize = 36;
 
-/// Writes the header of bytes of this shape, to be sealed when all is behind it.
+/// Writes the header for this shape. Call [`seal`] after all sections.
 pub(crate) fn begin(to: &mut Writer, shape: u64) {
-    to.put(&MAGIC);
+    to.write(&MAGIC);
     VERSION.save(to);
     shape.save(to);
     0_u64.save(to);
@@ -45,17 +45,17 @@ pub(crate) fn begin(to: &mut Writer, shape: u64) {
 
 /// Writes a section.
 pub(crate) fn write_section(to: &mut Writer, tag: [u8; 4], content: impl FnOnce(&mut Writer)) {
-    to.put(&tag);
-    let place = to.size();
+    to.write(&tag);
+    let length_at = to.size();
     0_u64.save(to);
     let start = to.size();
     content(to);
     let size = to.size() - start;
     to.end_section(size);
-    to.put_at(place, &(size as u64).to_le_bytes());
+    to.overwrite(length_at, &(size as u64).to_le_bytes());
 }
 
-/// Completes the header; what is too short for one is refused when it is opened.
+/// Completes the header. Bytes too short for a header are refused by [`opened`].
 pub(crate) fn seal(bytes: &mut [u8]) {
     if bytes.len() < HEADER {
         return;
@@ -73,7 +73,7 @@ fn checksum(bytes: &[u8]) -> u64 {
     hasher.digest()
 }
 
-/// What is behind the header, where that is whole and of this shape.
+/// The bytes after the header, if the header is valid and of this shape.
 pub(crate) fn opened(bytes: &[u8], shape: u64) -> Result<&[u8]> {
     let size = bytes.len();
     let known = size.min(MAGIC.len());
@@ -105,7 +105,7 @@ pub(crate) fn opened(bytes: &[u8], shape: u64) -> Result<&[u8]> {
     Ok(&bytes[HEADER..])
 }
 
-/// Reads the section that comes next, which must have this tag and hold nothing else.
+/// Reads the next section, which must have this tag and end with its content.
 pub(crate) fn read_section<T>(
     bytes: &mut &[u8],
     tag: [u8; 4],
@@ -137,21 +137,21 @@ mod tests {
 
     #[test]
     fn what_is_saved_can_be_loaded_or_is_refused_by_both() {
-        let room = |beside: usize| {
+        let room = |other_bytes: usize| {
             let mut to = Writer::new(None);
             write_section(&mut to, *b"LONG", |to| {
-                to.place(beside);
+                to.buffer(other_bytes);
             });
             write_section(&mut to, *b"ROOM", |to| to.needs(2 << 30));
             to
         };
-        // Room is counted by section, whatever is beside it.
-        for beside in [0, 1 << 28] {
-            assert!(room(beside).is_too_large());
+        // Memory is counted for each section alone.
+        for other_bytes in [0, 1 << 28] {
+            assert!(room(other_bytes).is_too_large());
         }
         let kernel = Kernel::Portable.choose().expect("a kernel for every processor");
         let mut bytes = &b"ROOM\0\0\0\0\0\0\0\0"[..];
-        let refused = read_section(&mut bytes, *b"ROOM", kernel, |from| from.will_take(Some(2 << 30)));
+        let refused = read_section(&mut bytes, *b"ROOM", kernel, |from| from.reserve_memory(Some(2 << 30)));
         assert!(refused.is_err());
     }
 }

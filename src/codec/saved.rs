@@ -1,4 +1,4 @@
-//! What can be written to bytes and made again of them: numbers, lists, and structures field by field.
+//! Serialization of numbers, lists, and structures field by field.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -9,24 +9,24 @@ use crate::base::{
     AttachmentId, BodyId, Error, LimitKind, Result, SlotId, StepLimit, StepReport, SubstepLimit, ToolId, memory,
 };
 
-/// What is written and read bit by bit.
+/// A type that can be saved and loaded bitwise.
 pub(crate) trait Saved: Sized {
-    /// Of how the bytes are laid out: other fields, another shape.
+    /// A hash of the layout: it changes with the fields.
     const SHAPE: u64;
 
-    /// The fewest bytes that one takes.
+    /// The least number of bytes of a value.
     const LEAST: usize;
 
     fn save(&self, to: &mut Writer);
 
     fn load(from: &mut Reader) -> Result<Self>;
 
-    /// Writes many, side by side.
+    /// Writes several values.
     fn save_all(all: &[Self], to: &mut Writer) {
         all.iter().for_each(|one| one.save(to));
     }
 
-    /// Reads so many into a list that has room for them.
+    /// Reads `count` values into a list that has room for them.
     fn load_all(count: usize, into: &mut Vec<Self>, from: &mut Reader) -> Result<()> {
         for _ in 0..count {
             into.push(Self::load(from)?);
@@ -35,7 +35,7 @@ pub(crate) trait Saved: Sized {
     }
 }
 
-/// The shape of something of this name (FNV-1a).
+/// The shape of a name (FNV-1a).
 pub(crate) const fn shape_of_name(name: &str) -> u64 {
     let bytes = name.as_bytes();
     let mut shape = 0xcbf2_9ce4_8422_2325;
@@ -47,7 +47,7 @@ pub(crate) const fn shape_of_name(name: &str) -> u64 {
     shape
 }
 
-/// The shape of something that has `shape`, and then another.
+/// Combines two shapes.
 pub(crate) const fn shape_with(shape: u64, other: u64) -> u64 {
     (shape.rotate_left(23) ^ other).wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
@@ -57,14 +57,14 @@ pub(crate) const fn shape_of_field<T, F: Saved>(_: fn(&T) -> &F) -> u64 {
     F::SHAPE
 }
 
-/// The fewest bytes of a field.
+/// The least number of bytes of a field.
 pub(crate) const fn least_of_field<T, F: Saved>(_: fn(&T) -> &F) -> usize {
     F::LEAST
 }
 
-/// Writes and reads a structure field by field: `saved! { Name { all, its, fields } }`, what is generic as `saved! { [T: Saved] Name<T> { .. } }`. One that
-/// is left out does not compile, unless `leaves { field: value }` says what it is after loading. With
-/// `where check` what is read must pass a check. `saved! { Name }` is of one without fields.
+/// Implements [`Saved`] for a structure: `saved! { Name { all, its, fields } }`, or `saved! { [T: Saved] Name<T> { .. } }` for a generic one. A missing field
+/// does not compile, unless `leaves { field: value }` gives its value after loading. With
+/// `where check` loaded values must pass a check. `saved! { Name }` is for a structure without fields.
 macro_rules! saved {
     ($name:ident) => {
         impl $crate::codec::Saved for $name {
@@ -110,7 +110,7 @@ macro_rules! saved {
     };
 }
 
-/// The same for what is one of several: `saved_enum!(Name { 0 => First, 1 => Second { field }, 2 => Third(value) })`.
+/// Implements [`Saved`] for an enum: `saved_enum!(Name { 0 => First, 1 => Second { field }, 2 => Third(value) })`.
 macro_rules! saved_enum {
     ($name:ty { $($tag:literal => $variant:ident $({ $($field:ident),* $(,)? })? $(( $($value:ident),* ))?),* $(,)? }) => {
         impl $crate::codec::Saved for $name {
@@ -123,7 +123,7 @@ macro_rules! saved_enum {
             fn save(&self, to: &mut $crate::codec::Writer) {
                 match self {
                     $(Self::$variant $({ $($field),* })? $(( $($value),* ))? => {
-                        to.put(&[$tag]);
+                        to.write(&[$tag]);
                         $($($crate::codec::Saved::save($field, to);)*)?
                         $($($crate::codec::Saved::save($value, to);)*)?
                     })*
@@ -154,7 +154,7 @@ macro_rules! saved_numbers {
             const LEAST: usize = size_of::<$number>();
 
             fn save(&self, to: &mut Writer) {
-                to.put(&self.to_le_bytes());
+                to.write(&self.to_le_bytes());
             }
 
             fn load(from: &mut Reader) -> Result<Self> {
@@ -163,7 +163,7 @@ macro_rules! saved_numbers {
 
             fn save_all(all: &[Self], to: &mut Writer) {
                 const SIZE: usize = size_of::<$number>();
-                if let Some(place) = to.place(SIZE * all.len()) {
+                if let Some(place) = to.buffer(SIZE * all.len()) {
                     for (place, one) in place.chunks_exact_mut(SIZE).zip(all) {
                         place.copy_from_slice(&one.to_le_bytes());
                     }
@@ -183,7 +183,7 @@ macro_rules! saved_numbers {
 
 saved_numbers!(u8, u16, u32, u64, i32, f32, f64);
 
-/// Reads as many numbers as there are places.
+/// Fills a slice with numbers.
 pub(crate) fn floats_into(places: &mut [f32], from: &mut Reader) -> Result<()> {
     let (chunks, _) = from.take(size_of_val(places))?.as_chunks::<4>();
     for (place, chunk) in places.iter_mut().zip(chunks) {
@@ -192,7 +192,7 @@ pub(crate) fn floats_into(places: &mut [f32], from: &mut Reader) -> Result<()> {
     Ok(())
 }
 
-/// What is the same in memory as an array of others is written as one.
+/// Saves a type as the array with the same layout.
 macro_rules! saved_as {
     ($($name:ty as $array:ty: $to:expr, $of:expr;)*) => {
         $(impl Saved for $name {
@@ -249,7 +249,7 @@ impl<T: Saved, const N: usize> Saved for [T; N] {
     }
 
     fn load(from: &mut Reader) -> Result<Self> {
-        // No list on the heap for each: there are many.
+        // This avoids a heap allocation for each value.
         let mut refused = None;
         let array = std::array::from_fn(|_| match &refused {
             Some(_) => None,
@@ -297,7 +297,7 @@ impl<T: Saved> Saved for Box<T> {
     }
 }
 
-/// How many values come next that take so many bytes each, at least.
+/// Reads a count of values of at least `least` bytes each.
 pub(crate) fn load_count(from: &mut Reader, least: usize) -> Result<usize> {
     let count = usize::load(from)?;
     if count > from.left() / least {
@@ -306,7 +306,7 @@ pub(crate) fn load_count(from: &mut Reader, least: usize) -> Result<usize> {
     Ok(count)
 }
 
-/// With its room: no step is to ask for memory after loading that it would not have asked for before.
+/// Saves the capacity too, so that steps after loading allocate no more than before.
 impl<T: Saved> Saved for Vec<T> {
     const SHAPE: u64 = shape_with(T::SHAPE, 2);
     const LEAST: usize = 16;
@@ -351,7 +351,7 @@ impl Saved for String {
 
     fn save(&self, to: &mut Writer) {
         self.len().save(to);
-        to.put(self.as_bytes());
+        to.write(self.as_bytes());
     }
 
     fn load(from: &mut Reader) -> Result<Self> {

@@ -1,85 +1,88 @@
-//! Contacts with tools beside contacts of tissue: both act in the same iterations, so that neither undoes the other.
+//! Iterates contacts with tools together with contacts of tissue, so that neither undoes the other.
 //!
-//! The contacts of a body with tools have been found and have acted before those of tissue are known. They go on from there.
+//! Contacts with tools have been found and solved before contacts of tissue are known. The common iterations continue
+//! from there.
 
 use glam::{Vec3, Vec3A};
 
 use super::contacts::Contacts;
-use super::impulses::Sweep;
-use crate::geometry::Bounds;
+use super::impulses::PgsPass;
+use crate::geometry::Aabb;
 use crate::soa::Vectors;
 
 impl Contacts {
-    /// Whether a tool touches the body, or may as other tissue moves it.
-    pub fn may_press(&self) -> bool {
+    /// True if a tool touches the body, or may touch it as other tissue moves the body.
+    pub fn may_touch(&self) -> bool {
         !self.nodes.is_empty() || !self.constraints.is_empty()
     }
 
-    /// Shows the nodes that contacts act on. What they have given so far is counted.
-    pub fn begin_sweeps(&mut self, mut see: impl FnMut(usize)) {
+    /// Begins the common sweeps. Visits the nodes that contacts act on, and stores the impulses that are already
+    /// counted.
+    pub fn begin_sweeps(&mut self, mut visit: impl FnMut(usize)) {
         for contact in self.nodes.iter_mut() {
-            contact.counted = contact.given();
-            see(contact.node as usize);
+            contact.counted_impulse = contact.total_impulse();
+            visit(contact.node as usize);
         }
         for constraint in &mut self.constraints {
-            constraint.counted = constraint.given();
-            constraint.nodes().iter().for_each(|&node| see(node as usize));
+            constraint.counted_impulse = constraint.total_impulse();
+            constraint.nodes().iter().for_each(|&node| visit(node as usize));
         }
     }
 
-    /// One sweep over the contacts, on the velocities of the substep: the most that one of them changed, m/s.
-    pub(crate) fn sweep(&mut self, velocities: &mut [Vec3A], sweep: Sweep) -> f32 {
-        let of_nodes = self.nodes.sweep(velocities, sweep);
+    /// Sweeps once over the contacts, with the velocities of the substep. Returns the largest velocity change, m/s.
+    pub(crate) fn sweep(&mut self, velocities: &mut [Vec3A], sweep: PgsPass) -> f32 {
+        let node_change = self.nodes.sweep(velocities, sweep);
         if self.constraints.is_empty() {
-            of_nodes
+            node_change
         } else {
-            of_nodes.max(self.presses.sweep(velocities, sweep))
+            node_change.max(self.contact_rows.sweep(velocities, sweep))
         }
     }
 
-    /// Adds what the sweeps gave to the loads of tools, and shows it, N s, with the nodes that received it. `velocities` are those that they led to.
-    pub fn end_sweeps(&mut self, velocities: &[Vec3A], mut give: impl FnMut(usize, Vec3)) {
+    /// Adds the impulses of the sweeps to the loads of the tools. `visit_impulse` receives each node and its impulse, N
+    /// s. `velocities` are those after the sweeps.
+    pub fn end_sweeps(&mut self, velocities: &[Vec3A], mut visit_impulse: impl FnMut(usize, Vec3)) {
         if !self.constraints.is_empty() {
-            self.presses.hand_over(&mut self.constraints);
+            self.contact_rows.store_impulses(&mut self.constraints);
         }
-        let mut given = Bounds::EMPTY;
+        let mut bounds = Aabb::EMPTY;
         for contact in self.nodes.iter_mut() {
-            let impulse = contact.given() - contact.counted;
+            let impulse = contact.total_impulse() - contact.counted_impulse;
             if impulse != Vec3::ZERO {
                 self.loads[contact.tool].add(-impulse.as_dvec3(), contact.arm);
-                given = given.with(velocities[contact.node as usize].into());
-                give(contact.node as usize, impulse);
+                bounds = bounds.with(velocities[contact.node as usize].into());
+                visit_impulse(contact.node as usize, impulse);
             }
         }
         for constraint in &self.constraints {
-            let impulse = constraint.given() - constraint.counted;
+            let impulse = constraint.total_impulse() - constraint.counted_impulse;
             if impulse != Vec3::ZERO {
                 self.loads[constraint.tool].add(-impulse.as_dvec3(), constraint.arm);
                 for (&node, share) in constraint.nodes().iter().zip(constraint.shares) {
-                    given = given.with(velocities[node as usize].into());
-                    give(node as usize, impulse * share);
+                    bounds = bounds.with(velocities[node as usize].into());
+                    visit_impulse(node as usize, impulse * share);
                 }
             }
         }
-        self.driven.amend(&self.loads);
-        if given != Bounds::EMPTY {
-            let fastest = given.magnitudes().length();
-            self.candidates.spend(self.found_for * fastest);
+        self.dynamic_tools.correct(&self.loads);
+        if bounds != Aabb::EMPTY {
+            let fastest = bounds.magnitudes().length();
+            self.candidates.spend_slack(self.slice_duration * fastest);
         }
     }
 
-    /// Moves nodes out of tools that were moved into them as tissue was parted, without giving them speed.
-    pub fn keep_out(&self, positions: &mut Vectors) {
+    /// Moves nodes out of tools after the separation of tissue has moved them in. Velocities do not change.
+    pub fn push_nodes_out(&self, positions: &mut Vectors) {
         for contact in self.nodes.iter() {
-            let lacks = contact.lacks(positions, self.found_for);
-            if lacks > 0.0 {
-                contact.push_out(positions, lacks);
+            let missing = contact.missing_distance(positions, self.slice_duration);
+            if missing > 0.0 {
+                contact.push_out(positions, missing);
             }
         }
         for constraint in &self.constraints {
-            let lacks = constraint.lacks(positions, self.found_for);
-            if lacks > 0.0 {
-                constraint.push_out(positions, lacks);
+            let missing = constraint.missing_distance(positions, self.slice_duration);
+            if missing > 0.0 {
+                constraint.push_out(positions, missing);
             }
         }
     }

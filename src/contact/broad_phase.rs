@@ -1,119 +1,124 @@
-//! What of a body is near tools, and in how many slices a substep is taken there.
+//! Broad phase of one body: the features near tools, and the number of slices of a substep.
 
+use super::contact_input::ContactInput;
 use super::contacts::Contacts;
-use super::meeting::Meeting;
 use super::path::ToolPath;
-use super::zone::met;
+use super::zone::filtered_tools;
 use crate::base::{Count, Stage, Stopwatch};
 
-/// A substep is cut into at most so many slices.
-const SLICES: u32 = 512;
+/// Maximum number of slices of a substep.
+const MAX_SLICES: u32 = 512;
 
-/// How far a tool and the body may move against each other in a slice, as a part of the tool's radius.
-const SLICE_TRAVEL: f32 = 0.5;
+/// Maximum relative motion of tool and body in a slice, as a fraction of the tool's radius.
+const MAX_SLICE_TRAVEL: f32 = 0.5;
 
 impl Contacts {
-    /// Whether no tool can come near within `duration` seconds, where no node is faster than `fastest`, m/s.
-    pub fn stay_far(&self, tools: &[ToolPath], dt: f32, duration: f32, fastest: f32) -> bool {
+    /// True if no tool can come near within `duration` seconds while no node is faster than `fastest`, m/s.
+    pub fn remains_clear_of_tools(&self, tools: &[ToolPath], dt: f32, duration: f32, fastest: f32) -> bool {
         let travel = duration * (fastest + self.tool_speed(tools, dt));
-        self.loads.is_empty() || self.candidates.near().is_empty() && self.candidates.lasts_for(travel)
+        self.loads.is_empty() || self.candidates.near().is_empty() && self.candidates.has_slack_for(travel)
     }
 
-    /// A substep without tools near has been taken: whether the list of what is near is still good.
-    pub fn pass_far(&mut self, tools: &[ToolPath], dt: f32, substep: f32, fastest: f32) -> bool {
+    /// Accounts for a substep taken without tools near. Returns true if the candidate list is still valid.
+    pub fn advance_clear_of_tools(&mut self, tools: &[ToolPath], dt: f32, substep: f32, fastest: f32) -> bool {
         let travel = substep * (fastest + self.tool_speed(tools, dt));
-        self.loads.is_empty() || self.candidates.spend(travel)
+        self.loads.is_empty() || self.candidates.spend_slack(travel)
     }
 
-    /// The speed of the fastest tool that the body meets, m/s.
+    /// Speed of the fastest tool that the body collides with, m/s.
     fn tool_speed(&self, tools: &[ToolPath], dt: f32) -> f32 {
-        met(tools, self.filter).map(|tool| tool.speed(dt)).fold(0.0, f32::max)
+        filtered_tools(tools, self.filter)
+            .map(|tool| tool.speed(dt))
+            .fold(0.0, f32::max)
     }
 
-    /// Whether no tool was near in the last substep.
-    pub fn are_far(&self) -> bool {
+    /// True if no tool was near in the last substep.
+    pub fn is_clear_of_tools(&self) -> bool {
         self.loads.is_empty() || self.candidates.near().is_empty()
     }
 
-    /// Whether the list was made for something much faster than these tools are now: what is in it is not near them.
-    pub(super) fn are_listed_too_far(&self, tools: &[ToolPath]) -> bool {
-        // Speed over one second is the way of the step.
-        self.candidates.excess > 2.0 * self.tool_speed(tools, 1.0)
+    /// True if the list was built for much faster tools than these, so that its features are not near them.
+    pub(super) fn has_oversized_list(&self, tools: &[ToolPath]) -> bool {
+        // For a step of one second, the speed equals the length of the path.
+        self.candidates.excess_travel > 2.0 * self.tool_speed(tools, 1.0)
     }
 
-    /// How many slices a substep needs. Only tools whose way comes near the body count: what is far changes nothing.
-    pub(super) fn needed_slices(&self, meeting: &Meeting) -> u32 {
+    /// The number of slices that a substep needs. Only tools whose path comes near the body count.
+    pub(super) fn needed_slices(&self, input: &ContactInput) -> u32 {
         let mut slices = 1.0_f32;
-        for tool in met(meeting.tools, self.filter) {
-            let Some(sweep) = tool.sweep(meeting.origin) else {
+        for tool in filtered_tools(input.tools, self.filter) {
+            let Some(sweep) = tool.sweep(input.origin) else {
                 continue;
             };
-            let travel = (tool.speed(meeting.dt) + meeting.fastest) * meeting.substep;
-            let wanted = (travel / (sweep.thickness * SLICE_TRAVEL)).ceil();
-            if wanted <= slices {
+            let travel = (tool.speed(input.dt) + input.fastest) * input.substep;
+            let upper_bound = (travel / (sweep.thickness * MAX_SLICE_TRAVEL)).ceil();
+            if upper_bound <= slices {
                 continue;
             }
-            let reached = meeting.bounds().extended(meeting.fastest * meeting.substep);
-            if reached.overlaps(&sweep.bounds) {
-                let travel = self.closing_speed(meeting, tool) * meeting.substep;
-                slices = slices.max((travel / (sweep.thickness * SLICE_TRAVEL)).ceil().min(wanted));
+            let reachable = input.bounds().extended(input.fastest * input.substep);
+            if reachable.overlaps(&sweep.bounds) {
+                let travel = self.closing_speed(input, tool) * input.substep;
+                slices = slices.max((travel / (sweep.thickness * MAX_SLICE_TRAVEL)).ceil().min(upper_bound));
             }
         }
-        (slices as u32).clamp(1, SLICES)
+        (slices as u32).clamp(1, MAX_SLICES)
     }
 
-    /// Whether a tool goes further in a substep than it may in a slice, whatever the body does.
-    pub(super) fn has_fast_tool(&self, meeting: &Meeting) -> bool {
-        met(meeting.tools, self.filter).any(|tool| {
-            let travel = tool.speed(meeting.dt) * meeting.substep;
-            let sweep = tool.sweep(meeting.origin);
-            sweep.is_some_and(|sweep| travel > sweep.thickness * SLICE_TRAVEL)
+    /// True if a tool alone moves further in a substep than a slice allows.
+    pub(super) fn has_fast_tool(&self, input: &ContactInput) -> bool {
+        filtered_tools(input.tools, self.filter).any(|tool| {
+            let travel = tool.speed(input.dt) * input.substep;
+            let sweep = tool.sweep(input.origin);
+            sweep.is_some_and(|sweep| travel > sweep.thickness * MAX_SLICE_TRAVEL)
         })
     }
 
-    /// How fast what is near moves against the tool at most, m/s.
-    fn closing_speed(&self, meeting: &Meeting, tool: &ToolPath) -> f32 {
-        let motion = tool.motion(meeting.start, meeting.end, meeting.dt, meeting.origin);
+    /// Maximum speed of the listed nodes relative to the tool, m/s.
+    fn closing_speed(&self, input: &ContactInput, tool: &ToolPath) -> f32 {
+        let motion = tool.motion(input.start, input.end, input.dt, input.origin);
         let speeds = self
             .candidates
             .corner_nodes()
-            .map(|node| (meeting.vector(meeting.velocities, node) - motion.velocity).length());
-        // Turning counts by the tool's furthest point: an arc is taken for its chord.
-        let turning = (tool.speed(meeting.dt) - motion.velocity.length()).max(0.0);
-        speeds.fold(turning, |fastest, speed| fastest.max(speed + turning))
+            .map(|node| (input.vector(input.velocities, node) - motion.velocity).length());
+        // Rotation counts at the tool's furthest point: an arc is approximated by its chord.
+        let rotation_speed = (tool.speed(input.dt) - motion.velocity.length()).max(0.0);
+        speeds.fold(rotation_speed, |fastest, speed| fastest.max(speed + rotation_speed))
     }
 
-    pub(super) fn find_candidates(&mut self, meeting: &Meeting) {
-        let watch = Stopwatch::start(meeting.profile);
-        self.gather_candidates(meeting);
-        watch.stop(meeting.profile, Stage::BroadPhase);
-        if let Some(profile) = meeting.profile {
+    pub(super) fn find_candidates(&mut self, input: &ContactInput) {
+        let watch = Stopwatch::start(input.profile);
+        self.gather_candidates(input);
+        watch.stop(input.profile, Stage::BroadPhase);
+        if let Some(profile) = input.profile {
             profile.count(Count::Candidates, self.candidates.near().len());
         }
     }
 
-    fn gather_candidates(&mut self, meeting: &Meeting) {
-        let tools = met(meeting.tools, self.filter);
-        let tool_speed = self.tool_speed(meeting.tools, meeting.dt);
-        let fastest = meeting.fastest.max(meeting.neighbor_speed.unwrap_or(0.0));
-        let travel = meeting.substep * (fastest + tool_speed);
-        if self.candidates.spend(travel) || self.candidates.renew(meeting.positions, travel) {
+    fn gather_candidates(&mut self, input: &ContactInput) {
+        let tools = filtered_tools(input.tools, self.filter);
+        let tool_speed = self.tool_speed(input.tools, input.dt);
+        let fastest = input.fastest.max(input.neighbor_speed.unwrap_or(0.0));
+        let travel = input.substep * (fastest + tool_speed);
+        if self.candidates.spend_slack(travel) || self.candidates.extend_validity(input.positions, travel) {
             return;
         }
-        let bounds = meeting.bounds();
-        // Good for the rest of the step, where that is no more than a part of the body.
+        let bounds = input.bounds();
+        // The list lasts for the rest of the step if that takes only a fraction of the body's size.
         let size = (bounds.max - bounds.min).length();
-        let left = ((1.0 - meeting.start) / (meeting.end - meeting.start).max(1e-9)) as f32;
-        let usual = 0.05 * size;
-        let slack = (left.max(8.0) * travel).min(usual).max(8.0 * travel).max(0.02 * size);
-        self.candidates.excess = (travel - usual / 8.0).max(0.0);
+        let substeps_left = ((1.0 - input.start) / (input.end - input.start).max(1e-9)) as f32;
+        let usual_slack = 0.05 * size;
+        let slack = (substeps_left.max(8.0) * travel)
+            .min(usual_slack)
+            .max(8.0 * travel)
+            .max(0.02 * size);
+        self.candidates.excess_travel = (travel - usual_slack / 8.0).max(0.0);
         self.candidates.gather(
             &self.features,
-            (meeting.positions, meeting.bindings),
+            (input.positions, input.bindings),
             tools,
-            meeting.origin,
-            [meeting.substep * tool_speed + meeting.slack + meeting.thickness, slack],
+            input.origin,
+            [input.substep * tool_speed + input.slack + input.thickness, slack],
         );
-        self.candidates.spend(travel);
+        self.candidates.spend_slack(travel);
     }
 }

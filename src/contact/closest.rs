@@ -1,19 +1,19 @@
-//! The question that every way of finding contact with a solid answers.
+//! The result of a distance query between a feature and a solid, common to all detectors.
 
 use glam::Vec3;
 
-/// The closest that a node, edge or face comes to a solid.
+/// The closest point of a node, edge or face to a solid.
 ///
-/// Nodes, edges and faces each answer for what is between their ends: an edge or a face that is closest at its border says so, and a smaller
-/// feature is met there instead. One that reaches into the solid answers with its deepest point.
+/// Each feature reports contacts in its interior. If an edge or face is closest at its border, `inside` is false and a
+/// smaller feature reports the contact. A feature that penetrates the solid reports its deepest point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Closest {
-    /// The feature's point, as weights of its corners.
+    /// Barycentric weights of the feature's point.
     pub weights: [f32; 3],
-    /// From the solid's surface to it, m; below 0 inside.
+    /// Distance from the solid's surface, m; negative inside.
     pub distance: f32,
-    /// Away from the solid, of unit length.
+    /// Unit normal, away from the solid.
     pub normal: Vec3,
-    /// Whether the feature's point lies within it, and not at its border, where a smaller feature is met instead.
+    /// True if the feature's point lies in its interior. At its border a smaller feature touches instead.
     pub inside: bool,
 }

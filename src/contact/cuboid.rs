@@ -1,8 +1,9 @@
-//! A box as triangles: its sides, edges and corners are found exactly as those of any mesh.
+//! Triangulated surface of a box. Its faces, edges and corners are found like those of any mesh.
 
 use glam::Vec3;
 
-/// The sides of a box, two triangles each, outward; corners are numbered by bits: x 1, y 2, z 4.
+/// Faces of a box, two outward triangles each. The bits of a corner's index select the upper side: 1 for x, 2 for y,
+/// 4 for z.
 const TRIANGLES: [[u32; 3]; 12] = [
     [0, 4, 6],
     [0, 6, 2],
@@ -18,9 +19,9 @@ const TRIANGLES: [[u32; 3]; 12] = [
     [4, 7, 6],
 ];
 
-/// Of all that is within `half_extents` of the origin along each axis.
+/// Returns the surface of the box of all points within `half_extents` of the origin along each axis.
 pub(super) fn surface(half_extents: Vec3) -> ([Vec3; 8], [[u32; 3]; 12]) {
-    let side = |corner: usize, axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
-    let corner = |corner| half_extents * Vec3::from_array([0, 1, 2].map(|axis| side(corner, axis)));
+    let sign = |corner: usize, axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
+    let corner = |corner| half_extents * Vec3::from_array([0, 1, 2].map(|axis| sign(corner, axis)));
     (std::array::from_fn(corner), TRIANGLES)
 }

@@ -2,12 +2,13 @@
 
 use glam::Vec3A;
 
-use crate::geometry::nearest::nearest_of_segments;
+use crate::geometry::nearest::nearest_on_segments;
 
-/// The squared sine of the angle below which two segments are compared in `f64`: above it the distance is right to some 1e-5 of their length.
+/// Squared sine of the angle below which two segments are compared in `f64`. Above it, the error of the distance is
+/// about 1e-5 of their length.
 const NEARLY_PARALLEL: f32 = 1e-4;
 
-/// How far along the segment from `a` to `b` the point closest to `point` lies, 0 to 1.
+/// Parameter of the point closest to `point` on the segment from `a` to `b`, 0 to 1.
 pub(super) fn closest_on_segment(point: Vec3A, a: Vec3A, b: Vec3A) -> f32 {
     let along = b - a;
     let length_squared = along.length_squared();
@@ -18,7 +19,7 @@ pub(super) fn closest_on_segment(point: Vec3A, a: Vec3A, b: Vec3A) -> f32 {
     }
 }
 
-/// How far along the segments from `a` to `b` and from `c` to `d` their closest points lie, 0 to 1 each.
+/// Parameters of the closest points of the segments from `a` to `b` and from `c` to `d`, 0 to 1 each.
 pub(super) fn closest_of_segments(a: Vec3A, b: Vec3A, c: Vec3A, d: Vec3A) -> (f32, f32) {
     let (first, second, between) = (b - a, d - c, a - c);
     let (first_squared, second_squared) = (first.length_squared(), second.length_squared());
@@ -31,9 +32,10 @@ pub(super) fn closest_of_segments(a: Vec3A, b: Vec3A, c: Vec3A, d: Vec3A) -> (f3
     let parallel = first.dot(second);
     let (ahead, behind) = (first.dot(between), second.dot(between));
     let denominator = first_squared * second_squared - parallel * parallel;
-    // Of nearly parallel ones rounding would decide, and a distance that is found too long lets a sweep step over a touch.
+    // Rounding errors dominate for nearly parallel segments. An overestimated distance would let a sweep step over a
+    // contact.
     if !(denominator > NEARLY_PARALLEL * first_squared * second_squared) {
-        let (on_first, on_second) = nearest_of_segments(a.as_dvec3(), b.as_dvec3(), c.as_dvec3(), d.as_dvec3());
+        let (on_first, on_second) = nearest_on_segments(a.as_dvec3(), b.as_dvec3(), c.as_dvec3(), d.as_dvec3());
         return (on_first as f32, on_second as f32);
     }
     let on_first = ((parallel * behind - ahead * second_squared) / denominator).clamp(0.0, 1.0);
@@ -45,7 +47,7 @@ pub(super) fn closest_of_segments(a: Vec3A, b: Vec3A, c: Vec3A, d: Vec3A) -> (f3
     (closest_on_segment(c + second * on_second, a, b), on_second)
 }
 
-/// The barycentric weights of the point of triangle `a b c` that is closest to `point`.
+/// Barycentric weights of the point of triangle `a b c` that is closest to `point`.
 pub(super) fn closest_on_triangle(point: Vec3A, a: Vec3A, b: Vec3A, c: Vec3A) -> [f32; 3] {
     let (ab, ac) = (b - a, c - a);
     let from_a = point - a;

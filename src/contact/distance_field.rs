@@ -1,36 +1,36 @@
-//! DISTANCE_FIELD: a solid's signed distance on a grid, sampled once from EXACT.
+//! DISTANCE_FIELD detection: signed distances of a solid on a grid, sampled once with EXACT.
 //!
-//! Between samples it is interpolated linearly along each axis: its error is of second order in the size of a cell where the distance is
-//! smooth, and of first order at what is sharper than a cell. The least distance of an edge or face is looked for on the grid (Macklin et al.
-//! 2020, Local Optimization for Robust Signed Distance Field Collision).
+//! Distances are interpolated trilinearly. The error is second order in the cell size where the distance is smooth,
+//! and first order at features sharper than a cell. The closest point of an edge or face is searched on the grid
+//! (Macklin et al. 2020, Local Optimization for Robust Signed Distance Field Collision).
 
 use glam::{UVec3, Vec3};
 
 use super::closest::Closest;
 use super::exact::ExactSolid;
 use crate::base::{Result, ensure, memory};
-use crate::geometry::Bounds;
+use crate::geometry::Aabb;
 
-/// Cells along the longest side of a solid where nothing else is asked for.
-const CELLS: f32 = 64.0;
+/// Default number of cells along the longest side of a solid.
+const DEFAULT_CELLS: f32 = 64.0;
 
-/// Cells around a solid on each side.
+/// Number of cells around a solid on each side.
 const MARGIN: f32 = 3.0;
 
-/// Samples at most: 64 MiB.
+/// Maximum number of samples: 64 MiB.
 const SAMPLES: u64 = 1 << 24;
 
-/// Stretches that an edge, or the side of a face, is first looked at by, at most.
-const STRETCHES: u32 = 24;
-const STRETCHES_OF_A_SIDE: u32 = 8;
+/// Maximum number of initial intervals of an edge, and of a side of a face.
+const MAX_INTERVALS: u32 = 24;
+const MAX_INTERVALS_OF_SIDE: u32 = 8;
 
-/// How often a search is then made half as wide.
+/// Number of times that a search then halves its step.
 const HALVINGS: u32 = 8;
 
-/// A point is at a feature's border where a weight is no more: what the search cannot tell apart.
+/// Largest weight at which a point counts as lying on a feature's border, the resolution of the search.
 const BORDER: f32 = 1e-4;
 
-/// Signed distances at the corners of cubes.
+/// Signed distances at the corners of grid cells.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -50,16 +50,16 @@ pub struct DistanceField {
     cell: f32,
     counts: UVec3,
     distances: Vec<f32>,
-    /// About the solid itself.
-    bounds: Bounds,
+    /// Bounding box of the solid.
+    bounds: Aabb,
 }
 
 impl DistanceField {
-    /// Samples a solid with cells of this size, m; 0: a 64th of its longest side.
+    /// Samples a solid with cells of this size, m; 0 selects 1/64 of its longest side.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] where the cell is negative, not finite, or so small that there would be more than 16.8 million samples;
-    /// [`Error::OutOfMemory`].
+    /// [`Error::InvalidArgument`] if the cell size is negative, not finite, or so small that more than 16.8 million
+    /// samples are needed; [`Error::OutOfMemory`].
     pub(crate) fn of(solid: &ExactSolid, cell: f32) -> Result<Self> {
         ensure!(
             cell >= 0.0 && cell.is_finite(),
@@ -67,7 +67,11 @@ impl DistanceField {
         );
         let bounds = solid.bounds();
         let sides = bounds.max - bounds.min;
-        let cell = if cell > 0.0 { cell } else { sides.max_element() / CELLS };
+        let cell = if cell > 0.0 {
+            cell
+        } else {
+            sides.max_element() / DEFAULT_CELLS
+        };
         let along = (sides / cell).ceil() + 2.0 * MARGIN + 1.0;
         let samples = along.as_dvec3().element_product();
         ensure!(
@@ -99,38 +103,40 @@ impl DistanceField {
         Ok(field)
     }
 
-    /// Of a solid; see `of`.
+    /// Samples a solid with cells of this size, m; 0 selects 1/64 of its longest side.
     ///
     /// # Errors
-    /// As there.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) if the cell size is negative, not finite, or so
+    /// small that more than 16.8 million samples are needed; [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(surface: &crate::mesh::ClosedSurface, cell: f32) -> Result<Self> {
         Self::of(&ExactSolid::new(surface)?, cell)
     }
 
-    /// Whether any sample lies further than this within the solid, m.
-    pub(super) fn is_inside_somewhere(&self, depth: f32) -> bool {
+    /// Returns true if a sample is deeper inside than `depth`, m.
+    pub(super) fn has_interior(&self, depth: f32) -> bool {
         self.distances.iter().any(|&distance| distance < -depth)
     }
 
-    /// The size of a cell, m.
+    /// Returns the size of a cell, m.
     pub fn cell(&self) -> f32 {
         self.cell
     }
 
-    /// The closest that a node, edge or face (1, 2 or 3 corners) comes; `None` where it is outside and further than `within`.
+    /// Returns the closest point of a node, edge or face (1, 2 or 3 corners); `None` if it is further outside than
+    /// `within`.
     pub(crate) fn closest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
         let count = corners.len();
-        let part = 1.0 / count as f32;
-        let middle = corners.iter().sum::<Vec3>() * part;
+        let weight = 1.0 / count as f32;
+        let middle = corners.iter().sum::<Vec3>() * weight;
         let radius = corners
             .iter()
             .fold(0.0_f32, |radius, corner| radius.max(corner.distance(middle)));
         let reach = within + radius;
-        let apart = (self.bounds.min - middle).max(middle - self.bounds.max).max(Vec3::ZERO);
-        if apart.length_squared() > reach * reach * 1.000_01 {
+        let offset = (self.bounds.min - middle).max(middle - self.bounds.max).max(Vec3::ZERO);
+        if offset.length_squared() > reach * reach * 1.000_01 {
             return None;
         }
-        // Interpolated distances are off by a part of a cell.
+        // Interpolated distances have an error of less than a cell.
         if self.distance(middle) > reach + self.cell {
             return None;
         }
@@ -145,104 +151,108 @@ impl DistanceField {
             .zip(weights)
             .map(|(corner, weight)| *corner * weight)
             .sum();
-        let (distance, slope) = self.measure(point);
+        let (distance, gradient) = self.measure(point);
         if !(distance <= within) {
             return None;
         }
         Some(Closest {
             weights,
             distance,
-            normal: slope.normalize_or(Vec3::Y),
+            normal: gradient.normalize_or(Vec3::Y),
             inside: weights[..count].iter().all(|&weight| weight > BORDER),
         })
     }
 
-    /// The signed distance of a point, m.
+    /// Returns the signed distance of a point, m.
     pub fn distance(&self, point: Vec3) -> f32 {
         self.measure(point).0
     }
 
-    /// The signed distance of a point, and how it grows there.
+    /// Returns the signed distance of a point and its gradient.
     pub fn measure(&self, point: Vec3) -> (f32, Vec3) {
         let last = self.low + (self.counts - 1).as_vec3() * self.cell;
         let inside = point.clamp(self.low, last);
-        let (distance, slope) = self.interpolate(inside);
+        let (distance, gradient) = self.interpolate(inside);
         if inside == point {
-            return (distance, slope);
+            return (distance, gradient);
         }
-        // Beyond the grid: from what is closest to where the grid ends.
-        let offset = point - (inside - slope.normalize_or_zero() * distance);
+        // Beyond the grid: the distance from the surface point closest to the grid's border.
+        let offset = point - (inside - gradient.normalize_or_zero() * distance);
         (offset.length(), offset)
     }
 
     fn interpolate(&self, point: Vec3) -> (f32, Vec3) {
-        let place = (point - self.low) / self.cell;
-        let first = place.floor().max(Vec3::ZERO).as_uvec3().min(self.counts - 2);
-        let part = place - first.as_vec3();
+        let position = (point - self.low) / self.cell;
+        let first = position.floor().max(Vec3::ZERO).as_uvec3().min(self.counts - 2);
+        let fraction = position - first.as_vec3();
         let row = self.counts.x as usize;
         let layer = row * self.counts.y as usize;
         let start = first.z as usize * layer + first.y as usize * row + first.x as usize;
         let at = |offset: usize| self.distances[start + offset];
-        let mix = |a: f32, b: f32, part: f32| a + (b - a) * part;
-        let along = |offset: usize| (mix(at(offset), at(offset + 1), part.x), at(offset + 1) - at(offset));
+        let mix = |a: f32, b: f32, fraction: f32| a + (b - a) * fraction;
+        let along = |offset: usize| (mix(at(offset), at(offset + 1), fraction.x), at(offset + 1) - at(offset));
         let (near, far) = ([along(0), along(row)], [along(layer), along(layer + row)]);
-        let plane = |[a, b]: [(f32, f32); 2]| (mix(a.0, b.0, part.y), mix(a.1, b.1, part.y), b.0 - a.0);
+        let plane = |[a, b]: [(f32, f32); 2]| (mix(a.0, b.0, fraction.y), mix(a.1, b.1, fraction.y), b.0 - a.0);
         let (near, far) = (plane(near), plane(far));
-        let slope = Vec3::new(mix(near.1, far.1, part.z), mix(near.2, far.2, part.z), far.0 - near.0);
-        (mix(near.0, far.0, part.z), slope / self.cell)
+        let gradient = Vec3::new(
+            mix(near.1, far.1, fraction.z),
+            mix(near.2, far.2, fraction.z),
+            far.0 - near.0,
+        );
+        (mix(near.0, far.0, fraction.z), gradient / self.cell)
     }
 
-    /// Where an edge is closest: the least of points a cell apart, and then the way of halves about it.
+    /// Returns the closest point of an edge: the least of samples a cell apart, refined by halving the step.
     fn least_of_edge(&self, [a, b]: [Vec3; 2]) -> [f32; 3] {
-        let stretches = ((a.distance(b) / self.cell).ceil() as u32).clamp(2, STRETCHES);
-        let mut width = 1.0 / stretches as f32;
+        let interval_count = ((a.distance(b) / self.cell).ceil() as u32).clamp(2, MAX_INTERVALS);
+        let mut width = 1.0 / interval_count as f32;
         let mut best = (f32::INFINITY, 0.0);
-        let look = |along: f32, best: &mut (f32, f32)| {
+        let consider = |along: f32, best: &mut (f32, f32)| {
             let here = self.distance(a.lerp(b, along));
             if here < best.0 {
                 *best = (here, along);
             }
         };
-        for index in 0..=stretches {
-            look(index as f32 * width, &mut best);
+        for index in 0..=interval_count {
+            consider(index as f32 * width, &mut best);
         }
         for _ in 0..HALVINGS {
             width *= 0.5;
-            let centre = best.1;
-            look((centre - width).max(0.0), &mut best);
-            look((centre + width).min(1.0), &mut best);
+            let center = best.1;
+            consider((center - width).max(0.0), &mut best);
+            consider((center + width).min(1.0), &mut best);
         }
         [1.0 - best.1, best.1, 0.0]
     }
 
-    /// The same over a face, towards and away from each corner.
+    /// As [`DistanceField::least_of_edge`], over a face, with steps toward and away from each corner.
     fn least_of_face(&self, corners: [Vec3; 3]) -> [f32; 3] {
         let [a, b, c] = corners;
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        let stretches = ((longest / self.cell).ceil() as u32).clamp(3, STRETCHES_OF_A_SIDE);
-        let mut width = 1.0 / stretches as f32;
+        let interval_count = ((longest / self.cell).ceil() as u32).clamp(3, MAX_INTERVALS_OF_SIDE);
+        let mut width = 1.0 / interval_count as f32;
         let mut best = (f32::INFINITY, [1.0, 0.0, 0.0]);
-        let look = |weights: [f32; 3], best: &mut (f32, [f32; 3])| {
+        let consider = |weights: [f32; 3], best: &mut (f32, [f32; 3])| {
             let here = self.distance(a * weights[0] + b * weights[1] + c * weights[2]);
             if here < best.0 {
                 *best = (here, weights);
             }
         };
-        for i in 0..=stretches {
-            for j in 0..=stretches - i {
+        for i in 0..=interval_count {
+            for j in 0..=interval_count - i {
                 let (u, v) = (i as f32 * width, j as f32 * width);
-                look([(1.0 - u - v).max(0.0), u, v], &mut best);
+                consider([(1.0 - u - v).max(0.0), u, v], &mut best);
             }
         }
         for _ in 0..HALVINGS {
             width *= 0.5;
-            let centre = best.1;
+            let center = best.1;
             for (from, to) in [(0, 1), (1, 2), (2, 0), (1, 0), (2, 1), (0, 2)] {
-                let step = width.min(centre[from]);
-                let mut weights = centre;
+                let step = width.min(center[from]);
+                let mut weights = center;
                 weights[from] -= step;
                 weights[to] += step;
-                look(weights, &mut best);
+                consider(weights, &mut best);
             }
         }
         best.1
@@ -255,7 +265,7 @@ mod tests {
     use crate::contact::exact::tests::{cube, sphere};
     use crate::random::Random;
 
-    /// The largest error against EXACT of points outside of a sphere of 0.05 m, at most 5 mm away.
+    /// Returns the largest error against EXACT for points up to 5 mm outside a sphere of 0.05 m.
     fn error(cell: f32) -> f64 {
         let solid = ExactSolid::new(&sphere(96)).expect("a solid");
         let field = DistanceField::of(&solid, cell).expect("a field");
@@ -264,9 +274,13 @@ mod tests {
         for _ in 0..2000 {
             let point = random.vector().normalize_or(Vec3::X) * (0.05 + 0.005 * random.unit());
             let (exact, normal) = solid.measure(point, f32::INFINITY).expect("a distance");
-            let told = field.closest(&[point], 0.1).expect("a distance");
-            largest = largest.max(f64::from(told.distance - exact).abs());
-            assert!(told.normal.dot(normal) > 0.98, "{point}: {} for {normal}", told.normal);
+            let result = field.closest(&[point], 0.1).expect("a distance");
+            largest = largest.max(f64::from(result.distance - exact).abs());
+            assert!(
+                result.normal.dot(normal) > 0.98,
+                "{point}: {} for {normal}",
+                result.normal
+            );
         }
         largest
     }
@@ -320,7 +334,7 @@ mod tests {
             }
         }
         assert!(found > 300, "{found}");
-        // Far from the grid distances are exact but for what was sampled at its end.
+        // Far from the grid, distances are exact up to the error at its border.
         let far = field.closest(&[Vec3::new(0.3, 0.0, 0.0)], 0.5).expect("within 0.5 m");
         assert!((far.distance - 0.26).abs() < cell && far.normal.x > 0.99);
         assert!(field.closest(&[Vec3::new(0.3, 0.0, 0.0)], 0.2).is_none());

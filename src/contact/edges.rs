@@ -1,4 +1,5 @@
-//! Which triangles' corners the edges of a surface that changes join: found and counted, so that a change costs what it changes.
+//! The edges of a surface that changes, with the number of triangles at each. A change takes time in proportion to its
+//! size.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, DefaultHasher};
@@ -8,22 +9,22 @@ use crate::base::{Result, memory};
 use crate::codec::{Reader, Saved, Writer, shape_of_name};
 use crate::mesh;
 
-/// How many triangles have each edge of a surface.
+/// The number of triangles at each edge of a surface.
 #[derive(Debug)]
 pub(super) struct EdgeUses {
-    /// Where the edges of each lower corner begin among those that the surface had at first, which are in order.
+    /// Start of each lower corner's edges among the original edges, which are sorted.
     starts: Vec<u32>,
-    /// How many triangles have each edge; [`MANY`] stays.
+    /// The number of triangles at each edge. At [`MANY`] the count is saturated and stays.
     counts: Vec<u8>,
-    /// The numbers of edges that came later, by their corners.
+    /// Indices of added edges, by their corners.
     added: HashMap<[u32; 2], u32, BuildHasherDefault<DefaultHasher>>,
-    /// The numbers of edges that are gone.
+    /// Indices of removed edges.
     holes: Vec<u32>,
 }
 
 const MANY: u8 = u8::MAX;
 
-/// Bytes of an edge that came later and its number.
+/// Bytes of an added edge and its index.
 const EDGE: usize = 12;
 
 impl Saved for EdgeUses {
@@ -42,14 +43,14 @@ impl Saved for EdgeUses {
         added.len().save(to);
         added.capacity().save(to);
         to.needs(added.capacity() * size_of::<([u32; 2], u32)>());
-        if let Some(place) = to.place(added.len() * EDGE) {
-            let (edges, _) = place.as_chunks_mut::<EDGE>();
+        if let Some(bytes) = to.buffer(added.len() * EDGE) {
+            let (edges, _) = bytes.as_chunks_mut::<EDGE>();
             for (edge, (&[low, high], &number)) in edges.iter_mut().zip(added) {
                 for (to, number) in edge.as_chunks_mut().0.iter_mut().zip([low, high, number]) {
                     *to = number.to_le_bytes();
                 }
             }
-            // In an order that says nothing of what came when.
+            // The bytes must not depend on the order of insertion.
             edges.sort_unstable();
         }
         holes.save(to);
@@ -57,10 +58,10 @@ impl Saved for EdgeUses {
 
     fn load(from: &mut Reader) -> Result<Self> {
         let (starts, counts) = (Saved::load(from)?, Saved::load(from)?);
-        let (count, room) = (usize::load(from)?, usize::load(from)?);
-        from.will_take(room.max(count).checked_mul(size_of::<([u32; 2], u32)>()))?;
+        let (count, capacity) = (usize::load(from)?, usize::load(from)?);
+        from.reserve_memory(capacity.max(count).checked_mul(size_of::<([u32; 2], u32)>()))?;
         let mut added = HashMap::default();
-        added.try_reserve(room.max(count))?;
+        added.try_reserve(capacity.max(count))?;
         for _ in 0..count {
             let (ends, edge) = Saved::load(from)?;
             added.insert(ends, edge);
@@ -75,7 +76,7 @@ impl Saved for EdgeUses {
 }
 
 impl EdgeUses {
-    /// Of a surface with these edges, in order, and faces.
+    /// Counts the uses of these sorted edges by the faces.
     pub fn new(node_count: u32, edges: &[[u32; 2]], faces: &[[u32; 3]]) -> Result<Self> {
         let mut starts = memory::filled(0_u32, node_count as usize + 1)?;
         for &[low, _] in edges {
@@ -102,14 +103,14 @@ impl EdgeUses {
         Ok(uses)
     }
 
-    /// Makes room for so many edges that go and so many that come.
-    pub fn reserve(&mut self, going: usize, coming: usize) -> Result<()> {
-        self.counts.try_reserve(coming)?;
-        self.added.try_reserve(coming)?;
-        Ok(self.holes.try_reserve(going)?)
+    /// Reserves memory for removing `removed` and adding `inserted` edges.
+    pub fn reserve(&mut self, removed: usize, inserted: usize) -> Result<()> {
+        self.counts.try_reserve(inserted)?;
+        self.added.try_reserve(inserted)?;
+        Ok(self.holes.try_reserve(removed)?)
     }
 
-    /// A triangle with these corners has come: shows the numbers of edges that came with it.
+    /// Counts a new triangle with these corners. `new` receives the indices of its new edges.
     pub fn add(&mut self, face: [u32; 3], edges: &mut Vec<[u32; 2]>, mut new: impl FnMut(u32)) {
         for ends in ends_of(face) {
             if let Some(edge) = self.find(ends, edges) {
@@ -129,7 +130,7 @@ impl EdgeUses {
         }
     }
 
-    /// A triangle with these corners has gone, and with it edges that no other has.
+    /// Removes a triangle with these corners, and the edges that no other triangle has.
     pub fn remove(&mut self, face: [u32; 3], edges: &mut [[u32; 2]]) {
         for ends in ends_of(face) {
             let Some(edge) = self.find(ends, edges) else {
@@ -146,20 +147,20 @@ impl EdgeUses {
         }
     }
 
-    /// The number of the edge with these ends, the lower first.
+    /// The index of the edge with these ends, the lower end first.
     fn find(&self, ends: [u32; 2], edges: &[[u32; 2]]) -> Option<usize> {
         let low = ends[0] as usize;
         if low + 1 < self.starts.len() {
             let first = self.starts[low] as usize..self.starts[low + 1] as usize;
-            if let Some(place) = edges[first.clone()].iter().position(|edge| *edge == ends) {
-                return Some(first.start + place);
+            if let Some(position) = edges[first.clone()].iter().position(|edge| *edge == ends) {
+                return Some(first.start + position);
             }
         }
         self.added.get(&ends).map(|&edge| edge as usize)
     }
 }
 
-/// The ends of a triangle's edges that have a length, the lower first.
+/// The ends of a triangle's edges between distinct nodes, the lower end first.
 fn ends_of(face: [u32; 3]) -> impl Iterator<Item = [u32; 2]> {
     mesh::ends_of(face).into_iter().filter(|[a, b]| a != b)
 }

@@ -1,4 +1,4 @@
-//! The parts of a body that a tool can meet: its nodes, and the edges and faces of its surface.
+//! The features of a body that a tool can touch: its nodes, and the edges and faces of its surface.
 
 use glam::Vec3;
 
@@ -7,27 +7,28 @@ use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::mesh;
 
-/// What a tool can meet. The closest points of a tool and a triangle lie on one of these, so that each touch is found
-/// once, however many triangles share the node or edge.
+/// The nodes, edges and faces of a surface. The closest points of a tool and a triangle lie on one of these. So each
+/// contact is found once, however many triangles share the node or edge.
 #[derive(Debug)]
 pub(super) struct Features {
     pub node_count: u32,
-    /// One that is gone leaves a [`HOLE`] for another.
+    /// A removed edge leaves a [`HOLE`] that another edge may fill.
     edges: Vec<[u32; 2]>,
     faces: Vec<[u32; 3]>,
-    /// The longest edge of each edge and face of a sheet, m, as they were at first. Those of a closed surface, and those that are new since, have none.
+    /// Longest initial edge of each edge and face of a sheet, m. Infinite on a closed surface and for features that
+    /// were added later.
     edge_lengths: Vec<f32>,
     face_lengths: Vec<f32>,
-    /// For surfaces that change.
+    /// Allocated for surfaces that change.
     uses: Option<Box<EdgeUses>>,
 }
 
 saved! { Features { node_count, edges, faces, edge_lengths, face_lengths, uses } }
 
-/// The corners of an edge that is none.
+/// The corners of a removed edge.
 pub(super) const HOLE: [u32; 2] = [u32::MAX; 2];
 
-/// One node, edge or face.
+/// A node, edge or face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Feature {
     nodes: [u32; 3],
@@ -37,7 +38,7 @@ pub(super) struct Feature {
 saved! { Feature { nodes, count } }
 
 impl Feature {
-    /// Its nodes; the last is repeated.
+    /// The nodes as three values; the last node is repeated.
     pub fn three_nodes(&self) -> [u32; 3] {
         let nodes = self.nodes();
         [0, 1, 2].map(|corner| nodes[corner.min(nodes.len() - 1)])
@@ -54,7 +55,8 @@ impl Feature {
         &self.nodes[..self.count as usize]
     }
 
-    /// That part of it whose corners have weight: a smaller feature where it is met at its border.
+    /// The feature of the corners with positive weights. A contact at the border of a feature belongs to that smaller
+    /// feature.
     pub fn part(&self, weights: [f64; 3]) -> Self {
         let mut part = Self {
             nodes: [0; 3],
@@ -74,10 +76,10 @@ impl Feature {
 }
 
 impl Features {
-    /// Of a surface of nodes that are where `position` tells.
+    /// Creates the features of a surface. `position` returns the position of a node.
     pub fn new(node_count: usize, surface: &[[u32; 3]], position: impl Fn(usize) -> Vec3) -> Result<Self> {
         let edges = mesh::edges(surface, &[])?;
-        // Each edge of a closed surface has two faces.
+        // Each edge of a closed surface belongs to two faces.
         let is_closed = 2 * edges.len() == 3 * surface.len();
         let length = |a: u32, b: u32| {
             if is_closed {
@@ -99,8 +101,8 @@ impl Features {
         })
     }
 
-    /// The longest edge of feature number `index` as it was at first, m; 0 of a node, infinite where it is not known or the surface is closed: a tool
-    /// that presses into a solid by little is told by how its faces lie between nodes.
+    /// Longest initial edge of the feature with this index, m; 0 for a node. Infinite if it is unknown or the surface
+    /// is closed: faces of a solid must resolve even a slight indentation between nodes.
     pub fn length(&self, index: u32) -> f32 {
         let Some(edge) = index.checked_sub(self.node_count) else {
             return 0.0;
@@ -112,22 +114,22 @@ impl Features {
         length.copied().unwrap_or(f32::INFINITY)
     }
 
-    /// How many there are: nodes, then edges, then faces.
+    /// The number of nodes, edges and faces. Their indices follow in this order.
     pub fn count(&self) -> usize {
         self.node_count as usize + self.edges.len() + self.faces.len()
     }
 
-    /// The edges that there are.
+    /// The existing edges.
     pub fn edges(&self) -> impl Iterator<Item = [u32; 2]> {
         self.edges.iter().copied().filter(|&edge| edge != HOLE)
     }
 
-    /// How many are nodes, edges and faces.
+    /// The numbers of nodes, edges and faces.
     pub fn counts(&self) -> [u32; 3] {
         [self.node_count, self.edges.len() as u32, self.faces.len() as u32]
     }
 
-    /// Feature number `index`; `None` where that is none now.
+    /// The feature with this index. `None` for a removed edge.
     #[inline]
     pub fn get(&self, index: u32) -> Option<Feature> {
         let Some(edge) = index.checked_sub(self.node_count) else {
@@ -146,7 +148,7 @@ impl Features {
         }
     }
 
-    /// Makes room for a surface of which so many triangles change and to which so many are added.
+    /// Reserves memory for a change of `changed` triangles and the addition of `added` triangles.
     pub fn reserve(&mut self, changed: usize, added: usize) -> Result<()> {
         let uses = match &mut self.uses {
             Some(uses) => uses,
@@ -161,8 +163,8 @@ impl Features {
         Ok(self.faces.try_reserve(added)?)
     }
 
-    /// Makes triangle number `index` one with these corners, or adds it behind the last, where there is room: shows which edges are new, by
-    /// their numbers among edges. What the surface does not have any more is dropped by [`Self::drop_edges_of`].
+    /// Sets the corners of triangle `index`, or appends the triangle. The memory is reserved. `new` receives the index
+    /// of each new edge among the edges. [`Self::drop_edges_of`] removes edges that the surface has lost.
     pub fn set_face(&mut self, index: usize, corners: [u32; 3], mut new: impl FnMut(u32)) {
         if let Some(length) = self.face_lengths.get_mut(index) {
             *length = f32::INFINITY;
@@ -187,7 +189,7 @@ impl Features {
         self.faces[index]
     }
 
-    /// A triangle with these corners is not part of the surface any more.
+    /// Removes a triangle with these corners from the counts of its edges.
     pub fn drop_edges_of(&mut self, corners: [u32; 3]) {
         if let Some(uses) = &mut self.uses {
             uses.remove(corners, &mut self.edges);
@@ -200,7 +202,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// All edges and faces, in some order.
+    /// All edges and faces, sorted.
     fn all(features: &Features) -> Vec<Feature> {
         let mut all: Vec<Feature> = (0..features.count() as u32)
             .filter_map(|index| features.get(index))
@@ -209,7 +211,7 @@ mod tests {
         all
     }
 
-    /// After any changes the features are those of the surface as it is, each once.
+    /// After any changes, the features equal those of the current surface, each once.
     #[test]
     fn a_changed_surface_has_its_features() {
         let mut random = Random(7);
@@ -224,9 +226,9 @@ mod tests {
             let edges = features.edges.clone();
             features.reserve(1, added.iter().count()).expect("memory");
             let mut new = Vec::new();
-            let gone = features.face(index);
+            let removed = features.face(index);
             features.set_face(index, corners, |edge| new.push(edge));
-            features.drop_edges_of(gone);
+            features.drop_edges_of(removed);
             surface[index] = corners;
             if let Some(corners) = added {
                 features.set_face(surface.len(), corners, |edge| new.push(edge));
@@ -239,7 +241,7 @@ mod tests {
                 assert!(!is_new || new.contains(&number), "{round}: {edge:?}");
             }
         }
-        // Numbers are used again.
+        // Indices of removed edges are reused.
         assert!(features.edges.len() < 3 * surface.len(), "{}", features.edges.len());
     }
 }

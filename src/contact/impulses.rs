@@ -1,84 +1,85 @@
-//! What contacts with tools and contacts of tissue share: impulses, one contact after another, until they change no more.
+//! Iteration control of projected Gauss-Seidel, shared by contacts with tools and contacts of tissue.
 
-/// Sweeps over all contacts, at most: so many that tissue comes to rest.
+/// Maximum number of sweeps; enough for tissue to come to rest.
 pub(super) const SWEEPS: u32 = 128;
 
-/// What a sweep changes is nothing, as a part of what the first one did.
-const CONVERGED: f32 = 1e-5;
+/// Convergence tolerance: change of a sweep relative to that of the first.
+const TOLERANCE: f32 = 1e-5;
 
-/// The part of how deep something began inside that it is moved out by in a substep, at most.
-pub(super) const PUSHED_OUT: f32 = 0.2;
+/// Maximum fraction of the initial penetration depth that a substep corrects.
+pub(super) const MAX_DEPTH_CORRECTION: f32 = 0.2;
 
-/// s: in substeps so short that this is longer than a fifth of it, what is inside is moved out with a speed of its depth over this time. A part of the
-/// depth in each would be the faster the shorter they are, and viscous tissue would ask for ever shorter ones.
-const PUSH_TIME: f32 = 1e-3;
+/// Time constant of the depth correction, s. A substep shorter than a fifth of it corrects depth at a speed of the
+/// depth over this time. A fixed fraction per substep would be faster the shorter the substep, and viscous tissue would
+/// then require ever shorter substeps.
+const DEPTH_CORRECTION_TIME: f32 = 1e-3;
 
-/// The part of how deep something began inside a tool that it is moved out by in a substep of so many seconds.
-pub(super) fn pushed_out(substep: f32) -> f32 {
-    (substep / PUSH_TIME).min(PUSHED_OUT)
+/// The fraction of the initial penetration depth that a substep of this many seconds corrects.
+pub(super) fn depth_correction(substep: f32) -> f32 {
+    (substep / DEPTH_CORRECTION_TIME).min(MAX_DEPTH_CORRECTION)
 }
 
-/// How much faster than the contact any of its nodes moves for it, at most. Only a contact close to pinned nodes would
-/// need more, and cannot be had: where nothing gives way, the tool goes in.
+/// Maximum ratio of a node's velocity change to that of its contact. Only contacts close to pinned nodes would exceed
+/// it. There the tool penetrates instead.
 pub(crate) const LEVERAGE: f32 = 4.0;
 
-/// Between two sweeps over all contacts so many go over those that press: what does not press seldom begins to.
-const BETWEEN: u32 = 3;
+/// Number of sweeps over pressing contacts between two sweeps over all. A contact that does not press seldom begins to.
+const PRESSING_SWEEPS: u32 = 3;
 
-/// Sweeps are slow where one over all changes this part of what the last such did, once that is little, as a part of what the first one did. Contacts
-/// that share what they give do so for long, and hardly move anything.
-const SLOW: f32 = 0.9;
-const LITTLE: f32 = 0.01;
+/// Convergence is slow if the change of a full sweep exceeds `STALL_RATIO` times that of the last full sweep and is
+/// below `STALL_LEVEL` times that of the first. Redundant contacts converge slowly and hardly move anything.
+const STALL_RATIO: f32 = 0.9;
+const STALL_LEVEL: f32 = 0.01;
 
-/// What a sweep goes over.
+/// The contacts that a sweep visits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sweep {
+pub(crate) enum PgsPass {
     All,
-    /// Contacts that have given something.
+    /// Only contacts with an impulse.
     Pressing,
 }
 
-/// How long sweeps go on.
+/// Termination criteria of the sweeps.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Effort {
-    /// So many at most.
+pub(crate) struct PgsLimits {
+    /// Maximum number of sweeps.
     pub sweeps: u32,
-    /// What a sweep changes is nothing, as a part of what the first one did.
-    pub converged: f32,
-    /// Whether what sweeps change slowly is left to the next substep, which begins with what they gave.
-    pub goes_on_later: bool,
+    /// Convergence tolerance: change of a sweep relative to that of the first.
+    pub tolerance: f32,
+    /// True if slow convergence ends the sweeps. The next substep is warm-started from their impulses.
+    pub defers_slow_tail: bool,
 }
 
-impl Effort {
-    /// So many at most, until they change as little as rounding leaves of slow tissue.
-    pub fn of(sweeps: u32) -> Self {
+impl PgsLimits {
+    /// At most `sweeps` sweeps, until the change is as small as rounding errors of slow tissue.
+    pub fn new(sweeps: u32) -> Self {
         Self {
             sweeps,
-            converged: CONVERGED,
-            goes_on_later: false,
+            tolerance: TOLERANCE,
+            defers_slow_tail: false,
         }
     }
 }
 
-/// Sweeps until one over all changes velocities by next to nothing beside `first`, m/s, or else beside what the first of them does: the
-/// most that it changed.
-pub(crate) fn relax(effort: Effort, first: Option<f32>, mut sweep: impl FnMut(Sweep) -> f32) -> f32 {
+/// Sweeps until a full sweep changes velocities by a negligible fraction of `first`, m/s, or of the first sweep's
+/// change if that is `None`. Returns that reference change.
+pub(crate) fn relax(limits: PgsLimits, first: Option<f32>, mut sweep: impl FnMut(PgsPass) -> f32) -> f32 {
     let mut first = first;
-    let mut left = effort.sweeps;
-    let mut before = f32::INFINITY;
-    while left > 0 {
-        left -= 1;
-        let largest = sweep(Sweep::All);
-        let first = *first.get_or_insert(largest);
-        let still = effort.converged * first;
-        let is_slow = largest > SLOW * before && largest < LITTLE * first;
-        if !(largest > still) || effort.goes_on_later && is_slow {
+    let mut sweeps_left = limits.sweeps;
+    let mut last = f32::INFINITY;
+    while sweeps_left > 0 {
+        sweeps_left -= 1;
+        let change = sweep(PgsPass::All);
+        let first = *first.get_or_insert(change);
+        let negligible = limits.tolerance * first;
+        let is_slow = change > STALL_RATIO * last && change < STALL_LEVEL * first;
+        if !(change > negligible) || limits.defers_slow_tail && is_slow {
             break;
         }
-        before = largest;
-        for _ in 0..BETWEEN.min(left) {
-            left -= 1;
-            if !(sweep(Sweep::Pressing) > still) {
+        last = change;
+        for _ in 0..PRESSING_SWEEPS.min(sweeps_left) {
+            sweeps_left -= 1;
+            if !(sweep(PgsPass::Pressing) > negligible) {
                 break;
             }
         }

@@ -1,84 +1,96 @@
 //! Contacts of single nodes with tools.
 //!
-//! A tool is kinematic, so what it gives to a node depends on no other node: the impulse with Coulomb friction has a closed form, and where
-//! several tools meet a node, a few iterations over their contacts alone find it.
+//! The impulse of a kinematic tool on a node depends on no other node. With Coulomb friction it has a closed form. If
+//! several tools touch a node, a few iterations over the node's contacts find the impulses.
 
 use glam::{BVec3, Vec3, Vec3A};
 
+use super::contact_geometry::{
+    ContactGeometry, mesh_contact, mesh_geometry, plane_contact, rounded_contact, rounded_geometry,
+};
+use super::contact_input::{ContactInput, SubSlice};
 use super::distance::closest_on_segment;
 use super::features::Feature;
-use super::impulses::{Effort, LEVERAGE, Sweep, pushed_out, relax};
-use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded, mesh_geometry, round_geometry};
-use super::meeting::{Meeting, Slice};
+use super::impulses::{LEVERAGE, PgsLimits, PgsPass, depth_correction, relax};
 use super::mesh_solid::MeshSolid;
 use super::nearest_plane::NearestPlane;
-use super::path::{Motion, Solid};
-use super::sweep::{Corners, Segment, Separation, TOUCHING};
+use super::path::{PosedShape, ToolMotion};
+use super::time_of_impact::{Corners, Segment, Separation, TOUCHING};
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::soa::Vectors;
 
-/// What finds the contacts of nodes with a tool in a slice: what is the same for all of them.
-pub(super) struct NodeLook<'a> {
-    motion: &'a Motion<'a>,
-    /// The tool's place in the world.
+/// Finds contacts of nodes with one tool in a slice. It stores the data that all nodes share.
+pub(super) struct NodeQuery<'a> {
+    motion: &'a ToolMotion<'a>,
+    /// The tool's slot in the world.
     pub slot: usize,
-    /// The segment of a round tool, and the radius at which it is met.
+    /// The segment of a rounded tool, and its radius with the contact thickness.
     pub segment: Segment,
-    pub around: f32,
-    /// How much nearer a node and the tool may come, m.
+    pub contact_radius: f32,
+    /// Bound on the approach of a node and the tool, m.
     pub closing: f32,
 }
 
-impl<'a> NodeLook<'a> {
-    pub fn new(meeting: &Meeting, slice: &Slice, motion: &'a Motion<'a>, slot: usize) -> Self {
-        let segment = motion.segment(meeting.drifts);
+impl<'a> NodeQuery<'a> {
+    pub fn new(input: &ContactInput, slice: &SubSlice, motion: &'a ToolMotion<'a>, slot: usize) -> Self {
+        let segment = motion.segment(input.drifts);
         let travel = match (motion.from, motion.to) {
-            (Solid::Rounded { .. }, _) => segment.travel(),
-            (Solid::HalfSpace { point: from, .. }, Solid::HalfSpace { point: to, .. }) if motion.spin == Vec3::ZERO => {
+            (PosedShape::Rounded { .. }, _) => segment.travel(),
+            (PosedShape::HalfSpace { point: from, .. }, PosedShape::HalfSpace { point: to, .. })
+                if motion.spin == Vec3::ZERO =>
+            {
                 from.distance(to)
             }
-            (Solid::Mesh(from), Solid::Mesh(to)) => {
+            (PosedShape::Mesh(from), PosedShape::Mesh(to)) => {
                 let reach = motion.mesh.map_or(0.0, |solid| solid.reach());
-                from.centre.distance(to.centre) + motion.spin.length() * slice.duration * reach
+                from.center.distance(to.center) + motion.spin.length() * slice.duration * reach
             }
             _ => f32::INFINITY,
         };
         Self {
             motion,
             slot,
-            around: segment.radius + meeting.thickness,
+            contact_radius: segment.radius + input.thickness,
             segment,
-            closing: meeting.fastest * slice.duration + 2.0 * travel + meeting.slack,
+            closing: input.fastest * slice.duration + 2.0 * travel + input.slack,
         }
     }
 
-    /// How a node meets the tool. `plane` is how it saw a mesh last.
+    /// The contact of a node with the tool. `plane` is the last plane of a mesh for this node.
     #[inline]
-    pub fn meet(
+    pub fn contact(
         &self,
-        meeting: &Meeting,
-        slice: &Slice,
+        input: &ContactInput,
+        slice: &SubSlice,
         node: usize,
         plane: Option<&mut NearestPlane>,
     ) -> Option<ContactGeometry> {
-        let start = meeting.position(slice, node);
+        let start = input.position(slice, node);
         match self.motion.from {
-            Solid::Rounded { .. } => self.meet_rounded(meeting, slice, node, start),
-            Solid::HalfSpace { point, normal } => {
-                let is_near = (start - point).dot(normal) <= meeting.thickness + self.closing;
-                is_near.then(|| meet_plane(meeting, slice, self.motion, node)).flatten()
+            PosedShape::Rounded { .. } => self.rounded_contact(input, slice, node, start),
+            PosedShape::HalfSpace { point, normal } => {
+                let is_near = (start - point).dot(normal) <= input.thickness + self.closing;
+                is_near
+                    .then(|| plane_contact(input, slice, self.motion, node))
+                    .flatten()
             }
-            Solid::Mesh(_) => self.meet_mesh(meeting, slice, (node, start), plane),
+            PosedShape::Mesh(_) => self.mesh_contact(input, slice, (node, start), plane),
         }
     }
 
     #[inline]
-    fn meet_rounded(&self, meeting: &Meeting, slice: &Slice, node: usize, start: Vec3) -> Option<ContactGeometry> {
+    fn rounded_contact(
+        &self,
+        input: &ContactInput,
+        slice: &SubSlice,
+        node: usize,
+        start: Vec3,
+    ) -> Option<ContactGeometry> {
         let [a, b] = self.segment.ends;
         let along = closest_on_segment(start.into(), a, b);
         let offset = Vec3A::from(start) - a.lerp(b, along);
-        let touching = self.around + TOUCHING * self.around;
+        let touching = self.contact_radius + TOUCHING * self.contact_radius;
         let distance_squared = offset.length_squared();
         if distance_squared > (touching + self.closing) * (touching + self.closing) {
             return None;
@@ -90,81 +102,77 @@ impl<'a> NodeLook<'a> {
                 along,
                 inside: true,
             };
-            return Some(round_geometry(
-                meeting,
+            return Some(rounded_geometry(
+                input,
                 slice,
                 self.motion,
                 &self.segment,
                 (&separation, start),
             ));
         }
-        let (start, step) = meeting.way(slice, node);
-        meet_rounded(
-            meeting,
-            slice,
-            self.motion,
-            &Corners::of_node(start, step),
-            &self.segment,
-        )
+        let (start, step) = input.corner_motion(slice, node);
+        rounded_contact(input, slice, self.motion, &Corners::of_node(start, step), &self.segment)
     }
 
-    /// A mesh is seen as flat by what moves no further, m.
+    /// Distance of motion within which a mesh is treated as flat, m.
     pub fn flat(&self) -> f32 {
         self.motion.mesh.map_or(0.0, MeshSolid::flat)
     }
 
-    /// Makes the plane through the mesh's closest point one of where the node is, unless it still serves or the node cannot come near.
-    fn refresh(&self, meeting: &Meeting, start: Vec3, plane: &mut NearestPlane) {
-        let (Solid::Mesh(from), Some(solid)) = (self.motion.from, self.motion.mesh) else {
+    /// Recomputes the plane through the mesh's closest point, unless it is still valid or the node cannot come near.
+    fn refresh(&self, input: &ContactInput, start: Vec3, plane: &mut NearestPlane) {
+        let (PosedShape::Mesh(from), Some(solid)) = (self.motion.from, self.motion.mesh) else {
             return;
         };
-        let own = from.own(start);
-        let (flat, near) = (solid.flat(), meeting.thickness + self.closing);
-        if plane.serves(self.slot, own, [flat, near]) {
+        let local = from.body_to_local(start);
+        let (flat, near) = (solid.flat(), input.thickness + self.closing);
+        if plane.is_valid_at(self.slot, local, [flat, near]) {
             return;
         }
-        *plane = NearestPlane::beyond(self.slot, own, near + flat);
-        if let Some(closest) = solid.closest(&[own], plane.distance, false) {
+        *plane = NearestPlane::farther_than(self.slot, local, near + flat);
+        if let Some(closest) = solid.closest(&[local], plane.distance, false) {
             (plane.distance, plane.normal) = (closest.distance, closest.normal);
         }
     }
 
-    /// A mesh is the plane through its closest point, as long as the node has not moved far against it.
-    fn meet_mesh(
+    /// The contact with a mesh. The plane through the closest point replaces the mesh until the node has moved far
+    /// relative to it.
+    fn mesh_contact(
         &self,
-        meeting: &Meeting,
-        slice: &Slice,
+        input: &ContactInput,
+        slice: &SubSlice,
         (node, start): (usize, Vec3),
         plane: Option<&mut NearestPlane>,
     ) -> Option<ContactGeometry> {
-        let (Solid::Mesh(from), Solid::Mesh(to), Some(solid)) = (self.motion.from, self.motion.to, self.motion.mesh)
+        let (PosedShape::Mesh(from), PosedShape::Mesh(to), Some(solid)) =
+            (self.motion.from, self.motion.to, self.motion.mesh)
         else {
             return None;
         };
-        let mut unknown = NearestPlane::NONE;
-        let plane = plane.unwrap_or(&mut unknown);
-        self.refresh(meeting, start, plane);
+        let mut no_plane = NearestPlane::NONE;
+        let plane = plane.unwrap_or(&mut no_plane);
+        self.refresh(input, start, plane);
         if plane.normal == Vec3::ZERO || plane.slot as usize != self.slot {
             return None;
         }
-        let (own, flat, near) = (from.own(start), self.flat(), meeting.thickness + self.closing);
-        let distance = plane.distance + plane.normal.dot(own - plane.point);
+        let (local, flat, near) = (from.body_to_local(start), self.flat(), input.thickness + self.closing);
+        let distance = plane.distance + plane.normal.dot(local - plane.point);
         if distance > near {
             return None;
         }
-        let (start, step) = meeting.way(slice, node);
-        if meeting.drifts && to.own(start + step).distance_squared(own) > flat * flat {
+        let (start, step) = input.corner_motion(slice, node);
+        if input.drifts && to.body_to_local(start + step).distance_squared(local) > flat * flat {
             let corners = Corners::of_node(start, step);
             let feature = Feature::node(node as u32);
-            return meet_mesh(meeting, slice, self.motion, (feature, &corners), [&from, &to], None);
+            return mesh_contact(input, slice, self.motion, (feature, &corners), [&from, &to], None);
         }
-        if !meeting.drifts && distance > meeting.thickness + TOUCHING * solid.thickness() {
+        if !input.drifts && distance > input.thickness + TOUCHING * solid.thickness() {
             return None;
         }
-        let (surface, normal) = (own - plane.normal * distance, from.orientation * plane.normal);
+        let (surface, normal) = (local - plane.normal * distance, from.orientation * plane.normal);
         let weights = [1.0, 0.0, 0.0];
-        let found = (surface, normal, distance, weights);
-        Some(mesh_geometry(meeting, slice, self.motion, [&from, &to], found))
+        let geometry = (surface, normal, distance, weights);
+        Some(mesh_geometry(input, slice, self.motion, [&from, &to], geometry))
     }
 }
 
@@ -172,160 +180,160 @@ impl<'a> NodeLook<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NodeContact {
     pub node: u32,
-    /// The tool's place among those near the body.
+    /// Index of the tool among those near the body.
     pub tool: usize,
-    /// Where the node is as the slice begins.
+    /// Position of the node when the slice begins.
     pub start: Vec3,
-    /// Away from the tool, of unit length.
+    /// Unit normal, away from the tool.
     pub normal: Vec3,
     /// Velocity of the tool's surface at the contact, m/s.
     surface_velocity: Vec3,
-    /// From the tool's position to the contact, m.
+    /// Vector from the tool's position to the contact, m.
     pub arm: Vec3,
-    /// How deep the node is inside at the start, m; not above 0 where it is outside.
+    /// Penetration depth at the start, m; not positive outside.
     pub depth: f32,
     pub friction: f32,
-    /// The node's velocity along the normal is at least this, m/s: then it ends the slice outside of the tool.
-    least_speed: f32,
-    /// Change of velocity along each axis for an impulse, 1/kg; 0 along held axes.
-    answer: Vec3,
-    /// Mass that an impulse along the normal moves, kg; less where the node is held along axes near the normal.
+    /// Minimum velocity along the normal with which the node ends the slice outside the tool, m/s.
+    target_velocity: f32,
+    /// Velocity change along each axis per impulse, 1/kg; 0 along held axes.
+    inv_mass: Vec3,
+    /// Effective mass along the normal, kg. It is smaller if the node is held along axes near the normal.
     effective_mass: f32,
-    /// Mass that an impulse along a free direction moves, kg.
-    free_mass: f32,
-    /// By what part of itself the impulse is taken back in an iteration: above 0 where the node is held near the normal.
-    give: f32,
-    /// What the node has received so far along the normal, N s, at least 0, and by friction.
+    /// Effective mass along a free direction, kg.
+    tangent_mass: f32,
+    /// Fraction of the impulse that is dropped in each iteration; positive if the node is held near the normal.
+    compliance: f32,
+    /// Accumulated normal impulse, at least 0, and accumulated friction impulse, N s.
     impulse: f32,
     friction_impulse: Vec3,
-    /// What of that its tool's load has, N s.
-    pub counted: Vec3,
+    /// The impulse that the tool's load already includes, N s.
+    pub counted_impulse: Vec3,
 }
 
 saved! { NodeContact {
-    node, tool, start, normal, surface_velocity, arm, depth, friction, least_speed, answer, effective_mass, free_mass,
-    give, impulse, friction_impulse, counted,
+    node, tool, start, normal, surface_velocity, arm, depth, friction, target_velocity, inv_mass, effective_mass,
+    tangent_mass, compliance, impulse, friction_impulse, counted_impulse,
 } }
 
 impl NodeContact {
-    /// A contact that has given nothing yet; `None` where the node cannot move along the normal.
+    /// Creates a contact without impulse. Returns `None` if the node cannot move along the normal.
     pub fn new(
-        meeting: &Meeting,
-        slice: &Slice,
+        input: &ContactInput,
+        slice: &SubSlice,
         (node, tool): (u32, usize),
         geometry: &ContactGeometry,
         friction: f32,
     ) -> Option<Self> {
-        let free = meeting.mobility.of(node as usize);
-        let held = meeting.pins.partial_axes_of(node);
+        let node_inv_mass = input.mobility.inverse_mass(node as usize);
+        let held = input.pins.partial_axes_of(node);
         let normal = geometry.normal;
-        let (mut along, mut answer) = (1.0, Vec3::splat(free));
+        let (mut normal_part, mut inv_mass) = (1.0, Vec3::splat(node_inv_mass));
         if held != BVec3::FALSE {
-            along = Vec3::select(held, Vec3::ZERO, normal).length_squared();
-            answer = Vec3::select(held, Vec3::ZERO, answer);
+            normal_part = Vec3::select(held, Vec3::ZERO, normal).length_squared();
+            inv_mass = Vec3::select(held, Vec3::ZERO, inv_mass);
         }
-        // The nearer the normal is to axes that the node is held along, the less is given, down to nothing.
-        let rigid = free * along;
-        let leverage = free / LEVERAGE;
-        let inverse_mass = leverage.max(rigid);
-        let gap = geometry.gap - meeting.thickness;
-        (rigid > 0.0).then(|| Self {
+        // The impulse fades to 0 as the normal turns toward axes along which the node is held.
+        let normal_inv_mass = node_inv_mass * normal_part;
+        let leverage = node_inv_mass / LEVERAGE;
+        let inverse_mass = leverage.max(normal_inv_mass);
+        let gap = geometry.gap - input.thickness;
+        (normal_inv_mass > 0.0).then(|| Self {
             node,
             tool,
-            start: meeting.position(slice, node as usize),
+            start: input.position(slice, node as usize),
             normal,
             surface_velocity: geometry.surface_velocity,
             arm: geometry.arm,
             depth: -gap,
             friction,
-            least_speed: geometry.surface_velocity.dot(normal) - gap.max(0.0) / slice.duration,
-            answer,
-            effective_mass: (rigid / leverage).min(1.0) / inverse_mass,
-            free_mass: 1.0 / free,
-            give: 1.0 - rigid / inverse_mass,
+            target_velocity: geometry.surface_velocity.dot(normal) - gap.max(0.0) / slice.duration,
+            inv_mass,
+            effective_mass: (normal_inv_mass / leverage).min(1.0) / inverse_mass,
+            tangent_mass: 1.0 / node_inv_mass,
+            compliance: 1.0 - normal_inv_mass / inverse_mass,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
-            counted: Vec3::ZERO,
+            counted_impulse: Vec3::ZERO,
         })
     }
 
-    /// How the node met the tool.
-    pub fn geometry(&self, meeting: &Meeting) -> ContactGeometry {
+    /// The geometry of the contact.
+    pub fn geometry(&self, input: &ContactInput) -> ContactGeometry {
         ContactGeometry {
             weights: [1.0, 0.0, 0.0],
             normal: self.normal,
             surface_velocity: self.surface_velocity,
             arm: self.arm,
-            gap: meeting.thickness - self.depth,
+            gap: input.thickness - self.depth,
             rounded: None,
         }
     }
 
-    /// What the node received, N s.
-    pub fn given(&self) -> Vec3 {
+    /// Total impulse on the node, N s.
+    pub fn total_impulse(&self) -> Vec3 {
         self.normal * self.impulse + self.friction_impulse
     }
 
-    /// Moves the node out of the tool by so much, m, without giving it speed.
-    pub fn push_out(&self, positions: &mut Vectors, way: f32) {
+    /// Moves the node out of the tool by `displacement`, m, without changing its velocity.
+    pub fn push_out(&self, positions: &mut Vectors, displacement: f32) {
         let node = self.node as usize;
-        let push = self.normal * (way * self.effective_mass) * self.answer;
+        let push = self.normal * (displacement * self.effective_mass) * self.inv_mass;
         positions.set(node, positions.get(node) + push);
     }
 
-    /// How much further the node is to go to end the slice of `duration` seconds outside of the tool, or less deep within it, m.
-    pub fn lacks(&self, positions: &Vectors, duration: f32) -> f32 {
-        let way = (positions.get(self.node as usize) - self.start).dot(self.normal);
-        self.least_speed * duration + pushed_out(duration) * self.depth.max(0.0) - way
+    /// Distance that the node still has to move to end the slice outside the tool, or less deep inside it, m.
+    pub fn missing_distance(&self, positions: &Vectors, duration: f32) -> f32 {
+        let displacement = (positions.get(self.node as usize) - self.start).dot(self.normal);
+        self.target_velocity * duration + depth_correction(duration) * self.depth.max(0.0) - displacement
     }
 
-    /// Gives the node's velocity what is missing, or takes back what was too much: how much that changed, m/s.
+    /// Updates the impulse and the node's velocity. Returns the change of velocity, m/s.
     #[inline]
-    fn press(&mut self, velocity: &mut Vec3) -> f32 {
-        let missing = self.least_speed - velocity.dot(self.normal);
-        let impulse = (self.impulse * (1.0 - self.give) + missing * self.effective_mass).max(0.0);
+    fn apply_impulse(&mut self, velocity: &mut Vec3) -> f32 {
+        let velocity_error = self.target_velocity - velocity.dot(self.normal);
+        let impulse = (self.impulse * (1.0 - self.compliance) + velocity_error * self.effective_mass).max(0.0);
         let change = impulse - self.impulse;
         self.impulse = impulse;
         if change == 0.0 && self.friction == 0.0 {
             return 0.0;
         }
-        let mut given = self.normal * change;
+        let mut applied = self.normal * change;
         if self.friction > 0.0 {
             let slip = (*velocity - self.surface_velocity).reject_from_normalized(self.normal);
-            let wanted = self.friction_impulse - slip * self.free_mass;
-            let friction = wanted.clamp_length_max(self.friction * impulse);
-            given += friction - self.friction_impulse;
+            let trial = self.friction_impulse - slip * self.tangent_mass;
+            let friction = trial.clamp_length_max(self.friction * impulse);
+            applied += friction - self.friction_impulse;
             self.friction_impulse = friction;
         }
-        *velocity += given * self.answer;
-        given.length() / self.free_mass
+        *velocity += applied * self.inv_mass;
+        applied.length() / self.tangent_mass
     }
 
-    /// Whether the node is to receive nothing, as it moves now.
+    /// True if the node receives no impulse at its current velocity.
     #[inline]
     pub fn is_idle(&self, velocities: &Vectors) -> bool {
-        self.depth <= 0.0 && velocities.get(self.node as usize).dot(self.normal) >= self.least_speed
+        self.depth <= 0.0 && velocities.get(self.node as usize).dot(self.normal) >= self.target_velocity
     }
 
-    /// Gives the impulse as if there were no other contacts.
+    /// Solves the contact independently of all others.
     pub fn solve_alone(&mut self, velocities: &mut Vectors) {
         solve(std::slice::from_mut(self), velocities, 1);
     }
 }
 
-/// Gives the impulses of the contacts of one node, in so many sweeps at most.
+/// Solves the contacts of one node in at most `sweeps` sweeps.
 fn solve(contacts: &mut [NodeContact], velocities: &mut Vectors, sweeps: u32) {
     let node = contacts[0].node as usize;
     let mut velocity = velocities.get(node);
     if let [contact] = contacts
         && sweeps == 1
     {
-        contact.press(&mut velocity);
+        contact.apply_impulse(&mut velocity);
         velocities.set(node, velocity);
         return;
     }
-    relax(Effort::of(sweeps), None, |_| {
-        let pressed = contacts.iter_mut().map(|contact| contact.press(&mut velocity));
+    relax(PgsLimits::new(sweeps), None, |_| {
+        let pressed = contacts.iter_mut().map(|contact| contact.apply_impulse(&mut velocity));
         pressed.fold(0.0, f32::max)
     });
     velocities.set(node, velocity);
@@ -362,7 +370,7 @@ impl NodeContacts {
         self.0.iter()
     }
 
-    /// Adds a contact, where there is room.
+    /// Adds a contact if memory is reserved for it.
     pub fn push(&mut self, contact: NodeContact) -> bool {
         let has_room = self.0.len() < self.0.capacity();
         if has_room {
@@ -379,27 +387,28 @@ impl NodeContacts {
         self.0.iter_mut()
     }
 
-    /// One sweep on velocities that something else has changed: the most that a contact changed, m/s.
-    pub fn sweep(&mut self, velocities: &mut [Vec3A], sweep: Sweep) -> f32 {
+    /// Sweeps once over the contacts, with velocities that other solvers have changed. Returns the largest velocity
+    /// change, m/s.
+    pub fn sweep(&mut self, velocities: &mut [Vec3A], sweep: PgsPass) -> f32 {
         let pressing = self.0.iter_mut();
-        let pressing = pressing.filter(|contact| sweep == Sweep::All || contact.impulse > 0.0);
+        let pressing = pressing.filter(|contact| sweep == PgsPass::All || contact.impulse > 0.0);
         let changes = pressing.map(|contact| {
             let node = contact.node as usize;
             let mut velocity = velocities[node].into();
-            let change = contact.press(&mut velocity);
+            let change = contact.apply_impulse(&mut velocity);
             velocities[node] = velocity.into();
             change
         });
         changes.fold(0.0, f32::max)
     }
 
-    /// Gives the impulses, in so many sweeps over the contacts of a node at most.
+    /// Solves the contacts in at most `sweeps` sweeps per node.
     pub fn solve(&mut self, velocities: &mut Vectors, sweeps: u32) {
         if !self.0.is_sorted_by_key(|contact| contact.node) {
             self.0.sort_unstable_by_key(|contact| (contact.node, contact.tool));
         }
         for contacts in self.0.chunk_by_mut(|one, other| one.node == other.node) {
-            let is_closed_form = contacts.len() == 1 && contacts[0].give == 0.0;
+            let is_closed_form = contacts.len() == 1 && contacts[0].compliance == 0.0;
             let sweeps = if is_closed_form { 1 } else { sweeps };
             solve(contacts, velocities, sweeps);
         }

@@ -1,152 +1,153 @@
-//! The way of a tool over a step.
+//! Path of a tool over a step.
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 
 use super::mesh_solid::MeshSolid;
-use super::tool::{Form, Pose, Tool};
+use super::tool::{Pose, Tool, ToolShape};
 use crate::codec::saved;
 use crate::def::CollisionFilter;
-use crate::geometry::Bounds;
-use crate::geometry::rotation::turned;
+use crate::geometry::Aabb;
+use crate::geometry::rotation::rotated;
 
-/// The way of a tool over a step: a straight line at constant speed, turning at a constant rate.
+/// Path of a tool over a step: a straight line at constant velocity and angular velocity.
 #[derive(Clone, Debug)]
 pub(crate) struct ToolPath {
-    /// The tool's place among the world's tools.
+    /// Index of the tool in the world.
     pub slot: usize,
-    form: Form,
+    shape: ToolShape,
     pub friction: f32,
     pub filter: CollisionFilter,
-    /// Whether tissue that is pinned all about presses it.
-    pub meets_pinned: bool,
+    /// True if tissue that is pinned on all sides presses it.
+    pub collides_with_pinned: bool,
     start: Pose,
     end: Pose,
-    /// The whole turn of the step as axis times angle, rad.
+    /// Rotation over the whole step as axis times angle, rad.
     turn: Vec3,
-    /// At what fraction of the step it starts: 0 but for a dynamic tool that contact has led elsewhere.
-    begun: f64,
-    /// How far it may leave that line, m: a dynamic tool becomes faster on its way.
-    strays: f32,
+    /// Fraction of the step at which the path begins. Above 0 only for a dynamic tool deflected by contact.
+    begin: f64,
+    /// Largest distance from that line, m. A dynamic tool accelerates along its path.
+    max_deviation: f32,
 }
 
-/// A tool's solid at one instant, in a body's coordinates.
+/// A tool's shape at one instant, in a body's coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Solid {
-    /// All that is within `radius` of the segment from `a` to `b`; a sphere's segment has no length.
+pub(super) enum PosedShape {
+    /// All points within `radius` of the segment from `a` to `b`; for a sphere `a` equals `b`.
     Rounded { a: Vec3, b: Vec3, radius: f32 },
-    /// All that lies behind the plane through `point`.
+    /// All points behind the plane through `point`.
     HalfSpace { point: Vec3, normal: Vec3 },
-    /// What a closed surface encloses.
-    Mesh(Placement),
+    /// The inside of a closed surface.
+    Mesh(MeshPose),
 }
 
-/// Where a mesh is and how it is turned, in a body's coordinates.
+/// Pose of a mesh in a body's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Placement {
-    pub centre: Vec3,
+pub(super) struct MeshPose {
+    pub center: Vec3,
     pub orientation: Quat,
 }
 
-saved! { Placement { centre, orientation } }
+saved! { MeshPose { center, orientation } }
 
-impl Placement {
-    /// A point in the mesh's own frame.
-    pub fn own(&self, point: Vec3) -> Vec3 {
-        self.orientation.conjugate() * (point - self.centre)
+impl MeshPose {
+    /// Transforms a point to the mesh's own frame.
+    pub fn body_to_local(&self, point: Vec3) -> Vec3 {
+        self.orientation.conjugate() * (point - self.center)
     }
 
-    /// A point of the mesh's own frame in the body's coordinates.
-    pub fn placed(&self, own: Vec3) -> Vec3 {
-        self.centre + self.orientation * own
+    /// Transforms a point of the mesh's own frame to the body's coordinates.
+    pub fn local_to_body(&self, point: Vec3) -> Vec3 {
+        self.center + self.orientation * point
     }
 }
 
-/// A tool over one substep, in a body's coordinates.
+/// Motion of a tool over one substep, in a body's coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Motion<'a> {
-    /// What a mesh encloses, in its own frame.
+pub(super) struct ToolMotion<'a> {
+    /// The mesh in its own frame.
     pub mesh: Option<&'a MeshSolid>,
     pub friction: f32,
-    pub from: Solid,
-    pub to: Solid,
-    /// The tool's position at the end.
-    pub centre: Vec3,
-    /// How fast its position moves, m/s.
+    pub from: PosedShape,
+    pub to: PosedShape,
+    /// Position of the tool at the end.
+    pub center: Vec3,
+    /// Velocity of the position, m/s.
     pub velocity: Vec3,
-    /// How fast it turns, rad/s.
+    /// Angular velocity, rad/s.
     pub spin: Vec3,
 }
 
-/// The axes of a tool at one instant, in a body's coordinates.
+/// Coordinate frame of a tool at one instant, in a body's coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame {
-    /// The tool's position.
-    pub centre: DVec3,
+pub(crate) struct ToolFrame {
+    /// Position of the tool.
+    pub center: DVec3,
     orientation: DQuat,
 }
 
-impl Frame {
-    /// Where what lies in this place of the tool's axes is.
-    pub fn carried(&self, offset: DVec3) -> DVec3 {
-        self.centre + self.orientation * offset
+impl ToolFrame {
+    /// Transforms a point of the tool's frame to the body's coordinates.
+    pub fn local_to_body(&self, point: DVec3) -> DVec3 {
+        self.center + self.orientation * point
     }
 
-    /// The place in the tool's axes of what is here.
-    pub fn offset(&self, position: DVec3) -> DVec3 {
-        self.orientation.conjugate() * (position - self.centre)
+    /// Transforms a point to the tool's frame.
+    pub fn body_to_local(&self, point: DVec3) -> DVec3 {
+        self.orientation.conjugate() * (point - self.center)
     }
 }
 
 impl ToolPath {
     pub fn new(slot: usize, tool: &Tool) -> Self {
         let start = tool.pose;
-        let end = tool.aim();
-        let turn = start.turn_to(&end);
+        let end = tool.step_target();
+        let turn = start.rotation_to(&end);
         Self {
             slot,
-            form: tool.form.clone(),
+            shape: tool.shape.clone(),
             friction: tool.friction,
             filter: tool.filter,
-            meets_pinned: true,
+            collides_with_pinned: true,
             start,
             end,
             turn,
-            begun: 0.0,
-            strays: 0.0,
+            begin: 0.0,
+            max_deviation: 0.0,
         }
     }
 
-    /// Has it lead from here to there, turning by so much, rad, from this fraction of the step on, and stray from that by no more than
-    /// `strays`, m.
-    pub fn lead(&mut self, [start, end]: [Pose; 2], turn: Vec3, begun: f64, strays: f32) {
-        (self.start, self.end, self.turn, self.begun, self.strays) = (start, end, turn, begun, strays);
+    /// Sets the path: start and end pose, the rotation between them (rad), the fraction of the step at which it
+    /// begins and the largest distance from it (m).
+    pub fn set(&mut self, [start, end]: [Pose; 2], turn: Vec3, begin: f64, max_deviation: f32) {
+        (self.start, self.end, self.turn, self.begin, self.max_deviation) = (start, end, turn, begin, max_deviation);
     }
 
-    /// The fraction of the step at which it starts.
-    pub(super) fn begun(&self) -> f64 {
-        self.begun
+    /// Returns the fraction of the step at which the path begins.
+    pub(super) fn begin(&self) -> f64 {
+        self.begin
     }
 
-    /// What part of it lies behind at a fraction of the step.
-    fn part(&self, fraction: f64) -> f64 {
-        (fraction - self.begun) / (1.0 - self.begun)
+    /// Returns the completed fraction of the path at a fraction of the step.
+    fn path_fraction(&self, fraction: f64) -> f64 {
+        (fraction - self.begin) / (1.0 - self.begin)
     }
 
-    /// How long it takes in a step of `dt` seconds, s.
-    fn lasts(&self, dt: f32) -> f64 {
-        f64::from(dt) * (1.0 - self.begun)
+    /// Returns the duration of the path in a step of `dt` seconds, s.
+    fn duration(&self, dt: f32) -> f64 {
+        f64::from(dt) * (1.0 - self.begin)
     }
 
-    /// Whether it comes to within `margin` of something in these bounds in the step, as far as boxes tell.
-    pub fn is_near(&self, bounds: &Bounds, origin: DVec3, margin: f32) -> bool {
+    /// Returns true if the tool may come within `margin` of these bounds in the step. Conservative, by bounding
+    /// boxes.
+    pub fn is_near(&self, bounds: &Aabb, origin: DVec3, margin: f32) -> bool {
         let bounds = bounds.extended(margin);
         if let Some(sweep) = self.sweep(origin) {
             return sweep.bounds.overlaps(&bounds);
         }
-        [self.begun, 1.0]
+        [self.begin, 1.0]
             .into_iter()
-            .any(|fraction| match self.solid_at(fraction, origin) {
-                Solid::HalfSpace { point, normal } => {
+            .any(|fraction| match self.shape_at(fraction, origin) {
+                PosedShape::HalfSpace { point, normal } => {
                     let lowest = Vec3::select(normal.cmpge(Vec3::ZERO), bounds.min, bounds.max);
                     (lowest - point).dot(normal) <= 0.0
                 }
@@ -154,30 +155,30 @@ impl ToolPath {
             })
     }
 
-    /// Whether it is elsewhere, or turned otherwise, after the step.
+    /// Returns true if the pose changes in the step.
     pub fn moves(&self) -> bool {
-        self.start != self.end || self.strays > 0.0
+        self.start != self.end || self.max_deviation > 0.0
     }
 
-    /// How far its position moves in the step, m, and how far it turns, as axis times angle, rad.
+    /// Returns the displacement (m) and the rotation as axis times angle (rad) over the step.
     pub fn travel(&self) -> [DVec3; 2] {
-        let way = self.end.position.as_dvec3() - self.start.position.as_dvec3();
-        [way, self.turn.as_dvec3()]
+        let displacement = self.end.position.as_dvec3() - self.start.position.as_dvec3();
+        [displacement, self.turn.as_dvec3()]
     }
 
-    /// Where the step leaves it.
+    /// Returns the pose at the end of the step.
     pub fn end(&self) -> Pose {
         self.end
     }
 
-    /// Its position after `fraction` of the step, in the coordinates of a body that begin at `origin`.
-    fn centre_at(&self, fraction: f64, origin: DVec3) -> Vec3 {
+    /// Returns the position after `fraction` of the step, in body coordinates with this origin.
+    fn center_at(&self, fraction: f64, origin: DVec3) -> Vec3 {
         let (start, end) = (self.start.position.as_dvec3(), self.end.position.as_dvec3());
-        (start.lerp(end, self.part(fraction)) - origin).as_vec3()
+        (start.lerp(end, self.path_fraction(fraction)) - origin).as_vec3()
     }
 
     fn orientation_at(&self, fraction: f64) -> Quat {
-        let fraction = self.part(fraction);
+        let fraction = self.path_fraction(fraction);
         if self.turn == Vec3::ZERO || fraction <= 0.0 {
             self.start.orientation
         } else if fraction >= 1.0 {
@@ -187,11 +188,11 @@ impl ToolPath {
         }
     }
 
-    /// Its axes after `fraction` of the step, in the coordinates of a body that begin at `origin`.
-    pub fn frame_at(&self, fraction: f64, origin: DVec3) -> Frame {
+    /// Returns the tool's frame after `fraction` of the step, in body coordinates with this origin.
+    pub fn frame_at(&self, fraction: f64, origin: DVec3) -> ToolFrame {
         let (start, end) = (self.start.position.as_dvec3(), self.end.position.as_dvec3());
-        Frame {
-            centre: start.lerp(end, fraction) - origin,
+        ToolFrame {
+            center: start.lerp(end, fraction) - origin,
             orientation: self.exact_orientation_at(fraction),
         }
     }
@@ -203,121 +204,123 @@ impl ToolPath {
         } else if fraction >= 1.0 {
             end
         } else {
-            turned(start, self.turn.as_dvec3() * fraction)
+            rotated(start, self.turn.as_dvec3() * fraction)
         }
     }
 
-    /// Where it is after `fraction` of the step, in the coordinates of a body that begin at `origin`.
-    pub(super) fn solid_at(&self, fraction: f64, origin: DVec3) -> Solid {
-        let centre = self.centre_at(fraction, origin);
+    /// Returns the shape after `fraction` of the step, in body coordinates with this origin.
+    pub(super) fn shape_at(&self, fraction: f64, origin: DVec3) -> PosedShape {
+        let center = self.center_at(fraction, origin);
         let orientation = self.orientation_at(fraction);
         let up = || orientation * Vec3::Y;
-        match self.form {
-            Form::Rounded {
+        match self.shape {
+            ToolShape::Rounded {
                 radius,
                 half_length: 0.0,
-            } => Solid::Rounded {
-                a: centre,
-                b: centre,
+            } => PosedShape::Rounded {
+                a: center,
+                b: center,
                 radius,
             },
-            Form::Rounded { radius, half_length } => {
+            ToolShape::Rounded { radius, half_length } => {
                 let axis = up() * half_length;
-                Solid::Rounded {
-                    a: centre - axis,
-                    b: centre + axis,
+                PosedShape::Rounded {
+                    a: center - axis,
+                    b: center + axis,
                     radius,
                 }
             }
-            Form::HalfSpace => Solid::HalfSpace {
-                point: centre,
+            ToolShape::HalfSpace => PosedShape::HalfSpace {
+                point: center,
                 normal: up(),
             },
-            Form::Mesh(_) => Solid::Mesh(Placement { centre, orientation }),
+            ToolShape::Mesh(_) => PosedShape::Mesh(MeshPose { center, orientation }),
         }
     }
 
-    /// The least radius that its surface is curved with outward, m, where it is round.
+    /// Returns the radius of a sphere or capsule, m.
     pub(super) fn radius(&self) -> Option<f32> {
-        match self.form {
-            Form::Rounded { radius, .. } => Some(radius),
+        match self.shape {
+            ToolShape::Rounded { radius, .. } => Some(radius),
             _ => None,
         }
     }
 
-    /// What its mesh encloses, where it is one.
+    /// Returns the mesh, if the tool is one.
     pub(super) fn mesh(&self) -> Option<&MeshSolid> {
-        match &self.form {
-            Form::Mesh(solid) => Some(solid),
+        match &self.shape {
+            ToolShape::Mesh(solid) => Some(solid),
             _ => None,
         }
     }
 
-    /// Its motion between two fractions of a step of `dt` seconds.
-    pub(super) fn motion(&self, start: f64, end: f64, dt: f32, origin: DVec3) -> Motion<'_> {
-        Motion {
+    /// Returns the motion between two fractions of a step of `dt` seconds.
+    pub(super) fn motion(&self, start: f64, end: f64, dt: f32, origin: DVec3) -> ToolMotion<'_> {
+        ToolMotion {
             mesh: self.mesh(),
             friction: self.friction,
-            from: self.solid_at(start, origin),
-            to: self.solid_at(end, origin),
-            centre: self.centre_at(end, origin),
-            velocity: ((self.end.position.as_dvec3() - self.start.position.as_dvec3()) / self.lasts(dt)).as_vec3(),
-            spin: self.turn / self.lasts(dt) as f32,
+            from: self.shape_at(start, origin),
+            to: self.shape_at(end, origin),
+            center: self.center_at(end, origin),
+            velocity: ((self.end.position.as_dvec3() - self.start.position.as_dvec3()) / self.duration(dt)).as_vec3(),
+            spin: self.turn / self.duration(dt) as f32,
         }
     }
 
-    /// What it sweeps over the step; `None` for a plane, which has no end.
+    /// Returns the volume swept over the step; `None` for a plane, which is unbounded.
     pub fn sweep(&self, origin: DVec3) -> Option<ToolSweep> {
-        let centres = Bounds::of([self.begun, 1.0].map(|end| self.centre_at(end, origin)).into_iter());
-        let (bounds, reach, thickness) = match &self.form {
-            Form::HalfSpace => return None,
-            Form::Rounded { radius, half_length } => (centres.extended(radius + half_length), *half_length, *radius),
-            Form::Mesh(solid) => {
-                // Between its ends a corner that turns goes outside their box by no more than the height of its arc.
-                let ends = [self.begun, 1.0].map(|end| (self.centre_at(end, origin), self.orientation_at(end)));
+        let centers = Aabb::of([self.begin, 1.0].map(|end| self.center_at(end, origin)).into_iter());
+        let (bounds, reach, thickness) = match &self.shape {
+            ToolShape::HalfSpace => return None,
+            ToolShape::Rounded { radius, half_length } => {
+                (centers.extended(radius + half_length), *half_length, *radius)
+            }
+            ToolShape::Mesh(solid) => {
+                // Between its ends a rotating corner leaves their box by at most the height of its arc.
+                let ends = [self.begin, 1.0].map(|end| (self.center_at(end, origin), self.orientation_at(end)));
                 let corners = ends
                     .into_iter()
-                    .flat_map(|(centre, orientation)| solid.corners().map(|corner| centre + orientation * corner));
+                    .flat_map(|(center, orientation)| solid.corners().map(|corner| center + orientation * corner));
                 let half_turn = 0.5 * self.turn.length();
                 let height = solid.reach() * (1.0 - libm::cosf(half_turn.min(std::f32::consts::PI)));
-                (Bounds::of(corners).extended(height), solid.reach(), solid.thickness())
+                (Aabb::of(corners).extended(height), solid.reach(), solid.thickness())
             }
         };
         Some(ToolSweep {
-            bounds: bounds.extended(self.strays),
-            travel: self.start.position.distance(self.end.position) + self.turn.length() * reach + self.strays,
+            bounds: bounds.extended(self.max_deviation),
+            travel: self.start.position.distance(self.end.position) + self.turn.length() * reach + self.max_deviation,
             thickness,
         })
     }
 
-    /// How far any point of a mesh can be from where it is at one end of the step, when it stands there instead, m.
-    pub(super) fn furthest_from(&self, standing: &Placement, origin: DVec3) -> f32 {
-        let Form::Mesh(solid) = &self.form else {
+    /// Returns the largest distance of a mesh's points over the step from their positions in the pose `standing`, m.
+    pub(super) fn max_distance_from(&self, standing: &MeshPose, origin: DVec3) -> f32 {
+        let ToolShape::Mesh(solid) = &self.shape else {
             return 0.0;
         };
-        let far = |end: f64| {
+        let distance = |end: f64| {
             let turn = self.orientation_at(end).angle_between(standing.orientation);
-            self.centre_at(end, origin).distance(standing.centre) + turn * solid.reach()
+            self.center_at(end, origin).distance(standing.center) + turn * solid.reach()
         };
-        far(self.begun).max(far(1.0)) + self.strays
+        distance(self.begin).max(distance(1.0)) + self.max_deviation
     }
 
-    /// How fast its fastest point moves, m/s; for a plane the point at its position.
+    /// Returns the speed of the fastest point, m/s; for a plane that of its position.
     pub(super) fn speed(&self, dt: f32) -> f32 {
         let travel = match self.sweep(DVec3::ZERO) {
             Some(sweep) => sweep.travel,
             None => self.start.position.distance(self.end.position),
         };
-        travel / self.lasts(dt) as f32
+        travel / self.duration(dt) as f32
     }
 }
 
-/// What a tool sweeps over a step.
+/// The volume that a tool sweeps over a step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ToolSweep {
-    /// A box about all of it.
-    pub bounds: Bounds,
-    /// The furthest that any point of its axis or its mesh goes, m.
+    /// Bounding box of the volume.
+    pub bounds: Aabb,
+    /// Longest displacement of a point of the axis or mesh, m.
     pub travel: f32,
     /// Half of the tool's least extent, m.
     pub thickness: f32,

@@ -1,59 +1,60 @@
-//! Tissue that is pinned all about a tool gives way to no impulse. So that a tool feels it, it presses back like a spring.
+//! Forces of fully pinned tissue on tools. Pinned nodes do not respond to impulses, so the tissue acts as a spring.
 //!
-//! It is features whose neighbours are pinned too. A tool that is pressed on free tissue may reach over a pinned border: there tissue
-//! beside it gives way, and what it does is known.
+//! These forces act on features whose neighbors are pinned too. A tool on free tissue may overlap a pinned border.
+//! There the free tissue determines the force.
 
+use super::contact_geometry::{ContactGeometry, mesh_contact, plane_contact, rounded_contact};
+use super::contact_input::{ContactInput, SubSlice};
 use super::contacts::Contacts;
+use super::corner_weights::FeatureNodes;
 use super::features::Feature;
-use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded};
-use super::meeting::{Meeting, Slice};
-use super::path::{Motion, Solid, ToolPath};
-use super::report::Touch;
-use super::supports::Supports;
-use super::sweep::Corners;
+use super::path::{PosedShape, ToolMotion, ToolPath};
+use super::report::ToolContact;
+use super::time_of_impact::Corners;
 use super::zone::zone_bit;
-use crate::nodes::parts;
+use crate::nodes::weighted_nodes;
 
-/// A normal that lies by less than this cosine along that of the last step is taken for one of the other side.
-const TURNED: f32 = 0.7;
+/// If the cosine between the normals of this step and the last is smaller, the tool has passed to the other side.
+const MIN_SAME_SIDE_COSINE: f32 = 0.7;
 
 impl Contacts {
-    /// Has what is pinned press each tool that is led into it, where it was deepest in the step: with the depth times the stiffness of the
-    /// nodes there, N/m. `meeting` is the whole step, of so many substeps, with the nodes where it has led them.
-    pub fn press_pinned(&mut self, meeting: Meeting, substeps: u32, stiffness_of: impl Fn(usize) -> f32) {
-        self.pinned.clear();
-        if self.are_far() || !meeting.pins.iter().any(|pin| !pin.is_partial()) {
+    /// Adds the force of pinned tissue on each kinematic tool that is moved into it. The force is the deepest
+    /// penetration in the step times the stiffness of the nodes there, N/m. `input` is the whole step of `substeps`
+    /// substeps, with its final node positions.
+    pub fn add_pinned_forces(&mut self, input: ContactInput, substeps: u32, stiffness_of: impl Fn(usize) -> f32) {
+        self.pinned_touches.clear();
+        if self.is_clear_of_tools() || !input.pins.iter().any(|pin| !pin.is_partial()) {
             return;
         }
-        let mut yielding = std::mem::take(&mut self.yielding_nodes);
-        yielding.clear();
-        // A tool that passes a thin sheet within the step must not miss it.
-        let looks = self.needed_slices(&meeting);
+        let mut free_marks = std::mem::take(&mut self.free_node_marks);
+        free_marks.clear();
+        // Several samples, so that a tool cannot pass through a thin sheet within the step.
+        let samples = self.needed_slices(&input);
         let mut bits = (0..).map(zone_bit);
-        for (place, tool) in meeting.tools.iter().enumerate() {
+        for (index, tool) in input.tools.iter().enumerate() {
             if !tool.filter.meets(self.filter) {
                 continue;
             }
             let deepest = bits
                 .next()
-                .filter(|_| tool.meets_pinned && self.driven.place(place).is_none())
-                .and_then(|bit| self.deepest(&meeting, (tool, bit), looks, &mut yielding));
+                .filter(|_| tool.collides_with_pinned && self.dynamic_tools.find(index).is_none())
+                .and_then(|bit| self.deepest(&input, (tool, bit), samples, &mut free_marks));
             let Some((depth, feature, geometry)) = deepest else {
                 continue;
             };
-            let supports = Supports::of(feature, meeting.bindings);
-            let shares = supports.shares(geometry.weights);
-            let shares = || supports.nodes().iter().zip(shares);
+            let feature_nodes = FeatureNodes::new(feature, input.bindings);
+            let shares = feature_nodes.shares(geometry.weights);
+            let shares = || feature_nodes.nodes().iter().zip(shares);
             let stiffness: f32 = shares().map(|(&node, share)| share * stiffness_of(node as usize)).sum();
             let force = geometry.normal * -(stiffness * depth);
-            self.loads[place].add(force.as_dvec3() * f64::from(meeting.dt), geometry.arm);
+            self.loads[index].add(force.as_dvec3() * f64::from(input.dt), geometry.arm);
             for (&node, share) in shares() {
-                if let Some(pin) = meeting.pins.get_mut(node) {
+                if let Some(pin) = input.pins.get_mut(node) {
                     pin.force_sum += (force * share).as_dvec3() * f64::from(substeps);
                 }
             }
-            // There is room for one of each tool.
-            self.pinned.push(Touch {
+            // Memory for one per tool is reserved.
+            self.pinned_touches.push(ToolContact {
                 slot: tool.slot,
                 nodes: feature.three_nodes(),
                 weights: geometry.weights,
@@ -61,46 +62,47 @@ impl Contacts {
                 force,
             });
         }
-        self.yielding_nodes = yielding;
+        self.free_node_marks = free_marks;
     }
 
-    /// How deep a tool, whose zone has this bit, comes to lie in what is pinned, and where, as so many looks on its way tell.
+    /// The deepest penetration of a tool into pinned tissue over `samples` samples of its path. `bit` is the bit of the
+    /// tool's zone.
     fn deepest(
         &self,
-        meeting: &Meeting,
+        input: &ContactInput,
         (tool, bit): (&ToolPath, u32),
-        looks: u32,
-        yielding: &mut Vec<u64>,
+        samples: u32,
+        free_marks: &mut Vec<u64>,
     ) -> Option<(f32, Feature, ContactGeometry)> {
         let mut deepest: Option<(f32, Feature, ContactGeometry)> = None;
-        let before = self.pinned_before.iter().find(|touch| touch.slot == tool.slot);
-        let radius = tool.sweep(meeting.origin).map_or(0.0, |sweep| sweep.thickness);
-        let near = self.candidates.near.iter().zip(&self.candidates.masks);
+        let last_touch = self.last_pinned_touches.iter().find(|touch| touch.slot == tool.slot);
+        let radius = tool.sweep(input.origin).map_or(0.0, |sweep| sweep.thickness);
+        let near = self.candidates.near.iter().zip(&self.candidates.zone_masks);
         let near = near.filter(|&(_, mask)| mask & bit != 0);
         let features = near.filter_map(|(&index, _)| self.features.get(index));
-        let is_pinned = |feature: &Feature| feature.nodes().iter().all(|&node| self.is_pinned(meeting, node));
+        let is_pinned = |feature: &Feature| feature.nodes().iter().all(|&node| self.is_pinned(input, node));
         for feature in features.filter(is_pinned) {
-            for look in 1..=looks {
-                let fraction = f64::from(look) / f64::from(looks);
-                let motion = tool.motion(fraction, fraction, meeting.dt, meeting.origin);
-                let Some(mut geometry) = meet_standing(meeting, &motion, feature) else {
+            for sample in 1..=samples {
+                let fraction = f64::from(sample) / f64::from(samples);
+                let motion = tool.motion(fraction, fraction, input.dt, input.origin);
+                let Some(mut geometry) = static_contact(input, &motion, feature) else {
                     continue;
                 };
-                // One that is in by more than half goes on out by the side on which it came.
-                let along = before.map_or(1.0, |before| before.normal.dot(geometry.normal));
-                let mut depth = meeting.thickness - geometry.gap;
-                if let Some(before) = before.filter(|_| along < TURNED) {
+                // A tool that is more than half inside keeps the normal of the side on which it entered.
+                let along = last_touch.map_or(1.0, |last_touch| last_touch.normal.dot(geometry.normal));
+                let mut depth = input.thickness - geometry.gap;
+                if let Some(last_touch) = last_touch.filter(|_| along < MIN_SAME_SIDE_COSINE) {
                     depth += (geometry.gap + radius) * (1.0 - along);
-                    geometry.arm += (before.normal - geometry.normal) * radius;
-                    geometry.normal = before.normal;
+                    geometry.arm += (last_touch.normal - geometry.normal) * radius;
+                    geometry.normal = last_touch.normal;
                 }
                 if depth <= deepest.map_or(0.0, |(depth, ..)| depth) {
                     continue;
                 }
-                if yielding.is_empty() {
-                    self.mark_yielding(meeting, yielding);
+                if free_marks.is_empty() {
+                    self.mark_free_nodes(input, free_marks);
                 }
-                if feature.nodes().iter().any(|&node| is_marked(yielding, node)) {
+                if feature.nodes().iter().any(|&node| is_marked(free_marks, node)) {
                     break;
                 }
                 deepest = Some((depth, feature, geometry));
@@ -109,20 +111,24 @@ impl Contacts {
         deepest
     }
 
-    /// Whether a node of the surface is pinned, or all that it is bound to, and no tool holds it.
-    fn is_pinned(&self, meeting: &Meeting, node: u32) -> bool {
-        parts(meeting.bindings, node).all(|(node, _)| {
-            let is_held = || self.held.binary_search_by_key(&node, |&(held, _)| held).is_ok();
-            meeting.mobility.inverse_masses[node as usize] == 0.0 && !is_held()
+    /// True if a surface node, or all nodes that it is bound to, are pinned and not attached to a tool.
+    fn is_pinned(&self, input: &ContactInput, node: u32) -> bool {
+        weighted_nodes(input.bindings, node).all(|(node, _)| {
+            let is_attached = || {
+                self.attached_nodes
+                    .binary_search_by_key(&node, |&(attached, _)| attached)
+                    .is_ok()
+            };
+            input.mobility.inverse_masses[node as usize] == 0.0 && !is_attached()
         })
     }
 
-    /// Marks the nodes of the surface that give way, or have a neighbour that does.
-    fn mark_yielding(&self, meeting: &Meeting, marks: &mut Vec<u64>) {
-        // There is room.
+    /// Marks the surface nodes that are free or have a free neighbor.
+    fn mark_free_nodes(&self, input: &ContactInput, marks: &mut Vec<u64>) {
+        // The memory is reserved.
         marks.resize((self.features.node_count as usize).div_ceil(64), 0);
         for edge in self.features.edges() {
-            if edge.iter().any(|&node| !self.is_pinned(meeting, node)) {
+            if edge.iter().any(|&node| !self.is_pinned(input, node)) {
                 edge.iter()
                     .for_each(|&node| marks[node as usize / 64] |= 1 << (node % 64));
             }
@@ -134,18 +140,18 @@ fn is_marked(marks: &[u64], node: u32) -> bool {
     marks[node as usize / 64] >> (node % 64) & 1 == 1
 }
 
-/// How a feature lies within a tool that stands.
-fn meet_standing(meeting: &Meeting, motion: &Motion, feature: Feature) -> Option<ContactGeometry> {
-    let slice = Slice::ahead(meeting);
+/// The contact of a feature with a tool at rest.
+fn static_contact(input: &ContactInput, motion: &ToolMotion, feature: Feature) -> Option<ContactGeometry> {
+    let slice = SubSlice::ahead(input);
     let nodes = feature.nodes();
-    let corners = Corners::still(nodes.iter().map(|&node| meeting.position(&slice, node as usize).into()));
+    let corners = Corners::still(nodes.iter().map(|&node| input.position(&slice, node as usize).into()));
     match (motion.from, motion.to) {
-        (Solid::HalfSpace { .. }, _) if nodes.len() > 1 => None,
-        (Solid::HalfSpace { .. }, _) => meet_plane(meeting, &slice, motion, nodes[0] as usize),
-        (Solid::Rounded { .. }, _) => meet_rounded(meeting, &slice, motion, &corners, &motion.segment(false)),
-        (Solid::Mesh(from), Solid::Mesh(to)) => {
-            meet_mesh(meeting, &slice, motion, (feature, &corners), [&from, &to], None)
+        (PosedShape::HalfSpace { .. }, _) if nodes.len() > 1 => None,
+        (PosedShape::HalfSpace { .. }, _) => plane_contact(input, &slice, motion, nodes[0] as usize),
+        (PosedShape::Rounded { .. }, _) => rounded_contact(input, &slice, motion, &corners, &motion.segment(false)),
+        (PosedShape::Mesh(from), PosedShape::Mesh(to)) => {
+            mesh_contact(input, &slice, motion, (feature, &corners), [&from, &to], None)
         }
-        (Solid::Mesh(_), _) => None,
+        (PosedShape::Mesh(_), _) => None,
     }
 }

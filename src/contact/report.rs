@@ -1,11 +1,11 @@
-//! What contact did in the last step, for whoever wants to draw it or hear of it.
+//! Contact reports of the last step, for visualization and events.
 
 use glam::Vec3;
 
 use crate::base::{BladeId, BodyId, ToolId};
 use crate::codec::saved;
 
-/// Where a tool pressed a body when the last step ended.
+/// A contact between a tool and a body at the end of the last step.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -26,19 +26,19 @@ use crate::codec::saved;
 pub struct Contact {
     /// The body.
     pub body: BodyId,
-    /// The node, the two of an edge or the three of a face that it pressed; the last is repeated.
+    /// The node, the two nodes of an edge or the three of a face in contact; the last is repeated.
     pub nodes: [u32; 3],
-    /// The point of them, as weights; 0 where a node is repeated.
+    /// Weights of the nodes for the contact point; 0 for a repeated node.
     pub weights: [f32; 3],
-    /// The point, m.
+    /// Contact point, m.
     pub point: Vec3,
-    /// Away from the tool, of unit length.
+    /// Unit vector away from the tool.
     pub normal: Vec3,
-    /// On the tool, friction with it, N, in the last substep: where a step has several, the wrench is their mean.
+    /// Force on the tool including friction, N, in the last substep. With several substeps, the wrench is their mean.
     pub force: Vec3,
 }
 
-/// A tool and a body that began or ceased to touch in the last step.
+/// A change of contact between a tool and a body in the last step.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -60,11 +60,11 @@ pub struct ContactChange {
     pub tool: ToolId,
     /// The body.
     pub body: BodyId,
-    /// Whether they touch now.
+    /// True if they touch now.
     pub has_begun: bool,
 }
 
-/// Two bodies that began or ceased to touch in the last step.
+/// A change of contact between two bodies in the last step.
 ///
 /// ```
 /// # use glam::{Quat, Vec3, vec3};
@@ -87,11 +87,11 @@ pub struct ContactChange {
 pub struct BodyContactChange {
     /// The bodies.
     pub bodies: [BodyId; 2],
-    /// Whether they touch now.
+    /// True if they touch now.
     pub has_begun: bool,
 }
 
-/// A blade and a body of which contact began or ceased in the last step.
+/// A change of contact between a blade and a body in the last step.
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
@@ -116,21 +116,21 @@ pub struct BladeContactChange {
     pub blade: BladeId,
     /// The body.
     pub body: BodyId,
-    /// Whether it presses the blade now.
+    /// True if they touch now.
     pub has_begun: bool,
 }
 
-/// A contact as a body keeps it.
+/// A contact as a body stores it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Touch {
-    /// The tool's place among those of the world.
+pub(crate) struct ToolContact {
+    /// Index of the tool in the world.
     pub slot: usize,
-    /// In the body's own numbers; the last is repeated.
+    /// Nodes with the body's own indices; the last is repeated.
     pub nodes: [u32; 3],
     pub weights: [f32; 3],
     pub normal: Vec3,
-    /// On the tool, N.
+    /// Force on the tool, N.
     pub force: Vec3,
 }
 
-saved! { Touch { slot, nodes, weights, normal, force } }
+saved! { ToolContact { slot, nodes, weights, normal, force } }

@@ -1,19 +1,19 @@
-//! Tools: rigid shapes that the caller moves, and the load that they feel.
+//! Tools: rigid shapes that the caller moves, and the forces on them.
 
 use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 
+use super::capsule;
 use super::cuboid;
-use super::limit::PressSearch;
+use super::force_limit::ForceLimitSearch;
 use super::mesh_solid::MeshSolid;
 use super::rigid::Rigid;
-use super::rounded;
 use crate::base::{Error, Result, StateHasher, above_zero, ensure, not_negative};
 use crate::codec::{saved, saved_enum};
 use crate::def::{CollisionFilter, Detection, check_reach, finite_vector};
-use crate::geometry::rotation::{turn_between, turned};
-use crate::mesh::FURTHEST;
+use crate::geometry::rotation::{rotated, rotation_between};
+use crate::mesh::MAX_COORDINATE;
 
 /// The shape of a tool, about its own origin.
 ///
@@ -33,35 +33,35 @@ use crate::mesh::FURTHEST;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape<'a> {
-    /// A ball.
+    /// A sphere.
     Sphere {
-        /// Metres, above 0, at most 1e9.
+        /// Meters, above 0, at most 1e9.
         radius: f32,
     },
-    /// A cylinder along y with round caps.
+    /// A cylinder along y with hemispherical caps.
     Capsule {
-        /// Metres, above 0, at most 1e9.
+        /// Meters, above 0, at most 1e9.
         radius: f32,
-        /// Metres between the centre and a cap's centre, 0 to 1e9. What is touched is known to a ten millionth of it.
+        /// Meters from the center to a cap's center, 0 to 1e9. Contact points are accurate to 1e-7 of it.
         half_length: f32,
     },
     /// The plane y = 0, with free space above it and solid below.
     Plane,
     /// A box along the axes about the origin.
     Box {
-        /// Metres from the centre to each side, above 0, at most 1e9.
+        /// Meters from the center to each side, above 0, at most 1e9.
         half_extents: Vec3,
     },
-    /// What a closed surface encloses. Corners at exactly the same place are one.
+    /// The inside of a closed surface. Corners at identical positions are merged.
     Mesh {
-        /// Metres.
+        /// Meters.
         positions: &'a [Vec3],
-        /// Three of the positions each, outward by the right-hand rule.
+        /// Three position indices each, outward by the right-hand rule.
         triangles: &'a [[u32; 3]],
     },
 }
 
-/// Where a tool is and how it is turned.
+/// Position and orientation of a tool.
 ///
 /// ```
 /// # use glam::{Quat, Vec3};
@@ -76,7 +76,7 @@ pub enum Shape<'a> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Metres, each within 1e9 of 0.
+    /// Meters, each coordinate within 1e9 of 0.
     pub position: Vec3,
     /// A unit quaternion.
     pub orientation: Quat,
@@ -85,30 +85,30 @@ pub struct Pose {
 saved! { Pose { position, orientation } }
 
 impl Pose {
-    /// At the origin, not turned.
+    /// The origin without rotation.
     pub const IDENTITY: Self = Self {
         position: Vec3::ZERO,
         orientation: Quat::IDENTITY,
     };
 
-    /// The shorter way round from this orientation to that one, as axis times angle, rad; 0 where they are the same.
-    pub(super) fn turn_to(&self, other: &Self) -> Vec3 {
+    /// Returns the shortest rotation to another orientation, as axis times angle, rad; 0 if both are equal.
+    pub(super) fn rotation_to(&self, other: &Self) -> Vec3 {
         if other.orientation == self.orientation {
             return Vec3::ZERO;
         }
-        turn_between(self.orientation.as_dquat(), other.orientation.as_dquat()).as_vec3()
+        rotation_between(self.orientation.as_dquat(), other.orientation.as_dquat()).as_vec3()
     }
 
-    /// Where something is after a part of the way from here to there, 0 to 1.
-    fn on_way_to(&self, other: &Self, part: f32) -> Self {
-        let turn = self.turn_to(other).as_dvec3() * f64::from(part);
+    /// Interpolates between two poses by a fraction, 0 to 1.
+    fn interpolate(&self, other: &Self, fraction: f32) -> Self {
+        let turn = self.rotation_to(other).as_dvec3() * f64::from(fraction);
         Self {
-            position: self.position.lerp(other.position, part),
-            orientation: turned(self.orientation.as_dquat(), turn).as_quat(),
+            position: self.position.lerp(other.position, fraction),
+            orientation: rotated(self.orientation.as_dquat(), turn).as_quat(),
         }
     }
 
-    /// Adds the bits of a pose and of where it is to go.
+    /// Hashes a pose and its target.
     pub(crate) fn hash(&self, target: Option<Self>, hasher: &mut StateHasher) {
         hasher.write_u64(u64::from(target.is_some()));
         for pose in [Some(*self), target].into_iter().flatten() {
@@ -117,22 +117,23 @@ impl Pose {
         }
     }
 
-    /// The pose at another position, and turned, `None`: as it is; checked.
+    /// Returns the checked pose at another position; `None` keeps the orientation.
     pub(crate) fn moved(self, position: Vec3, orientation: Option<Quat>) -> Result<Self> {
         let orientation = orientation.unwrap_or(self.orientation);
         Self { position, orientation }.checked()
     }
 
-    /// The pose with its orientation normalised; refused where it has no direction, is not finite or too far away.
+    /// Returns the pose with a normalized orientation. Fails if a value is not finite, the position is too far away,
+    /// or the orientation is 0.
     pub(crate) fn checked(self) -> Result<Self> {
         finite_vector("position", self.position)?;
         ensure!(
-            self.position.abs().max_element() <= FURTHEST,
-            "position is {}: must be within {FURTHEST:e} m of the origin along each axis",
+            self.position.abs().max_element() <= MAX_COORDINATE,
+            "position is {}: must be within {MAX_COORDINATE:e} m of the origin along each axis",
             self.position
         );
         let [x, y, z, w] = self.orientation.to_array();
-        // In f64, so that neither large nor small quaternions overflow on the way.
+        // In `f64`, so that neither large nor small quaternions overflow.
         let exact = glam::DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into());
         let length = exact.length();
         ensure!(
@@ -148,7 +149,7 @@ impl Pose {
     }
 }
 
-/// What a tool is. Plain data, used only during [`World::create_tool`](crate::World::create_tool).
+/// Definition of a tool. Plain data, used only during [`World::create_tool`](crate::World::create_tool).
 ///
 /// ```
 /// # use glam::Vec3;
@@ -165,26 +166,26 @@ impl Pose {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolDefinition<'a> {
-    /// Its shape.
+    /// Shape of the tool.
     pub shape: Shape<'a>,
-    /// How it finds what it touches.
+    /// Method of contact detection.
     pub detection: Detection,
-    /// How fine an image or a distance field is, m: the side of a pixel or a cell; 0: a 256th or a 96th of the mesh's longest extent, or a
-    /// fourth of the least where that is less. Refused where no ray or sample would lie within the mesh.
+    /// Side of a pixel of an image or a cell of a distance field, m. 0 selects 1/256 or 1/96 of the mesh's longest
+    /// extent, or a quarter of the least extent if that is less. Fails if no ray or sample lies inside the mesh.
     pub resolution: f32,
-    /// The Coulomb coefficient of friction, at least 0.
+    /// Coulomb coefficient of friction, at least 0.
     pub friction: f32,
-    /// The largest force that moves it, N, at least 0; 0 or infinite: it goes wherever it is sent. Where tissue resists with more it stops short of
-    /// its pose: see [`World::pose`](crate::World::pose).
+    /// Largest force that moves the tool, N, at least 0; 0 or infinite means unlimited. If tissue resists with more,
+    /// the tool stops short of its target: see [`World::pose`](crate::World::pose).
     pub force_limit: f32,
-    /// Which bodies it meets.
+    /// Selects the bodies that the tool collides with.
     pub filter: CollisionFilter,
-    /// Where it is at first.
+    /// Initial pose.
     pub pose: Pose,
 }
 
 impl<'a> ToolDefinition<'a> {
-    /// A tool of this shape at the origin, without friction, that meets everything.
+    /// Defines a tool of this shape at the origin, without friction, that collides with everything.
     pub fn new(shape: Shape<'a>) -> Self {
         Self {
             shape,
@@ -198,22 +199,22 @@ impl<'a> ToolDefinition<'a> {
     }
 }
 
-/// A shape as a tool keeps it.
+/// A tool's shape as it is stored.
 #[derive(Clone, Debug)]
-pub(crate) enum Form {
-    /// All that is within `radius` of a segment along y; a sphere's has no length.
+pub(crate) enum ToolShape {
+    /// All points within `radius` of a segment along y; a sphere's has length 0.
     Rounded { radius: f32, half_length: f32 },
-    /// All that lies below y = 0.
+    /// All points below y = 0.
     HalfSpace,
-    /// What a closed surface encloses.
+    /// The inside of a closed surface.
     Mesh(Arc<MeshSolid>),
 }
 
-saved_enum!(Form { 0 => Rounded { radius, half_length }, 1 => HalfSpace, 2 => Mesh(solid) });
+saved_enum!(ToolShape { 0 => Rounded { radius, half_length }, 1 => HalfSpace, 2 => Mesh(solid) });
 
-/// How many tools contacts need room for, and whether some are meshes.
+/// Number and kind of the tools that contacts reserve memory for.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ToolPlaces {
+pub(crate) struct ToolCapacity {
     pub count: usize,
     pub has_meshes: bool,
 }
@@ -221,39 +222,40 @@ pub(crate) struct ToolPlaces {
 /// A tool of a world.
 #[derive(Clone, Debug)]
 pub(crate) struct Tool {
-    pub form: Form,
+    pub shape: ToolShape,
     pub friction: f32,
     pub force_limit: f32,
     pub filter: CollisionFilter,
     pub pose: Pose,
-    /// Where the next step moves it.
+    /// Pose that the next step moves it to.
     pub target: Option<Pose>,
-    /// Where the last step was to move it.
-    pub led_to: Pose,
-    /// How much of that way the step in progress takes, where it has a limit of force.
-    pub reach: Option<PressSearch>,
-    /// Mean force on it over the last step, N.
+    /// Target of the last step.
+    pub last_target: Pose,
+    /// Search for the fraction of the path that respects the force limit, if there is a limit.
+    pub limit_search: Option<ForceLimitSearch>,
+    /// Mean force over the last step, N.
     pub force: Vec3,
     /// Mean torque about its position over the last step, N m.
     pub torque: Vec3,
-    /// By how much, at most, equations of the last step had that force off, N.
+    /// Error bound of the force from unconverged equations of the last step, N.
     pub force_error: f32,
-    /// Its mass and motion, where forces move it.
+    /// Mass and motion of a dynamic tool.
     pub rigid: Option<Box<Rigid>>,
-    /// What the caller keeps with it.
+    /// Data of the caller.
     pub user_data: usize,
 }
 
 saved! { Tool {
-    form, friction, force_limit, filter, pose, target, led_to, reach, force, torque, force_error, rigid,
+    shape, friction, force_limit, filter, pose, target, last_target, limit_search, force, torque, force_error, rigid,
 } leaves { user_data: 0 } }
 
-/// A longer capsule, as a part of its radius, has no caps among triangles with corners in `f32`.
+/// Largest half length of a capsule drawn as triangles, relative to its radius. The caps of a longer one vanish in
+/// `f32` rounding.
 const SLENDEREST: f32 = 1e4;
 
 impl Tool {
     pub fn is_mesh(&self) -> bool {
-        matches!(self.form, Form::Mesh(_))
+        matches!(self.shape, ToolShape::Mesh(_))
     }
 
     pub fn new(definition: &ToolDefinition) -> Result<Self> {
@@ -279,12 +281,12 @@ impl Tool {
         );
         let rounded = |radius, half_length| match detection {
             Detection::ImageSpace => {
-                let (positions, triangles) = rounded::surface(radius, half_length)?;
-                MeshSolid::shared(&positions, &triangles, detection, resolution).map(Form::Mesh)
+                let (positions, triangles) = capsule::surface(radius, half_length)?;
+                MeshSolid::new_shared(&positions, &triangles, detection, resolution).map(ToolShape::Mesh)
             }
-            _ => Ok(Form::Rounded { radius, half_length }),
+            _ => Ok(ToolShape::Rounded { radius, half_length }),
         };
-        let form = match definition.shape {
+        let shape = match definition.shape {
             Shape::Sphere { radius } => {
                 positive("radius", radius)?;
                 rounded(radius, 0.0)?
@@ -300,27 +302,27 @@ impl Tool {
                 );
                 rounded(radius, half_length)?
             }
-            Shape::Plane => Form::HalfSpace,
+            Shape::Plane => ToolShape::HalfSpace,
             Shape::Box { half_extents } => {
                 for (axis, half_extent) in half_extents.to_array().into_iter().enumerate() {
                     positive(&format!("half_extents[{axis}]"), half_extent)?;
                 }
                 let (positions, triangles) = cuboid::surface(half_extents);
-                Form::Mesh(MeshSolid::shared(&positions, &triangles, detection, resolution)?)
+                ToolShape::Mesh(MeshSolid::new_shared(&positions, &triangles, detection, resolution)?)
             }
             Shape::Mesh { positions, triangles } => {
-                Form::Mesh(MeshSolid::shared(positions, triangles, detection, resolution)?)
+                ToolShape::Mesh(MeshSolid::new_shared(positions, triangles, detection, resolution)?)
             }
         };
         Ok(Self {
-            form,
+            shape,
             friction: definition.friction,
             force_limit,
             filter: definition.filter,
             pose,
             target: None,
-            led_to: pose,
-            reach: None,
+            last_target: pose,
+            limit_search: None,
             force: Vec3::ZERO,
             torque: Vec3::ZERO,
             force_error: 0.0,
@@ -330,7 +332,7 @@ impl Tool {
     }
 }
 
-/// The limit of force that a number means: 0 is unlimited, like infinity.
+/// Returns the force limit that a value stands for: 0 means unlimited, like infinity.
 fn force_limit(limit: f32) -> Result<f32> {
     if limit >= 0.0 {
         return Ok(if limit == 0.0 { f32::INFINITY } else { limit });
@@ -339,50 +341,50 @@ fn force_limit(limit: f32) -> Result<f32> {
 }
 
 impl Tool {
-    /// Gives it this friction from the next step on.
+    /// Sets the friction from the next step on.
     pub fn set_friction(&mut self, friction: f32) -> Result<()> {
         not_negative("friction", friction)?;
         self.friction = friction;
         Ok(())
     }
 
-    /// Has this force, N, be the largest that moves it from the next step on.
+    /// Sets the force limit from the next step on, N.
     pub fn set_force_limit(&mut self, limit: f32) -> Result<()> {
         self.force_limit = force_limit(limit)?;
         Ok(())
     }
 
-    /// Whether it is a plane.
+    /// Returns true for a plane.
     pub fn is_plane(&self) -> bool {
-        matches!(self.form, Form::HalfSpace)
+        matches!(self.shape, ToolShape::HalfSpace)
     }
 
-    /// Where the step in progress takes it.
-    pub fn aim(&self) -> Pose {
+    /// Returns the pose that the current step moves it to.
+    pub fn step_target(&self) -> Pose {
         let target = self.target.unwrap_or(self.pose);
-        match self.reach {
-            Some(reach) if reach.part < 1.0 => self.pose.on_way_to(&target, reach.part),
+        match self.limit_search {
+            Some(limit_search) if limit_search.fraction < 1.0 => self.pose.interpolate(&target, limit_search.fraction),
             _ => target,
         }
     }
 
-    /// Begins a step: all of its way, until it is known what resists.
-    pub fn set_out(&mut self) {
-        let goes = self.target.is_some_and(|target| target != self.pose);
-        let is_limited = self.force_limit < f32::INFINITY && goes;
-        self.reach = is_limited.then(|| PressSearch::new(self.force.length(), self.force_limit));
+    /// Begins a step with the whole path, until the resistance is known.
+    pub fn begin_step(&mut self) {
+        let moves = self.target.is_some_and(|target| target != self.pose);
+        let is_limited = self.force_limit < f32::INFINITY && moves;
+        self.limit_search = is_limited.then(|| ForceLimitSearch::new(self.force.length(), self.force_limit));
     }
 
-    /// Adds the bits that the next step depends on.
+    /// Hashes the state that the next step depends on.
     pub fn hash_state(&self, hasher: &mut StateHasher) {
-        match &self.form {
-            Form::Rounded { radius, half_length } => hasher.write_floats(&[1.0, *radius, *half_length]),
-            Form::HalfSpace => hasher.write_floats(&[2.0]),
-            Form::Mesh(solid) => hasher.write_u64(solid.hash()),
+        match &self.shape {
+            ToolShape::Rounded { radius, half_length } => hasher.write_floats(&[1.0, *radius, *half_length]),
+            ToolShape::HalfSpace => hasher.write_floats(&[2.0]),
+            ToolShape::Mesh(solid) => hasher.write_u64(solid.hash()),
         }
         hasher.write_floats(&[self.friction, self.force_limit]);
         if self.force_limit.is_finite() {
-            // The search for how far it gets begins with it.
+            // The search under the force limit starts from it.
             hasher.write_floats(&self.force.to_array());
         }
         if let Some(rigid) = &self.rigid {

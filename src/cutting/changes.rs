@@ -1,8 +1,8 @@
-//! What a cut has changed, for the solver and for a renderer.
+//! The changes of a cut, for the solver and for renderers.
 
 use crate::base::{Result, memory};
 
-/// A part of what a node was before the cut.
+/// A part of a node after a cut.
 ///
 /// ```
 #[doc = include_str!("../doctest/cut_sheet.txt")]
@@ -17,15 +17,16 @@ use crate::base::{Result, memory};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PieceOfNode {
-    /// The node: its source, which keeps its number, or a new one, which starts with its source's position and velocity.
+    /// The node: the source, which keeps its index, or a copy, which starts with the position and velocity of the
+    /// source.
     pub node: u32,
-    /// The node that it was.
+    /// The node before the cut.
     pub source: u32,
-    /// Its part of the source's mass as it was, above 0; those of one source add up to 1.
+    /// The part of the source's previous mass, above 0. The parts of one source add up to 1.
     pub part: f64,
 }
 
-/// A part of what a spring was before the cut. It has its source's rest length.
+/// A part of a spring after a cut. It has the rest length of its source.
 ///
 /// ```
 #[doc = include_str!("../doctest/cut_sheet.txt")]
@@ -40,15 +41,15 @@ pub struct PieceOfNode {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PieceOfSpring {
-    /// Its nodes, in the order of `source`.
+    /// The nodes, in the order of `source`.
     pub nodes: [u32; 2],
-    /// The nodes of the spring that it was, in ascending order.
+    /// The nodes of the spring before the cut, in ascending order.
     pub source: [u32; 2],
-    /// Its part of the source's stiffness as it was, above 0; those of one source add up to 1.
+    /// The part of the source's previous stiffness, above 0. The parts of one source add up to 1.
     pub part: f64,
 }
 
-/// A part of what a cell was before the cut.
+/// A part of a cell after a cut.
 ///
 /// ```
 #[doc = include_str!("../doctest/cut_sheet.txt")]
@@ -61,15 +62,15 @@ pub struct PieceOfSpring {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PieceOfCell {
-    /// The cell: its source, which keeps its number, or a new one.
+    /// The cell: the source, which keeps its index, or a copy.
     pub cell: u32,
-    /// The cell that it was.
+    /// The cell before the cut.
     pub source: u32,
-    /// Its part of the source's material as it was, above 0; those of one source add up to 1.
+    /// The part of the source's previous material, above 0. The parts of one source add up to 1.
     pub part: f64,
 }
 
-/// A point of what is drawn that is at no node, but bound to some.
+/// A point of the render mesh that is bound to nodes.
 ///
 /// ```
 #[doc = include_str!("../doctest/cut_sheet.txt")]
@@ -84,15 +85,16 @@ pub struct PieceOfCell {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundPoint {
-    /// Its number among nodes.
+    /// The index among nodes.
     pub point: u32,
-    /// The nodes that it is bound to; those beyond the first may repeat it with weight 0.
+    /// The nodes that it is bound to. Further entries may repeat the first one with weight 0.
     pub nodes: [u32; 4],
-    /// How much of each, at least 0, 1 in all.
+    /// The weights of the nodes. They are at least 0 and add up to 1.
     pub weights: [f64; 4],
 }
 
-/// Where a new node or point that is drawn comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
+/// The origin of a new point of the render mesh. Attributes of vertices, such as texture coordinates and skinning
+/// weights, are interpolated with these weights.
 ///
 /// ```
 #[doc = include_str!("../doctest/cut_sheet.txt")]
@@ -107,43 +109,45 @@ pub struct BoundPoint {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Source {
-    /// Its number among nodes.
+    /// The index among nodes.
     pub point: u32,
-    /// Those that it lies between, each of a lower number than its own; those beyond the first may repeat it with weight 0.
+    /// The points that it lies between, each with a lower index than its own. Further entries may repeat the first one
+    /// with weight 0.
     pub sources: [u32; 3],
-    /// How much of each, at least 0, 1 in all.
+    /// The weights of the sources. They are at least 0 and add up to 1.
     pub weights: [f64; 3],
 }
 
-/// Where a new vertex comes from.
+/// The origin of a new vertex.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct NewVertex {
-    /// The vertices that it lies between, each of a lower number than its own; those beyond the first may repeat it with weight 0.
+    /// The vertices that it lies between, each with a lower index than its own. Further entries may repeat the first
+    /// one with weight 0.
     pub sources: [u32; 3],
     pub weights: [f64; 3],
 }
 
-/// A new edge of the rim: of surfaces each edge that was cut is two of them, one on either side; of solids those where the inside that was bared
-/// meets the skin.
+/// A new cut-boundary edge. A cut edge of a surface becomes two of them, one on each side. In a solid they lie where
+/// exposed faces meet the skin.
 ///
 /// ```
 #[doc = include_str!("../doctest/cut_sheet.txt")]
 /// # let near = sheet.near(&across, &mesh.positions)?;
 /// # let changes = sheet.cut(&across, &mesh.positions, &near, Limits::NONE)?;
-/// // Each edge of the cut is two of the rim.
+/// // Each cut edge becomes two boundary edges.
 /// let length: f64 = changes.rim.iter().map(|edge| edge.length).sum();
 /// assert!((length - 2.0 * 0.1).abs() < 1e-3);
 /// # Ok::<(), sinew::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RimEdge {
-    /// Its ends, by their numbers among nodes, in the order in which its triangle has them.
+    /// The ends, by their indices among nodes, in the order of the corners of `triangle`.
     pub points: [u32; 2],
-    /// The triangle that it is a side of.
+    /// The triangle that has this edge. In a solid it is an exposed one.
     pub triangle: u32,
-    /// The triangle that lay across; of solids that of the skin, `triangle` being of the inside.
+    /// The triangle on the other side of the edge. In a solid it belongs to the skin.
     pub across: u32,
-    /// How long it is in the rest shape, m.
+    /// The length in the rest shape, m.
     pub length: f64,
 }
 
@@ -159,14 +163,14 @@ pub struct RimEdge {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutFace {
-    /// The triangles that are drawn on its two sides.
+    /// The triangles of the render mesh on the two sides.
     pub triangles: [u32; 2],
-    /// Its area in the rest shape, m².
+    /// The area in the rest shape, m².
     pub area: f64,
 }
 
-/// What a cut has changed. New nodes and points, cells and triangles are numbered from their count before the cut on. The order of all lists
-/// depends on what is cut and the blade alone.
+/// The changes of a cut. New nodes, points, cells and triangles are numbered from their count before the cut on. The
+/// order of all lists depends only on the material and the blade.
 ///
 /// ```
 #[doc = include_str!("../doctest/cut_sheet.txt")]
@@ -178,41 +182,42 @@ pub struct CutFace {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Changes {
-    /// All parts of each node that fell apart; new ones in ascending order.
+    /// All parts of each node that fell apart. Copies are in ascending order.
     pub nodes: Vec<PieceOfNode>,
     /// All parts of each spring along an edge of cells that fell apart or changed a node.
     pub springs: Vec<PieceOfSpring>,
-    /// The springs that are no more: none of their parts has their nodes.
+    /// Springs that have been removed: none of their parts has their nodes.
     pub removed_springs: Vec<[u32; 2]>,
     /// All parts of each cell that fell apart, and cells that changed a node.
     pub cells: Vec<PieceOfCell>,
-    /// Points that are bound to nodes: new ones, in ascending order, and others whose nodes changed.
+    /// Points that are bound to nodes: new ones in ascending order, and others whose nodes changed.
     pub bound: Vec<BoundPoint>,
-    /// The new nodes that no vertex is at: they lie beyond the cut.
+    /// New nodes without a vertex. They lie beyond the cut.
     pub undrawn: Vec<u32>,
-    /// Where what is new and drawn, or inside a solid, comes from, in the order of numbers.
+    /// The origins of new points of the render mesh and of points inside solids, in the order of indices.
     pub sources: Vec<Source>,
-    /// The number of the first new triangle.
+    /// The index of the first new triangle.
     pub first_triangle: u32,
-    /// The triangles whose corners or cell changed, and the new ones.
+    /// Triangles whose corners or cell changed, and new ones.
     pub triangles: Vec<u32>,
-    /// Of surfaces: the vertices where the blade's edge stands at the end of the step, in the surface or on its border: where it goes on from
-    /// if the surface moves before the next step.
+    /// For surfaces, the vertices at the blade's edge at the end of the step, inside the surface or on its border. The
+    /// next step continues from them if the surface moves.
     pub ends: Vec<u32>,
-    /// The new edges of the rim.
+    /// New cut-boundary edges.
     pub rim: Vec<RimEdge>,
-    /// Of solids: the faces that have opened.
+    /// For solids, the faces that have opened.
     pub faces: Vec<CutFace>,
     pub(crate) vertices: Vec<NewVertex>,
 }
 
 impl Changes {
-    /// Whether nothing is other than it was.
+    /// True if nothing has changed.
     pub(crate) fn is_empty(&self) -> bool {
         self.triangles.is_empty() && self.nodes.is_empty() && self.bound.is_empty()
     }
 
-    /// Tells of the copies of nodes which have a vertex at them, of which these are all: those come from their sources.
+    /// Lists the origins of copies of nodes, given all nodes that have a vertex. Copies without a vertex are not
+    /// rendered.
     pub(crate) fn list_copies(&mut self, at_vertices: &[u32]) -> Result<()> {
         for &PieceOfNode { node, source, .. } in &self.nodes {
             if node == source {
@@ -232,8 +237,8 @@ impl Changes {
         Ok(())
     }
 
-    /// Tells where the new vertices come from, which are numbered from `first` on: by the point and the first node of each, and the points of all
-    /// before the cut, if they were there.
+    /// Lists the origins of the new vertices, numbered from `first` on. `at` returns the point and the first node of a
+    /// vertex, and `point_before` the point before the cut.
     pub(crate) fn list_sources(
         &mut self,
         first: u32,

@@ -1,52 +1,52 @@
-//! Edges that are cut: between two vertices there is a way of edges.
+//! Cuts along edges: connects two vertices by a path of edges.
 
 use glam::DVec3;
 
+use super::cell_complex::NONE;
 use super::cut::Cut;
-use super::divided::NONE;
 use crate::base::Result;
 
-/// A way that is longer was led astray by a surface that is folded in its rest shape; the cut ends there.
-const LONGEST_WAY: usize = 64;
+/// A longer path was misled by a surface that is folded in its rest shape. The cut ends there.
+const MAX_PATH_EDGES: usize = 64;
 
 impl Cut<'_> {
-    /// Cuts between two vertices near each other: along the edge between them, mostly; else straight across what lies between. What was cut
-    /// before may lie between: then from both up to there.
+    /// Cuts between two vertices near each other: along the edge between them, or in a straight line across the
+    /// triangles between them. If an earlier cut lies between them, both ends are connected to it.
     pub(crate) fn connect(&mut self, from: u32, to: u32) -> Result<()> {
-        if from != NONE && to != NONE && !self.cut_towards(from, to)? {
-            self.cut_towards(to, from)?;
+        if from != NONE && to != NONE && !self.cut_straight(from, to)? {
+            self.cut_straight(to, from)?;
         }
         Ok(())
     }
 
-    /// Cuts from one vertex straight to another; answers whether it has come there.
-    fn cut_towards(&mut self, from: u32, to: u32) -> Result<bool> {
-        let (mut before, mut at) = (NONE, from);
-        for _ in 0..LONGEST_WAY {
-            if at == to || self.mark(at, to)? {
+    /// Cuts in a straight line from one vertex to another. Returns true if it arrives there.
+    fn cut_straight(&mut self, from: u32, to: u32) -> Result<bool> {
+        let (mut before, mut current) = (NONE, from);
+        for _ in 0..MAX_PATH_EDGES {
+            if current == to || self.mark_edge(current, to)? {
                 return Ok(true);
             }
-            let goal = self.surface.rest_place(to);
-            let Some((triangle, side, along)) = self.way_out(at, goal)? else {
+            let target = self.surface.rest_place(to);
+            let Some((triangle, side, along)) = self.exit_towards(current, target)? else {
                 return Ok(false);
             };
-            let next = self.vertex_at(triangle, side, along)?;
+            let next = self.vertex_on_side(triangle, side, along)?;
             if next == before {
                 return Ok(false);
             }
-            self.mark(at, next)?;
-            (before, at) = (at, next);
+            self.mark_edge(current, next)?;
+            (before, current) = (current, next);
         }
         Ok(false)
     }
 
-    /// Marks the edge between two vertices as cut; answers whether there is one.
-    fn mark(&mut self, from: u32, to: u32) -> Result<bool> {
+    /// Marks the edge between two vertices as cut. Returns true if it exists.
+    fn mark_edge(&mut self, from: u32, to: u32) -> Result<bool> {
         for (triangle, corner) in self.ring(from)? {
             let it = &self.surface.triangles[triangle];
-            let ends_there = |side: &usize| it.corners[*side] == to || it.corners[(side + 1) % 3] == to;
-            if let Some(side) = [corner, (corner + 2) % 3].into_iter().find(ends_there) {
-                if it.neighbours[side] != NONE {
+            let has_end = |side: &usize| it.corners[*side] == to || it.corners[(side + 1) % 3] == to;
+            if let Some(side) = [corner, (corner + 2) % 3].into_iter().find(has_end) {
+                if it.neighbors[side] != NONE {
                     self.set_cut(triangle, side, true)?;
                 }
                 return Ok(true);
@@ -55,29 +55,31 @@ impl Cut<'_> {
         Ok(false)
     }
 
-    /// Sets whether a side of a triangle, which has a triangle across, is to be cut.
+    /// Marks a side of a triangle, which has a triangle across, as cut or uncut.
     pub(crate) fn set_cut(&mut self, triangle: u32, side: usize, is_cut: bool) -> Result<()> {
         let it = &self.surface.triangles[triangle];
-        let across = it.neighbours[side];
-        let back = self.surface.corner(across, it.corners[(side + 1) % 3]);
+        let across = it.neighbors[side];
+        let opposite_side = self.surface.corner(across, it.corners[(side + 1) % 3]);
         self.surface
             .triangles
             .edit(triangle, |triangle| triangle.rim[side] = is_cut)?;
-        self.surface.triangles.edit(across, |across| across.rim[back] = is_cut)
+        self.surface
+            .triangles
+            .edit(across, |across| across.rim[opposite_side] = is_cut)
     }
 
-    /// Where the straight way from a vertex to a place leaves the triangles about it: the triangle, its side, and how far along that. None if the
-    /// way does not lead into one of them.
-    pub(crate) fn way_out(&self, at: u32, goal: DVec3) -> Result<Option<(u32, usize, f64)>> {
-        let start = self.surface.rest_place(at);
-        let way = goal - start;
-        for (triangle, corner) in self.ring(at)? {
+    /// The point where a straight line from a vertex to a position leaves the triangles around the vertex: the
+    /// triangle, its side, and the position along the side. `None` if the line enters none of them.
+    pub(crate) fn exit_towards(&self, current: u32, target: DVec3) -> Result<Option<(u32, usize, f64)>> {
+        let start = self.surface.rest_place(current);
+        let direction = target - start;
+        for (triangle, corner) in self.ring(current)? {
             let corners = self.surface.triangles[triangle].corners;
             let [right, left] = [1, 2].map(|k| self.surface.rest_place(corners[(corner + k) % 3]) - start);
             let normal = right.cross(left);
-            // A way along an edge leads into the triangles on both sides.
-            let rounding = 1e-6 * normal.length() * way.length() * right.length().max(left.length());
-            let [right, left] = [right, left].map(|side| normal.dot(way.cross(side)));
+            // A line along an edge enters the triangles on both sides.
+            let rounding = 1e-6 * normal.length() * direction.length() * right.length().max(left.length());
+            let [right, left] = [right, left].map(|side| normal.dot(direction.cross(side)));
             if right <= rounding && left >= -rounding && right < left {
                 let along = (right / (right - left)).clamp(0.0, 1.0);
                 return Ok(Some((triangle, (corner + 1) % 3, along)));

@@ -1,13 +1,14 @@
-//! A cut from its beginning to its end.
+//! All stages of a cut.
 
 use glam::{DVec3, Vec3};
 
+use super::cell_copies::Copier;
 use super::changes::Changes;
-use super::pieces::Copier;
 use super::surface::CutSurface;
 use crate::base::{Error, Result, ensure, memory};
 
-/// What a blade's edge, a segment, passes over in one step: two triangles, which meet from the start's first point to the end's second.
+/// The surface that a blade's edge sweeps in one step. It consists of two triangles that share the line from the
+/// start's first point to the end's second.
 ///
 /// ```
 /// # use glam::vec3;
@@ -30,24 +31,24 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// The two triangles; the last side of each is the one that they share, the first the blade's edge before and after the step.
+    /// The two triangles. Their last side is shared. Their first side is the blade's edge before and after the step.
     pub(crate) fn triangles(&self) -> [[Vec3; 3]; 2] {
         let ([a, b], [c, d]) = (self.start, self.end);
         [[a, b, d], [d, c, a]]
     }
 
-    /// The numbers of the items whose box meets its own, of the corners of each.
+    /// The indices of the items, given by their corners, whose bounding box overlaps that of the sweep.
     pub(crate) fn near<const N: usize>(&self, items: impl Iterator<Item = [Vec3; N]>) -> Result<Vec<u32>> {
         let (low, high) = bounds(&[self.start[0], self.start[1], self.end[0], self.end[1]]);
-        let meets = |corners: &[Vec3; N]| {
+        let overlaps = |corners: &[Vec3; N]| {
             let (from, to) = bounds(corners);
             from.cmple(high).all() && low.cmple(to).all()
         };
-        let near = (0..).zip(items).filter(|(_, corners)| meets(corners));
+        let near = (0..).zip(items).filter(|(_, corners)| overlaps(corners));
         memory::gathered(near.map(|(number, _)| number))
     }
 
-    /// Refuses what no cut is made of: with items of a name and a count, of which `nodes_of` tells the nodes.
+    /// Refuses invalid arguments of a cut. `nodes_of` returns the nodes of an item.
     pub(crate) fn check<const N: usize>(
         &self,
         positions: &[Vec3],
@@ -75,7 +76,7 @@ impl Sweep {
     }
 }
 
-/// How many there may be after a cut; one that needs more is refused.
+/// The maximum counts after a cut. A cut that needs more fails.
 ///
 /// ```
 #[doc = include_str!("../doctest/cut_sheet.txt")]
@@ -87,23 +88,23 @@ impl Sweep {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Nodes, with copies and bound points.
+    /// Nodes, including copies and bound points.
     pub nodes: u32,
-    /// Vertices of what is drawn.
+    /// Vertices of the render mesh.
     pub vertices: u32,
-    /// Triangles that are drawn.
+    /// Triangles of the render mesh.
     pub triangles: u32,
 }
 
 impl Limits {
-    /// As many as can be numbered.
+    /// The largest counts with valid indices.
     pub const NONE: Self = Self {
         nodes: u32::MAX / 3,
         vertices: u32::MAX / 3,
         triangles: u32::MAX / 3,
     };
 
-    /// Refuses one more than `count` if there may be no more than `limit`.
+    /// Refuses to exceed `limit` with one more than `count`.
     pub(crate) fn check(&self, what: &str, count: u32, limit: u32) -> Result<()> {
         if count < limit.min(u32::MAX / 3) {
             return Ok(());
@@ -114,32 +115,36 @@ impl Limits {
     }
 }
 
-/// A cut that is being made.
+/// A cut in progress.
 pub(crate) struct Cut<'a> {
     pub(crate) surface: &'a mut CutSurface,
     pub(crate) limits: Limits,
     pub(crate) changes: Changes,
-    /// Where the side that the swept triangles share passes through, in the rest shape, with the vertices there.
-    pub(crate) joints: Vec<(DVec3, u32)>,
-    /// Vertices that a point was snapped to, and ends of cuts within the snapping distance of it.
-    pub(crate) joins: Vec<[u32; 2]>,
+    /// Positions in the rest shape where the side shared by the swept triangles passes through, with the vertices
+    /// there.
+    pub(crate) shared_crossings: Vec<(DVec3, u32)>,
+    /// Vertices that points were snapped to, and ends of cuts within their snapping distance.
+    pub(crate) pending_joins: Vec<[u32; 2]>,
 }
 
 impl CutSurface {
-    /// Cuts what a blade passes through while nodes are at `positions`. Of the triangles `candidates` alone, in any order, it finds those
-    /// that are met: all whose box meets the sweep's.
+    /// Cuts the triangles that a blade passes through with nodes at `positions`. It examines only the triangles in
+    /// `candidates`, in any order. They must include all whose bounding box overlaps that of the sweep.
     ///
-    /// Where the blade crosses an edge or ends in a triangle there is a vertex from then on: one that is there, or on an edge that is there, if
-    /// it lies within 5 % of the shortest edge of the cell, in the rest shape. Edges between them are cut. A cell whose material falls apart is
-    /// copied for each piece; copies share nodes where their material hangs together across an edge (Molino, Bao, Fedkiw 2004). Of the
-    /// copies of a node that keeps its number which moves what is drawn at the node; of several that with the most material.
+    /// Each point where the blade crosses an edge or ends in a triangle becomes a vertex. An existing vertex or a point
+    /// of an existing edge is used within 5 % of the cell's shortest edge in the rest shape. Edges between these
+    /// vertices are cut. A cell whose material falls apart is copied for each piece. Copies share nodes if their
+    /// material is connected across an edge (Molino, Bao, Fedkiw 2004). The copy that moves the render mesh at the node
+    /// keeps the node's index, or of several the one with the most material.
     ///
-    /// The cost is that of what is met. [`CutSurface::undo`] takes it back until the next cut.
+    /// The cost is proportional to the intersected triangles. [`CutSurface::undo`] restores the state before the cut,
+    /// until the next cut.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] if there is not one position for each node, if one that is needed or the blade is not finite, or if a
-    /// candidate is unknown; [`Error::Capacity`] beyond the limits; [`Error::OutOfMemory`]. Then nothing has changed.
+    /// [`Error::InvalidArgument`] if the number of positions is not the number of nodes, if a needed position or the
+    /// blade is not finite, or if a candidate is unknown; [`Error::Capacity`] beyond the limits;
+    /// [`Error::OutOfMemory`]. An error changes nothing.
     pub fn cut(&mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32], limits: Limits) -> Result<Changes> {
         let nodes_of = |triangle: u32| self.cells[self.triangles[triangle].cell].nodes;
         let items = ("triangles", self.triangles.count());
@@ -151,18 +156,18 @@ impl CutSurface {
                 first_triangle: self.triangles.count(),
                 ..Changes::default()
             },
-            joints: Vec::new(),
-            joins: Vec::new(),
+            shared_crossings: Vec::new(),
+            pending_joins: Vec::new(),
             surface: self,
         };
-        let changes = cut.make(sweep, positions, candidates);
+        let changes = cut.run(sweep, positions, candidates);
         if changes.is_err() {
             self.undo();
         }
         changes
     }
 
-    /// Takes back the last cut; a second time, nothing.
+    /// Undoes the last cut. A second call does nothing.
     pub fn undo(&mut self) {
         self.nodes.undo();
         self.cells.undo();
@@ -177,40 +182,41 @@ impl CutSurface {
         self.vertices.begin();
     }
 
-    /// The triangles whose box meets the sweep's if nodes are at `positions`, found by going through all.
+    /// The triangles whose bounding box overlaps that of the sweep with nodes at `positions`. All triangles are
+    /// examined.
     pub fn near(&self, sweep: &Sweep, positions: &[Vec3]) -> Result<Vec<u32>> {
-        let place = |corner| self.place(corner, positions);
-        sweep.near(self.triangles().iter().map(|triangle| triangle.corners.map(place)))
+        let position = |corner| self.place(corner, positions);
+        sweep.near(self.triangles().iter().map(|triangle| triangle.corners.map(position)))
     }
 }
 
 impl Cut<'_> {
-    fn make(mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<Changes> {
+    fn run(mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<Changes> {
         let mut candidates = memory::copied(candidates)?;
         memory::sort_once(&mut candidates);
         let [first, second] = sweep.triangles();
-        self.carve(first, false, positions, &candidates)?;
-        // What the first has added lies where candidates were.
+        self.intersect(first, false, positions, &candidates)?;
+        // Triangles that the first swept triangle added lie in those of the candidates.
         let added = self.surface.triangles.count_before()..self.surface.triangles.count();
         candidates.try_reserve(added.len())?;
         candidates.extend(added);
-        self.carve(second, true, positions, &candidates)?;
-        self.keep_crumbs()?;
+        self.intersect(second, true, positions, &candidates)?;
+        self.keep_slivers()?;
         let cells = self.open()?;
         Copier {
             body: &mut *self.surface,
             limits: self.limits,
             changes: &mut self.changes,
         }
-        .part(&cells)?;
+        .run(&cells)?;
         self.finish()
     }
 
-    /// The lists that only the end can tell.
+    /// Completes the lists of changes.
     fn finish(mut self) -> Result<Changes> {
         memory::sort_once(&mut self.changes.ends);
-        self.changes.triangles = self.surface.triangles.touched()?;
-        self.number_points()?;
+        self.changes.triangles = self.surface.triangles.changed_indices()?;
+        self.assign_points()?;
         for edge in &mut self.changes.rim {
             edge.points = edge.points.map(|vertex| self.surface.vertices[vertex].point);
         }

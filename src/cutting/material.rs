@@ -1,20 +1,20 @@
-//! What a body's material is made of where it can be cut: triangles, tetrahedra, or springs alone.
+//! The material of a body that can be cut: triangles, tetrahedra, or only springs.
 
 use glam::{DVec3, Vec3};
 
+use super::blade_query::BladeContact;
+use super::cell_complex::CellComplex;
 use super::changes::Changes;
 use super::cut::{Limits, Sweep};
-use super::divided::Divided;
-use super::met::Met;
 use super::solid::{CutSolid, SolidStroke};
 use super::surface::CutSurface;
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{saved, saved_enum};
 
-/// The material of a body. It is looked for by *items*: the triangles of a surface, the cells of a solid, springs.
+/// The material of a body. Its *items* are the triangles of a surface, the cells of a solid, or springs.
 #[derive(Debug)]
 pub(crate) enum CutMaterial {
-    /// Those that a blade passes through go; nothing else changes.
+    /// A blade removes those that it passes through, and changes nothing else.
     Springs(Vec<[u32; 2]>),
     Surface(CutSurface),
     Solid(CutSolid),
@@ -23,7 +23,7 @@ pub(crate) enum CutMaterial {
 saved_enum!(CutMaterial { 0 => Springs(it), 1 => Surface(it), 2 => Solid(it) });
 
 impl CutMaterial {
-    /// That of triangles.
+    /// The material if it consists of triangles.
     pub fn surface(&self) -> Option<&CutSurface> {
         match self {
             Self::Surface(surface) => Some(surface),
@@ -31,7 +31,7 @@ impl CutMaterial {
         }
     }
 
-    /// That of tetrahedra.
+    /// The material if it consists of tetrahedra.
     pub fn solid(&self) -> Option<&CutSolid> {
         match self {
             Self::Solid(solid) => Some(solid),
@@ -56,16 +56,22 @@ impl CutMaterial {
         }
     }
 
-    /// See [`CutSurface::meet`] and [`CutSolid::meet`], with items as candidates.
-    pub fn meet(&self, sweep: &Sweep, positions: &[Vec3], near: &[u32], met: &mut Vec<Met>) -> Result<()> {
+    /// See [`CutSurface::query_blade`] and [`CutSolid::query_blade`], with items as candidates.
+    pub fn query_blade(
+        &self,
+        sweep: &Sweep,
+        positions: &[Vec3],
+        near: &[u32],
+        contacts: &mut Vec<BladeContact>,
+    ) -> Result<()> {
         match self {
             Self::Springs(_) => Ok(()),
-            Self::Surface(surface) => surface.meet(sweep, positions, near, met),
-            Self::Solid(solid) => solid.meet(sweep, positions, near, met),
+            Self::Surface(surface) => surface.query_blade(sweep, positions, near, contacts),
+            Self::Solid(solid) => solid.query_blade(sweep, positions, near, contacts),
         }
     }
 
-    /// Takes back the last cut.
+    /// Undoes the last cut.
     pub fn undo(&mut self) {
         match self {
             Self::Springs(_) => {}
@@ -74,12 +80,13 @@ impl CutMaterial {
         }
     }
 
-    /// How many more pieces it has after the last cut; `None` if that takes more than `most` triangles or tetrahedra to find out.
-    pub fn parted(&self, changes: &Changes, most: usize) -> Result<Option<u32>> {
+    /// The number of components that the last cut has added. `None` if more than `max_simplices` triangles or tetrahedra must be
+    /// visited.
+    pub fn parted(&self, changes: &Changes, max_simplices: usize) -> Result<Option<u32>> {
         match self {
             Self::Springs(_) => Ok(Some(0)),
-            Self::Surface(surface) => surface.parted(&changes.rim, most),
-            Self::Solid(solid) => solid.parted(&changes.faces, most),
+            Self::Surface(surface) => surface.parted(&changes.rim, max_simplices),
+            Self::Solid(solid) => solid.parted(&changes.faces, max_simplices),
         }
     }
 
@@ -91,8 +98,9 @@ impl CutMaterial {
         }
     }
 
-    /// How many triangles may come for each node that comes. Of a surface those that a split adds, two, with a vertex that has a node of its
-    /// own. Where a solid opens along n nodes inside, n copies come and 4 n triangles, and more at the line where it ends.
+    /// The maximum number of new triangles per new node. A split of a surface adds two triangles and a vertex with its
+    /// own node. A solid that opens along n inner nodes gains n copies and 4 n triangles, and more at the line where
+    /// the cut ends.
     pub fn triangles_per_node(&self) -> u32 {
         match self {
             Self::Springs(_) => 0,
@@ -101,19 +109,19 @@ impl CutMaterial {
         }
     }
 
-    /// Of the triangles of solids, whether a cut has bared them.
-    pub fn bared(&self) -> impl Iterator<Item = bool> {
+    /// For each triangle of a solid, true if a cut exposed it.
+    pub fn exposed(&self) -> impl Iterator<Item = bool> {
         let triangles = self.solid().map_or(&[][..], CutSolid::triangles);
         triangles.iter().map(|triangle| triangle.is_inner)
     }
 
-    /// Whether a cut has bared a triangle of a solid.
-    pub fn is_bared(&self, triangle: u32) -> bool {
+    /// True if a cut exposed a triangle of a solid.
+    pub fn is_exposed(&self, triangle: u32) -> bool {
         self.solid()
             .is_some_and(|solid| solid.triangles()[triangle as usize].is_inner)
     }
 
-    /// The corners of a triangle, by their numbers among nodes.
+    /// The corners of a triangle, by their indices among nodes.
     pub fn corner_points(&self, triangle: u32) -> [u32; 3] {
         match self {
             Self::Springs(_) => [0; 3],
@@ -122,7 +130,7 @@ impl CutMaterial {
         }
     }
 
-    /// Where the corners of a triangle are in the rest shape.
+    /// The rest positions of the corners of a triangle.
     pub fn corners_at_rest(&self, triangle: u32) -> [DVec3; 3] {
         match self {
             Self::Springs(_) => [DVec3::NAN; 3],
@@ -137,8 +145,8 @@ impl CutMaterial {
         }
     }
 
-    /// A node's part of the material of its cells, m² or m³.
-    pub fn share_at(&self, node: u32) -> f64 {
+    /// The share of a node of the material of its cells, m² or m³.
+    pub fn material_at(&self, node: u32) -> f64 {
         match self {
             Self::Springs(_) => 0.0,
             Self::Surface(surface) => surface.area_at(node),
@@ -146,7 +154,7 @@ impl CutMaterial {
         }
     }
 
-    /// Whether two nodes are corners of one cell.
+    /// True if two nodes are corners of one cell.
     pub fn has_edge(&self, nodes: [u32; 2]) -> bool {
         match self {
             Self::Springs(_) => false,
@@ -177,26 +185,26 @@ impl CutMaterial {
         }
     }
 
-    /// The nodes of the cell that an item lies in; those beyond the third may repeat the first.
+    /// The nodes of the cell that an item lies in. Nodes beyond the third may repeat the first.
     pub fn nodes_of(&self, item: u32) -> [u32; 4] {
         let cell = self.cell_of(item) as usize;
         match self {
-            Self::Springs(springs) => with_first(springs[cell]),
+            Self::Springs(springs) => two_and_first(springs[cell]),
             Self::Surface(surface) => three_and_first(surface.cells()[cell].nodes),
             Self::Solid(solid) => solid.cells()[cell].nodes,
         }
     }
 
-    /// What an item lies between, by numbers among nodes.
-    pub fn corners_of(&self, item: u32) -> [u32; 4] {
+    /// The corners of an item, by their indices among nodes.
+    pub fn item_corners(&self, item: u32) -> [u32; 4] {
         match self {
-            Self::Springs(springs) => with_first(springs[item as usize]),
+            Self::Springs(springs) => two_and_first(springs[item as usize]),
             Self::Surface(surface) => three_and_first(surface.corner_points(item)),
             Self::Solid(solid) => solid.cells()[item as usize].nodes,
         }
     }
 
-    /// How many items there are.
+    /// The number of items.
     pub fn item_count(&self) -> u32 {
         match self {
             Self::Springs(springs) => springs.len() as u32,
@@ -214,8 +222,8 @@ impl CutMaterial {
         }
     }
 
-    /// How many ends there are at most, of items that were near.
-    pub fn most_ends(&self, changes: &Changes, near: &[u32]) -> usize {
+    /// The maximum number of ends of a cut, given the items near it.
+    pub fn max_ends(&self, changes: &Changes, near: &[u32]) -> usize {
         match self {
             Self::Springs(_) => 0,
             Self::Surface(_) => changes.ends.len(),
@@ -223,24 +231,25 @@ impl CutMaterial {
         }
     }
 
-    /// Shows points of the material where a cut's edge stands at its end, with nodes at `positions`, given the items that were near it.
-    pub fn ends(
+    /// Visits the points of the material at the edge's end position, with nodes at `positions`. `near` contains the
+    /// items near it.
+    pub fn visit_ends(
         &self,
         changes: &Changes,
         sweep: &Sweep,
         positions: &[Vec3],
         near: &[u32],
-        mut see: impl FnMut(CutEnd),
+        mut visit: impl FnMut(CutEnd),
     ) {
         match self {
             Self::Springs(_) => {}
             Self::Surface(surface) => {
                 for &vertex in &changes.ends {
-                    let of = &surface.vertices()[vertex as usize];
-                    let [u, v, w] = of.weights;
-                    see(CutEnd {
+                    let surface_vertex = &surface.vertices()[vertex as usize];
+                    let [u, v, w] = surface_vertex.weights;
+                    visit(CutEnd {
                         vertex: Some(vertex),
-                        nodes: three_and_first(of.nodes),
+                        nodes: three_and_first(surface_vertex.nodes),
                         weights: [u, v, w, 0.0],
                         slack: 0.0,
                         size: surface.size_at(vertex),
@@ -249,56 +258,56 @@ impl CutMaterial {
             }
             Self::Solid(solid) => {
                 let ends = near.iter().filter_map(|&cell| solid.end_in(cell, sweep, positions));
-                ends.for_each(see);
+                ends.for_each(visit);
             }
         }
     }
 
-    /// Where an end is if nodes are at `positions`, also after other cuts.
-    pub fn place_of(&self, end: &CutEnd, positions: &[Vec3]) -> Vec3 {
+    /// The position of an end with nodes at `positions`, also after other cuts.
+    pub fn position_of_end(&self, end: &CutEnd, positions: &[Vec3]) -> Vec3 {
         if let (Self::Surface(surface), Some(vertex)) = (self, end.vertex) {
             return positions[surface.vertices()[vertex as usize].point as usize];
         }
-        let parts = end.nodes.iter().zip(end.weights);
-        let places = parts.map(|(&node, weight)| weight * positions[node as usize].as_dvec3());
-        places.sum::<DVec3>().as_vec3()
+        let weighted = end.nodes.iter().zip(end.weights);
+        let terms = weighted.map(|(&node, weight)| weight * positions[node as usize].as_dvec3());
+        terms.sum::<DVec3>().as_vec3()
     }
 
-    /// Takes a stroke for that of the next cut, and gives the one that it had.
+    /// Exchanges the stroke that the next cut continues.
     pub fn swap_stroke(&mut self, stroke: &mut SolidStroke) {
         if let Self::Solid(solid) = self {
             std::mem::swap(&mut solid.stroke, stroke);
         }
     }
 
-    /// The stroke of the next cut of a solid.
+    /// The stroke that the next cut of a solid continues.
     pub fn stroke(&self) -> Option<SolidStroke> {
         self.solid().map(|solid| solid.stroke)
     }
 
-    /// Has it be this again.
-    pub fn take_back(&mut self, stroke: Option<SolidStroke>) {
+    /// Restores a stroke of a solid.
+    pub fn restore_stroke(&mut self, stroke: Option<SolidStroke>) {
         if let (Self::Solid(solid), Some(stroke)) = (self, stroke) {
             solid.stroke = stroke;
         }
     }
 
-    /// Adds the bits that what a cut does depends on beside what is drawn.
+    /// Hashes the state that cuts depend on in addition to the render mesh.
     pub fn hash(&self, hasher: &mut StateHasher) {
         if let Self::Solid(solid) = self {
             solid.hash(hasher);
         }
     }
 
-    /// The material has moved since the last cut: the blade's edge, which stopped there, is here in it now.
-    pub fn carry(&mut self, edge: [Vec3; 2]) {
+    /// Sets the edge's current position in the material, which has moved since the last cut.
+    pub fn set_edge(&mut self, edge: [Vec3; 2]) {
         if let Self::Solid(solid) = self {
-            solid.carry(edge);
+            solid.set_edge(edge);
         }
     }
 }
 
-fn with_first([a, b]: [u32; 2]) -> [u32; 4] {
+fn two_and_first([a, b]: [u32; 2]) -> [u32; 4] {
     [a, b, a, a]
 }
 
@@ -306,16 +315,16 @@ fn three_and_first([a, b, c]: [u32; 3]) -> [u32; 4] {
     [a, b, c, a]
 }
 
-/// A point of the material.
+/// A point of the material at the end of a cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CutEnd {
-    /// The vertex of a surface that it is.
+    /// The vertex at the point, for surfaces.
     pub vertex: Option<u32>,
     pub nodes: [u32; 4],
     pub weights: [f64; 4],
-    /// How far from it what was cut may end, m: nothing where it is an end of that itself.
+    /// The distance within which the cut can end, m. It is 0 if the point is an end of the cut.
     pub slack: f64,
-    /// The shortest edge of a cell that it is in, in the rest shape, m.
+    /// The shortest edge of the cell in the rest shape, m.
     pub size: f64,
 }
 

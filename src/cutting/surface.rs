@@ -1,14 +1,17 @@
-//! The surface that is cut: cells of material, the triangles that are drawn, and the vertices that bind them to nodes.
+//! A surface that can be cut: cells of material, triangles of the render mesh, and vertices that are bound to nodes.
 
 use glam::{DVec3, Vec3};
 
-use super::divided::{Cell, Divided, NONE, Node, SNAP, Simplex, divided, nodes_at, places_of, put_at, weighed};
-use super::pieces::piece_count;
+use super::cell_complex::{
+    Cell, CellComplex, NONE, Node, SNAP, Simplex, cell_complex, insert_corners, nodes_without_cells, rest_positions_of,
+    weighted_mean,
+};
+use super::cell_copies::piece_count;
 use super::tracked::Tracked;
 use crate::base::{Error, Result, ensure, memory};
 use crate::codec::saved;
 
-/// A triangle that is simulated.
+/// A simulated triangle.
 ///
 /// ```
 #[doc = include_str!("../doctest/cut_sheet.txt")]
@@ -21,21 +24,21 @@ use crate::codec::saved;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceCell {
-    /// Its nodes.
+    /// The nodes.
     pub nodes: [u32; 3],
-    /// The area of its material in the rest shape, m²: that of the triangles drawn in it.
+    /// The area of the material in the rest shape, m²: that of the render triangles in the cell.
     pub area: f64,
-    /// How far what is snapped in it may be moved, in the rest shape, m.
+    /// The snapping distance in the rest shape, m.
     pub snap: f64,
-    /// The first of the triangles drawn in it.
+    /// The first render triangle in the cell.
     pub(crate) first: u32,
-    /// For each of its nodes the next corner at the node; corner k of cell c has the number 3 c + k.
+    /// For each node the next corner at the node. Corner k of cell c has the index 3 c + k.
     pub(crate) next: [u32; 3],
 }
 
 saved! { SurfaceCell { nodes, area, snap, first, next } }
 
-/// A triangle that is drawn and touched.
+/// A triangle of the render mesh.
 ///
 /// ```
 #[doc = include_str!("../doctest/cut_sheet.txt")]
@@ -47,21 +50,21 @@ saved! { SurfaceCell { nodes, area, snap, first, next } }
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTriangle {
-    /// Its vertices.
+    /// The vertices.
     pub corners: [u32; 3],
-    /// The cell that it lies in.
+    /// The cell that contains the triangle.
     pub cell: u32,
-    /// Whether the side from each corner to the next was cut.
+    /// For each side, from each corner to the next, true if it was cut.
     pub rim: [bool; 3],
     /// The triangle across the side from each corner to the next.
-    pub(crate) neighbours: [u32; 3],
+    pub(crate) neighbors: [u32; 3],
     /// The next triangle of the same cell.
     pub(crate) next: u32,
 }
 
-saved! { SurfaceTriangle { corners, cell, rim, neighbours, next } }
+saved! { SurfaceTriangle { corners, cell, rim, neighbors, next } }
 
-/// A corner of what is drawn.
+/// A vertex of the render mesh.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -78,13 +81,13 @@ saved! { SurfaceTriangle { corners, cell, rim, neighbours, next } }
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceVertex {
-    /// The nodes that it is bound to; unused ones repeat the first with weight 0.
+    /// The nodes that it is bound to. Unused entries repeat the first one with weight 0.
     pub nodes: [u32; 3],
-    /// How much of each, at least 0, 1 in all.
+    /// The weights of the nodes. They are at least 0 and add up to 1.
     pub weights: [f64; 3],
-    /// Its number among nodes, which no other vertex has: that of the node that it is at, or one of its own.
+    /// The index among nodes, which no other vertex has: that of the node at this vertex, or a separate one.
     pub point: u32,
-    /// One of the triangles about it.
+    /// One of the triangles around it.
     pub(crate) around: u32,
 }
 
@@ -117,11 +120,11 @@ pub struct CutSurface {
 
 saved! { CutSurface { nodes, cells, triangles, vertices } }
 
-divided!(CutSurface, 3, SurfaceCell { area }, triangles, SurfaceTriangle, {
+cell_complex!(CutSurface, 3, SurfaceCell { area }, triangles, SurfaceTriangle, {
     const EDGES: &'static [[usize; 2]] = &[[0, 1], [1, 2], [2, 0]];
     const SIDES: [&'static [usize]; 3] = [&[0, 1], &[1, 2], &[2, 0]];
 
-    fn part_of(&self, triangle: u32) -> f64 {
+    fn material_fraction(&self, triangle: u32) -> f64 {
         self.part_of_cell(triangle)
     }
 
@@ -132,53 +135,54 @@ divided!(CutSurface, 3, SurfaceCell { area }, triangles, SurfaceTriangle, {
 });
 
 impl CutSurface {
-    /// Of the rest positions of its nodes, m, and of cells with three nodes each; what is drawn are the cells, with a vertex for each node.
+    /// Creates a surface from the rest positions of its nodes, m, and from cells with three nodes each. The render mesh
+    /// starts as the cells, with a vertex for each node.
     ///
-    /// Refused unless positions are finite, nodes are known, each cell has an area, and the surface is manifold and turned one way all over:
-    /// at most two cells at an edge, which run along it in opposite directions, and one fan of cells at a node.
+    /// Positions must be finite, nodes known, and areas positive. The surface must be a consistently oriented
+    /// 2-manifold: at most two cells at an edge, and one fan of cells at a node.
     pub fn new(rest: &[Vec3], cells: &[[u32; 3]]) -> Result<Self> {
         ensure!(
             rest.len().max(cells.len()) < (NONE / 3) as usize,
             "more than 2^32 / 3 nodes or cells"
         );
-        let mut nodes = nodes_at(rest)?;
+        let mut nodes = nodes_without_cells(rest)?;
         let mut vertices = memory::collected((0..rest.len() as u32).map(|node| SurfaceVertex {
             nodes: [node; 3],
             weights: [1.0, 0.0, 0.0],
             point: node,
             around: NONE,
         }))?;
-        let mut made = memory::reserved(cells.len())?;
+        let mut surface_cells = memory::reserved(cells.len())?;
         let mut triangles = memory::reserved(cells.len())?;
         for (number, &corners) in cells.iter().enumerate() {
-            let places = places_of(number, corners, rest)?;
-            let area = area_of(places);
+            let positions = rest_positions_of(number, corners, rest)?;
+            let area = area_of(positions);
             ensure!(area > 0.0, "cell {number} of nodes {corners:?} has no area");
             let shortest = (0..3)
-                .map(|k| places[k].distance(places[(k + 1) % 3]))
+                .map(|k| positions[k].distance(positions[(k + 1) % 3]))
                 .fold(f64::INFINITY, f64::min);
             for node in corners {
                 vertices[node as usize].around = number as u32;
             }
-            made.push(SurfaceCell {
+            surface_cells.push(SurfaceCell {
                 nodes: corners,
                 area,
                 snap: SNAP * shortest,
                 first: number as u32,
-                next: put_at(&mut nodes, number, corners),
+                next: insert_corners(&mut nodes, number, corners),
             });
             triangles.push(SurfaceTriangle {
                 corners,
                 cell: number as u32,
                 rim: [false; 3],
-                neighbours: [NONE; 3],
+                neighbors: [NONE; 3],
                 next: NONE,
             });
         }
-        join_neighbours(&mut triangles)?;
+        join_neighbors(&mut triangles)?;
         let surface = Self {
             nodes: Tracked::new(nodes),
-            cells: Tracked::new(made),
+            cells: Tracked::new(surface_cells),
             triangles: Tracked::new(triangles),
             vertices: Tracked::new(vertices),
         };
@@ -186,8 +190,8 @@ impl CutSurface {
         Ok(surface)
     }
 
-    /// Reserves room for so many more nodes, and for as much of all else as cuts that make them need in general, so that cuts do not have to
-    /// move what is there.
+    /// Reserves space for this many more nodes, and for everything else that cuts with these nodes usually need. Cuts
+    /// then need not reallocate.
     pub fn reserve(&mut self, nodes: u32) -> Result<()> {
         let nodes = nodes as usize;
         self.nodes.reserve(nodes)?;
@@ -196,26 +200,26 @@ impl CutSurface {
         self.vertices.reserve(4 * nodes)
     }
 
-    /// The vertices of what is drawn; none is ever taken away.
+    /// The vertices of the render mesh. Cuts never remove one.
     pub fn vertices(&self) -> &[SurfaceVertex] {
         self.vertices.values()
     }
 
-    /// Where a point of a cell, by weights of its corners, is in the rest shape.
-    pub(crate) fn rest_place_in(&self, cell: u32, weights: [f64; 3]) -> DVec3 {
+    /// The rest position of a point of a cell, given by weights of its corners.
+    pub(crate) fn rest_position_in(&self, cell: u32, weights: [f64; 3]) -> DVec3 {
         let nodes = self.cells[cell].nodes;
         (0..3).map(|k| weights[k] * self.nodes[nodes[k]].rest.as_dvec3()).sum()
     }
 
-    /// How much of its cell, if that were whole, a triangle covers.
+    /// The area of a triangle as a fraction of its whole cell.
     pub fn part_of_cell(&self, triangle: u32) -> f64 {
         let SurfaceTriangle { corners, cell, .. } = self.triangles[triangle];
-        turn(corners.map(|corner| self.weights_in(corner, cell)))
+        signed_area_fraction(corners.map(|corner| self.weights_in(corner, cell)))
     }
 
-    /// How many pieces what is drawn has fallen into, found by going through all.
+    /// The number of connected components of the render mesh. All triangles are visited.
     pub fn piece_count(&self) -> Result<u32> {
-        piece_count(self.triangles().iter().map(|triangle| triangle.neighbours))
+        piece_count(self.triangles().iter().map(|triangle| triangle.neighbors))
     }
 
     /// A third of the material of the cells at a node, m².
@@ -233,7 +237,8 @@ impl CutSurface {
         self.cells[self.triangles[self.vertices[vertex].around].cell].snap / SNAP
     }
 
-    /// The triangles about a vertex, counterclockwise, each with the vertex's number in it; of an open fan from its first triangle on.
+    /// The triangles around a vertex, counterclockwise, each with the corner index of the vertex. An open fan starts
+    /// with its first triangle.
     pub(crate) fn ring(&self, vertex: u32, ring: &mut Vec<(u32, usize)>) -> Result<()> {
         ring.clear();
         let start = self.vertices[vertex].around;
@@ -241,25 +246,25 @@ impl CutSurface {
         while triangle != NONE {
             let corner = self.corner(triangle, vertex);
             memory::push(ring, (triangle, corner))?;
-            triangle = self.triangles[triangle].neighbours[(corner + 2) % 3];
+            triangle = self.triangles[triangle].neighbors[(corner + 2) % 3];
             if triangle == start {
                 return Ok(());
             }
         }
-        // The fan is open: what lies before its start is still missing.
+        // The fan is open: the triangles before its start are missing.
         let count = ring.len();
-        let mut triangle = self.triangles[start].neighbours[ring[0].1];
+        let mut triangle = self.triangles[start].neighbors[ring[0].1];
         while triangle != NONE {
             let corner = self.corner(triangle, vertex);
             memory::push(ring, (triangle, corner))?;
-            triangle = self.triangles[triangle].neighbours[corner];
+            triangle = self.triangles[triangle].neighbors[corner];
         }
         ring[count..].reverse();
         ring.rotate_left(count);
         Ok(())
     }
 
-    /// Which corner of a triangle a vertex is.
+    /// The corner index of a vertex in a triangle.
     pub(crate) fn corner(&self, triangle: u32, vertex: u32) -> usize {
         let corners = self.triangles[triangle].corners;
         (0..2).find(|&k| corners[k] == vertex).unwrap_or(2)
@@ -283,8 +288,8 @@ impl CutSurface {
     }
 }
 
-/// Finds the neighbours of each triangle.
-fn join_neighbours(triangles: &mut [SurfaceTriangle]) -> Result<()> {
+/// Finds the neighbors of each triangle.
+fn join_neighbors(triangles: &mut [SurfaceTriangle]) -> Result<()> {
     let mut sides = memory::reserved(3 * triangles.len())?;
     for (number, triangle) in triangles.iter().enumerate() {
         for k in 0..3 {
@@ -298,8 +303,8 @@ fn join_neighbours(triangles: &mut [SurfaceTriangle]) -> Result<()> {
         match *at_edge {
             [_] => {}
             [(.., false, a, side_a), (.., true, b, side_b)] => {
-                triangles[a as usize].neighbours[side_a] = b;
-                triangles[b as usize].neighbours[side_b] = a;
+                triangles[a as usize].neighbors[side_a] = b;
+                triangles[b as usize].neighbors[side_b] = a;
             }
             [(.., a, _), (.., b, _)] => {
                 return Err(Error::invalid(format!(
@@ -322,8 +327,8 @@ pub(crate) fn area_of([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// The area of a triangle between points that are given by weights, as a part of the triangle that they are weights of; above 0 if it is turned
-/// the same way.
-pub(crate) fn turn([a, b, c]: [[f64; 3]; 3]) -> f64 {
+/// The signed area of a triangle whose corners are given by weights of another one, as a fraction of that one. It is
+/// above 0 if both have the same orientation.
+pub(crate) fn signed_area_fraction([a, b, c]: [[f64; 3]; 3]) -> f64 {
     (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
 }

@@ -1,4 +1,4 @@
-//! Where something is attached to a body.
+//! Points of a body for attachments.
 
 use crate::codec::{saved, saved_enum};
 
@@ -18,15 +18,15 @@ use crate::codec::{saved, saved_enum};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// Which triangle of [`Body::surface`](crate::Body::surface).
+    /// The index of the triangle in [`Body::surface`](crate::Body::surface).
     pub triangle: u32,
-    /// The parts of its corners in the point: at least 0, and 1 in sum.
+    /// The barycentric weights of its corners: at least 0, with a sum of 1.
     pub weights: [f32; 3],
 }
 
 saved! { SurfacePoint { triangle, weights } }
 
-/// Where a body is attached to a body.
+/// A point of a body that is attached to another body.
 ///
 /// ```
 /// # use glam::{Quat, Vec3};
@@ -43,7 +43,7 @@ saved! { SurfacePoint { triangle, weights } }
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Anchor {
-    /// A node, of the surface or not.
+    /// A node, on the surface or inside.
     Node(u32),
     /// A point of the surface.
     Point(SurfacePoint),

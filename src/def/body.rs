@@ -1,4 +1,4 @@
-//! What a body is made of, as the caller gives it, and the checks at the door.
+//! The definition of a body as the caller gives it, and its validation.
 
 use glam::Vec3;
 
@@ -12,7 +12,7 @@ use super::{Material, Model, Values, Viscosity, Yielding};
 use crate::base::{Error, Result, ensure, finite, memory, not_negative};
 use crate::mesh::Mesh;
 
-/// How a body keeps its springs.
+/// The memory layout of a body's springs.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -25,7 +25,7 @@ use crate::mesh::Mesh;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Storage {
-    /// Laid out for the processor.
+    /// A SIMD-friendly layout, the fastest one.
     #[default]
     Packed,
     /// A linked list per node (Halic et al., section 4, "efficient storage").
@@ -36,7 +36,7 @@ pub enum Storage {
     DynamicBulk,
 }
 
-/// How a body is moved.
+/// The time integrator of a body.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -49,27 +49,28 @@ pub enum Storage {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Solver {
-    /// Explicit, with as many substeps as it needs to be stable.
+    /// Explicit, with as many substeps as stability needs.
     Verlet,
-    /// Stable at any step.
+    /// Implicit, and stable at any step length.
     Implicit,
-    /// The accurate reference: the equations of [`Solver::Implicit`], solved exactly; slow.
+    /// The accurate reference solver. It solves the equations of [`Solver::Implicit`] exactly, and is slow.
     Newton,
-    /// [`Solver::Verlet`] where its substeps are few, else [`Solver::Implicit`]: chosen when the body is made, from its mesh, its
-    /// material and the length of the world's steps; see [`Body::solver_choice`](crate::Body::solver_choice).
+    /// [`Solver::Verlet`] if it needs few substeps, otherwise [`Solver::Implicit`]. The choice is made when the body is
+    /// created, from its mesh, its material and the length of the world's steps; see
+    /// [`Body::solver_choice`](crate::Body::solver_choice).
     #[default]
     Auto,
 }
 
 crate::codec::saved_enum!(Solver { 0 => Verlet, 1 => Implicit, 2 => Newton, 3 => Auto });
 
-/// A smaller mass, kg, has no finite inverse.
-pub(crate) const SMALLEST_MASS: f32 = 1e-37;
+/// The smallest mass with a finite inverse, kg.
+pub(crate) const MIN_MASS: f32 = 1e-37;
 
-/// The most iterations of a step.
-pub(crate) const MOST_ITERATIONS: u32 = 1_000_000;
+/// The largest number of iterations per step.
+pub(crate) const MAX_ITERATIONS: u32 = 1_000_000;
 
-/// What a body is made of. Plain data, used only during [`World::create_body`](crate::World::create_body).
+/// The definition of a body. Plain data, used only during [`World::create_body`](crate::World::create_body).
 ///
 /// ```
 /// use sinew::mesh::Mesh;
@@ -87,137 +88,152 @@ pub(crate) const MOST_ITERATIONS: u32 = 1_000_000;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct BodyDefinition<'a> {
-    /// Where each node is, in metres.
+    /// The initial position of each node (m).
     pub positions: &'a [Vec3],
-    /// Where each node would be at rest, in metres; `None`: as in `positions`.
+    /// The rest position of each node (m). `None`: the same as `positions`.
     pub rest_positions: Option<&'a [Vec3]>,
-    /// The mass of each node in kilograms, above 0; in [`Values::Each`] 0 pins a node for good. [`Values::Uniform`] of 0 where a
-    /// material's density gives them.
+    /// The mass of each node (kg), above 0. In [`Values::Each`] a mass of 0 pins a node permanently.
+    /// [`Values::Uniform`] of 0 if the density of a material gives the masses.
     pub masses: Values<'a>,
-    /// Damping of each node against the world, in N s/m, at least 0.
+    /// Damping of each node relative to the world (N s/m), at least 0.
     pub node_dampings: Values<'a>,
-    /// Damping of each node against the world for each kilogram of its mass, in 1/s, at least 0, beside that.
+    /// Additional damping of each node relative to the world, per mass (1/s), at least 0.
     pub damping_rate: f32,
-    /// The two nodes of each spring, each pair once; `None`: the edges of the triangles, tetrahedra and cells, of
-    /// the latter with the diagonals of their faces, each once.
+    /// The two nodes of each spring, each pair once. `None`: the edges of the triangles, tetrahedra and cells, each
+    /// once. Cells also get springs along the diagonals of their faces.
     pub springs: Option<&'a [[u32; 2]]>,
-    /// The stiffness of each spring in N/m, at least 0; 0 where tetrahedra are elements and no springs are given.
+    /// The stiffness of each spring (N/m), at least 0. It is 0 if tetrahedra are elements and no springs are given.
     pub stiffnesses: Values<'a>,
-    /// The rest length of each spring in metres, at least 0; `None`: from the rest positions.
+    /// The rest length of each spring (m), at least 0. `None`: computed from the rest positions.
     pub rest_lengths: Option<&'a [f32]>,
-    /// Damping along each spring in N s/m, at least 0; 0 where tetrahedra are elements and no springs are given.
+    /// Damping along each spring (N s/m), at least 0. It is 0 if tetrahedra are elements and no springs are given.
     pub spring_dampings: Values<'a>,
-    /// The surface that is drawn and touched, outward by the right-hand rule; where it is empty, the outer faces of the tetrahedra, or
-    /// of the cells. Outer faces of tetrahedra that are given facing inward are turned.
+    /// The render and collision surface, facing outward by the right-hand rule. If it is empty, the outer faces of the
+    /// tetrahedra or cells are used. Outer faces of tetrahedra that are given facing inward are reversed.
     pub triangles: &'a [[u32; 3]],
-    /// Tetrahedra, four nodes each.
+    /// The tetrahedra, with four nodes each.
     pub tetrahedra: &'a [[u32; 4]],
-    /// Cubes of a lattice, eight nodes each, numbered by bits: x 1, y 2, z 4; see [`Mesh::lattice`](crate::mesh::Mesh::lattice).
+    /// The cubes of a lattice, with eight nodes each, numbered by bits: x 1, y 2, z 4. See
+    /// [`Mesh::lattice`](crate::mesh::Mesh::lattice).
     pub cells: &'a [[u32; 8]],
-    /// Where stiffnesses, and masses if it has a density, come from instead; it fills the tetrahedra or the cells, or else the
-    /// triangles, as they are at rest. `springs` must be `None` then and `stiffnesses` 0, and triangles beside tetrahedra or cells
-    /// may have no edges but theirs.
+    /// The material that gives the stiffnesses, and the masses if it has a density. It fills the tetrahedra or cells at
+    /// rest, or the triangles if there are neither. `springs` must then be `None` and `stiffnesses` 0. Triangles beside
+    /// tetrahedra or cells may only have edges of these.
     pub material: Option<Material>,
-    /// How tetrahedra that are no elements resist a change of their volume, each by itself, Pa: the energy of one of volume V at rest that
-    /// becomes V' is `volume_stiffness / 2 V (V'/V - 1)²`, and negative where it is inside out, so that it turns back. At least 0; 0: they
-    /// do not. It adds to the stiffness of the springs: a bulk modulus of so much. From 0.3 to 0.6 of Young's modulus a body of springs comes
-    /// back to rest from anywhere; with far less tetrahedra stay inside out, with more than some 4 times as much folds stay. Not beside [`Model::Tetrahedra`](crate::Model),
-    /// which has a term of its own.
+    /// The resistance of tetrahedra that are no elements to a change of their volume (Pa), at least 0. 0: none. A
+    /// tetrahedron with rest volume V and current volume V' has the energy `volume_stiffness / 2 V (V'/V - 1)²`. V' is
+    /// negative if it is inverted, so it recovers from inversion.
+    ///
+    /// It adds to the stiffness of the springs like a bulk modulus of this value. With 0.3 to 0.6 of Young's modulus, a
+    /// body of springs recovers its rest shape from any state. With far less, tetrahedra stay inverted; with more than
+    /// about 4 times as much, folds remain. Not allowed with [`Model::Tetrahedra`](crate::Model), which has its own
+    /// volume term.
     pub volume_stiffness: f32,
-    /// What draws each node back to its rest position, wherever the body is, in N/m, at least 0: the paper's restoring forces.
+    /// The stiffness of the anchor spring from each node to its rest position in the world (N/m), at least 0: the
+    /// restoring forces of Halic et al.
     pub home_stiffnesses: Values<'a>,
-    /// The flexural rigidity of the surface that `triangles` make, in N m, at least 0; 0: it bends freely. Of a sheet of Young's
-    /// modulus E, Poisson's ratio nu and thickness t it is `E t³ / (12 (1 - nu²))`.
+    /// The flexural rigidity of the surface that `triangles` define (N m), at least 0. 0: it bends freely. A sheet with
+    /// Young's modulus E, Poisson's ratio nu and thickness t has `E t³ / (12 (1 - nu²))`.
     ///
-    /// Each edge of two triangles is a hinge that turns back to its angle at rest, whether the surface is flat or curved there; an edge
-    /// of more triangles is refused. Where triangles are equilateral it is rolled up with just this rigidity, whichever way. Where they are
-    /// squares that are cut alternately it has 5/6 of it along a side; where all are cut the same way, it has it along a side and across
-    /// the cuts, and three times as much along them.
+    /// Each edge of two triangles is a hinge that returns to its rest angle, whether the surface is flat or curved at
+    /// rest. An edge of more triangles is refused. Equilateral triangles have exactly this rigidity in every direction.
+    /// Squares with alternating diagonals have 5/6 of it along a side. Squares with parallel diagonals have it along a
+    /// side and across the diagonals, and three times as much along the diagonals.
     pub bending_stiffness: f32,
-    /// How the pull of the springs grows as they are stretched.
+    /// The force-strain law of the springs.
     pub spring_law: SpringLaw,
-    /// The law of tetrahedra that are elements. Those of another than [`ElementLaw::StVenantKirchhoff`] have no viscosity and do not yield, nor do
-    /// springs beside them.
+    /// The hyperelastic law of tetrahedra that are elements. With a law other than [`ElementLaw::StVenantKirchhoff`],
+    /// neither elements nor springs may be viscous or yield.
     pub element_law: ElementLaw,
-    /// For each tetrahedron the direction of its fibres at rest, 1 long, or 0: it has none. Empty: there are none at all.
+    /// The rest direction of the fibers in each tetrahedron: of unit length, or 0 for none. Empty: there are no fibers.
     pub fibre_directions: &'a [Vec3],
-    /// For each tetrahedron how stiff its fibres are, in Pa, at least 0. Fibres pull where they are longer than at rest, by this times
-    /// the part by which they are longer, over the area across them at rest; they never push.
+    /// The stiffness of the fibers in each tetrahedron (Pa), at least 0. The stress over their rest cross-section is
+    /// this value times their strain. Compressed fibers do not push.
     pub fibre_stiffnesses: Values<'a>,
-    /// How springs, and tetrahedra that are elements, resist the speed at which they are deformed. With a `retardation_time` alone it is
-    /// damping along the springs, on top of `spring_dampings`; springs that are added later have none. A body begins relaxed, and is so
-    /// where [`Body::set_positions`](crate::Body::set_positions) puts it.
+    /// The viscosity of springs, and of tetrahedra that are elements. A `retardation_time` alone is damping along the
+    /// springs, in addition to `spring_dampings`. Springs that are added later have none. A body is relaxed when it is
+    /// created and after [`Body::set_positions`](crate::Body::set_positions).
     pub viscosity: Viscosity,
-    /// From which strain springs, and tetrahedra that are elements, take a set. Springs that yield are [`SpringLaw::Linear`]; those that
-    /// are added later do not. Springs yield within a step; tetrahedra do where a substep ends, and with [`Solver::Implicit`] and
-    /// [`Solver::Newton`] where a step does: there a load that deforms them further and further does so the more slowly the longer steps are.
+    /// The yield strain of springs, and of tetrahedra that are elements. Springs that yield must be
+    /// [`SpringLaw::Linear`]; springs that are added later do not yield. Springs yield within a step. Tetrahedra yield
+    /// at the end of a substep, or of a step with [`Solver::Implicit`] and [`Solver::Newton`]. With these two solvers,
+    /// longer steps under-predict plastic flow under a sustained load.
     pub yielding: Yielding,
-    /// The strain of springs from which they are stiffer, at least 0; 0: there is none.
+    /// The strain beyond which springs are stiffer, at least 0. 0: there is no limit.
     pub strain_limit: f32,
-    /// How many times their stiffness is added beyond it, above 0, at most 1e6: a load that would stretch a spring by some strain more
-    /// stretches it by that over 1 + `limit_stiffening`. Springs that are added later have no limit.
+    /// The stiffness added beyond the limit, relative to that of the spring; above 0, at most 1e6. An additional load
+    /// then stretches a spring by 1 / (1 + `limit_stiffening`) of what it would without the limit. Springs that are
+    /// added later have no limit.
     pub limit_stiffening: f32,
-    /// How the volume inside of a closed surface resists a change, Pa, at least 0; 0: it does not. With
-    /// [`Self::pressure`] p the energy of each cavity of volume V, V0 at rest, is
-    /// `enclosed_stiffness / 2 V0 (V/V0 - 1)² - p (V - V0)`: what fills it has this bulk modulus.
+    /// The bulk modulus of the volume inside a closed surface (Pa), at least 0. 0: the volume changes freely. With
+    /// [`Self::pressure`] p, a cavity of volume V and rest volume V0 has the energy `enclosed_stiffness / 2 V0 (V/V0 -
+    /// 1)² - p (V - V0)`.
     ///
-    /// The surface is `triangles`, or where there are none the boundary of the tetrahedra or cells; each of its parts that hang together
-    /// by edges must be closed and have a volume at rest. Each is a cavity of its own, unless some are inside out, as the inner wall
-    /// of a hollow organ is: then those alone are cavities. [`Body::remove_spring`](crate::Body::remove_spring) opens the cavities whose
-    /// triangles have the edge, for good, and a cut those of which it divides or parts triangles, however little: what is open is neither kept nor
-    /// pressed, and what that took goes with what was inside. A cut beside a cavity leaves it.
+    /// The surface is `triangles`, or the boundary of the tetrahedra or cells if there are none. Each part connected by
+    /// edges must be closed and have a rest volume. Each part is a cavity, unless some face inward, as the inner wall
+    /// of a hollow organ does; then only those are cavities.
+    ///
+    /// [`Body::remove_spring`](crate::Body::remove_spring) permanently opens the cavities with that edge, and a cut
+    /// those whose triangles it divides or separates. An open cavity has neither stiffness nor pressure, and its
+    /// contents are lost. A cut elsewhere leaves the cavity closed.
     pub enclosed_stiffness: f32,
-    /// By how much the pressure inside of a cavity that has its volume at rest is above that outside, Pa; below 0 it sucks; 0: it is not. See
-    /// [`Self::enclosed_stiffness`], and [`Body::set_pressure`](crate::Body::set_pressure) to change it. Without a stiffness the pressure
-    /// stays the same however large the cavity becomes: springs that do not stiffen may not hold it.
+    /// The overpressure in a cavity at its rest volume (Pa). Negative values are suction; 0: none. See
+    /// [`Self::enclosed_stiffness`], and [`Body::set_pressure`](crate::Body::set_pressure) to change it. Without an
+    /// `enclosed_stiffness` the pressure does not depend on the volume, and springs that do not stiffen may be unable
+    /// to contain it.
     pub pressure: f32,
-    /// What keeps off its surface, and whether it meets other bodies and itself.
+    /// The contact settings of the body.
     pub contact: BodyContact,
-    /// How the springs are kept.
+    /// The memory layout of the springs.
     pub storage: Storage,
-    /// [`Storage::FastLink`]: places of each node; [`Storage::DynamicBulk`]: places of each array. 0: chosen from the
-    /// springs given, as many as the node with the most has, or what takes the least memory.
+    /// Slots per node ([`Storage::FastLink`]) or per array ([`Storage::DynamicBulk`]). 0: chosen from the given
+    /// springs, as the maximum number per node or the size with the least memory.
     pub springs_per_node: u32,
-    /// How the body is moved.
+    /// The time integrator of the body.
     pub solver: Solver,
-    /// [`Solver::Implicit`], [`Solver::Newton`]: 1, implicit Euler; 2, the second backward difference formula; 0: 2.
+    /// The order of [`Solver::Implicit`] and [`Solver::Newton`]. 1: implicit Euler. 2: the second-order backward
+    /// differentiation formula. 0: 2.
     pub order: u32,
-    /// [`Solver::Implicit`], [`Solver::Newton`]: the most products with the matrix of its equation in a step; 0: 1000, or
-    /// 100 000 with [`Solver::Newton`]. Where a tool or a tolerance cuts the step, a
-    /// thirty-second of it for each part at least. With fewer than 256 a step beside a tool may take seven times as many, at most 128
-    /// more, before it is cut.
+    /// The maximum number of matrix-vector products per step of [`Solver::Implicit`] and [`Solver::Newton`]. 0: 1000,
+    /// or 100 000 with [`Solver::Newton`]. If a tool or a tolerance divides the step, each part has at least one
+    /// thirty-second of it. With fewer than 256, a step near a tool may take seven times as many, at most 128 more,
+    /// before it is divided.
     pub iterations: u32,
-    /// [`Solver::Implicit`], [`Solver::Newton`]: what may be missing of the solution of a step's equation, as a part of what forces
-    /// change in the step; from 1e-6 to 1; 0: 0.01, or 1e-6 with [`Solver::Newton`].
+    /// The relative tolerance of [`Solver::Implicit`] and [`Solver::Newton`], from 1e-6 to 1: the allowed position
+    /// error divided by the displacement that forces cause in the step. 0: 0.01, or 1e-6 with [`Solver::Newton`].
     pub accuracy: f32,
-    /// [`Solver::Verlet`]: what part of the body's mass may be added, in all, to the nodes whose springs or elements would make
-    /// substeps short, as those of slivers are; from 0 to 1; 0: none.
+    /// The mass that [`Solver::Verlet`] may add, as a fraction of the body's mass from 0 to 1. It goes to nodes whose
+    /// springs or elements would make substeps short, as those of slivers do. 0: none.
     ///
-    /// Mass is added where that saves a quarter of the substeps or more, and no more than they need; where motion makes elements so stiff that a
-    /// step would be refused, as much as it takes for a quarter of a second, but no more than the body has. Never where the
-    /// world's `substeps` are fixed or a tolerance is asked for. It is inertia alone: weight, and the force on a pin, stay
-    /// as they are. See [`SolverReport::added_mass`](crate::SolverReport::added_mass).
+    /// Mass is added only if that saves at least a quarter of the substeps, and no more than needed. Motion may make
+    /// elements so stiff that a step would be refused. Mass is then added as needed for a quarter of a second, up to
+    /// the mass of the body. No mass is added with fixed `substeps` of the world or with a tolerance. Added mass is
+    /// inertia only: weight and pin forces do not change. See
+    /// [`SolverReport::added_mass`](crate::SolverReport::added_mass).
     pub mass_scaling: f32,
-    /// Whether what is at rest of it is left alone, and when.
+    /// When parts of the body that are at rest fall asleep.
     pub sleep: Sleep,
-    /// How many nodes cuts may add, of which room is made: copies of nodes, and points of the surface between them. Some five for each triangle or
-    /// tetrahedron that a blade passes through. 0: the body cannot be cut, and pays nothing for it.
+    /// The number of nodes that cuts may add, for which memory is reserved. These are copies of nodes, and surface
+    /// points between nodes. Expect about five for each triangle or tetrahedron that a blade passes through. 0: the
+    /// body cannot be cut, and has no cost for it.
     ///
-    /// A surface that is to be cut is one of triangles turned one way all over, of which two at most have an edge and those about a node hang
-    /// together; a solid is one of tetrahedra of which those about a node hang together by faces at it, and `triangles` are its boundary, if there
-    /// are any. A body of springs alone loses those that a blade passes through, and needs no room: 1 will do.
+    /// A cuttable surface must be a consistently oriented 2-manifold: at most two triangles per edge, and the triangles
+    /// around each node connected through edges. In a cuttable solid the tetrahedra around each node must be connected
+    /// through faces at it, and `triangles`, if given, must be its boundary. In a body of springs alone a blade removes
+    /// the springs that it passes through; a value of 1 is enough.
     pub spare_nodes: u32,
-    /// When it tears by itself, at the end of a step; a body that does may be cut. See [`Body::tear_report`](crate::Body::tear_report) and
-    /// [`Body::set_tear_limits`](crate::Body::set_tear_limits).
+    /// The limits beyond which the body tears at the end of a step. A body that tears can also be cut. See
+    /// [`Body::tear_report`](crate::Body::tear_report) and [`Body::set_tear_limits`](crate::Body::set_tear_limits).
     pub tearing: Tearing,
-    /// What a blade ([`World::create_blade`](crate::World::create_blade)) spends to cut it, J for each m of the cut in the rest shape: the
-    /// fracture toughness of the material, J/m², times the thickness of the surface; of tetrahedra that itself, for each m² of their faces that opens.
-    /// Springs alone have none. At least 0; 0: it is cut for nothing. Above 0 it needs `spare_nodes`.
+    /// The work of a blade ([`World::create_blade`](crate::World::create_blade)) per cut, measured in the rest shape.
+    /// For a surface it is per length (J/m): the fracture toughness of the material (J/m²) times the thickness. For
+    /// tetrahedra it is the toughness per area of the opened faces (J/m²). Springs alone have none. At least 0; 0:
+    /// cutting meets no resistance. A value above 0 needs `spare_nodes`.
     pub toughness: f32,
 }
 
 impl<'a> BodyDefinition<'a> {
-    /// The default with the nodes of a mesh and all that they make.
+    /// A default definition with the nodes and elements of a mesh.
     pub fn of(mesh: &'a Mesh) -> Self {
         Self {
             positions: &mesh.positions,
@@ -230,8 +246,8 @@ impl<'a> BodyDefinition<'a> {
 }
 
 impl Default for BodyDefinition<'_> {
-    /// No nodes, masses or stiffnesses yet; no damping; up to a thousandth of the mass may be added. Springs that yield may do so by half of
-    /// their length, and are 101 times as stiff beyond a limit.
+    /// No nodes, masses, stiffnesses or damping. Up to a thousandth of the mass may be added. The maximum plastic
+    /// strain is one half, and springs are 101 times as stiff beyond a strain limit.
     fn default() -> Self {
         Self {
             positions: &[],
@@ -277,7 +293,7 @@ impl Default for BodyDefinition<'_> {
 }
 
 impl BodyDefinition<'_> {
-    /// Refuses whatever is out of range, with a message that names it.
+    /// Returns an error that names the first value out of range.
     pub(crate) fn check(&self) -> Result<()> {
         let nodes = self.positions.len();
         ensure!(
@@ -349,7 +365,7 @@ impl BodyDefinition<'_> {
 
     fn check_masses(&self) -> Result<()> {
         match self.masses {
-            Values::Uniform(mass) if !(mass >= SMALLEST_MASS && mass.is_finite()) => Err(Error::invalid(format!(
+            Values::Uniform(mass) if !(mass >= MIN_MASS && mass.is_finite()) => Err(Error::invalid(format!(
                 "node_mass is {mass}: must be above 0 and finite, or a material be given a density instead"
             ))),
             Values::Uniform(_) => Ok(()),
@@ -357,7 +373,7 @@ impl BodyDefinition<'_> {
                 expect_count("masses", masses.len(), self.positions.len())?;
                 match masses
                     .iter()
-                    .position(|&mass| mass != 0.0 && !(mass >= SMALLEST_MASS && mass.is_finite()))
+                    .position(|&mass| mass != 0.0 && !(mass >= MIN_MASS && mass.is_finite()))
                 {
                     None => Ok(()),
                     Some(node) => Err(Error::invalid(format!(
@@ -376,7 +392,7 @@ impl BodyDefinition<'_> {
         if let Some(lengths) = self.rest_lengths {
             check_values("rest_length", &Values::Each(lengths), springs.len())?;
         }
-        // Each pair once: equal pairs are neighbours once sorted.
+        // Each pair once: equal pairs are adjacent after sorting.
         let mut pairs: Vec<(u64, u32)> = memory::reserved(springs.len())?;
         for (index, &[a, b]) in springs.iter().enumerate() {
             pairs.push((u64::from(a.min(b)) << 32 | u64::from(a.max(b)), index as u32));
@@ -399,8 +415,8 @@ impl BodyDefinition<'_> {
             self.accuracy
         );
         ensure!(
-            self.iterations <= MOST_ITERATIONS,
-            "iterations is {}: must be at most {MOST_ITERATIONS}",
+            self.iterations <= MAX_ITERATIONS,
+            "iterations is {}: must be at most {MAX_ITERATIONS}",
             self.iterations
         );
         ensure!(

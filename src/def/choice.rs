@@ -1,9 +1,9 @@
-//! Which solver a body has, and why.
+//! The solver of a body, and the reason for it.
 
 use super::Solver;
 use crate::codec::{saved, saved_enum};
 
-/// Why a body has its solver.
+/// The reason for the solver of a body.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -14,18 +14,18 @@ use crate::codec::{saved, saved_enum};
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ChoiceReason {
-    /// The definition names it.
+    /// The definition names the solver.
     #[default]
     Given,
-    /// [`Solver::Auto`]: explicit substeps are few enough to cost less than the solution of an equation, or the world's are fixed.
+    /// [`Solver::Auto`]: explicit substeps are cheaper than an implicit solve, or the world's substeps are fixed.
     FewSubsteps,
-    /// [`Solver::Auto`]: explicit substeps would be too many.
+    /// [`Solver::Auto`]: there would be too many explicit substeps.
     ManySubsteps,
 }
 
 saved_enum!(ChoiceReason { 0 => Given, 1 => FewSubsteps, 2 => ManySubsteps });
 
-/// The solver of a body, and what [`Solver::Auto`] chose it by.
+/// The solver of a body, and the figures by which [`Solver::Auto`] chose it.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -37,20 +37,20 @@ saved_enum!(ChoiceReason { 0 => Given, 1 => FewSubsteps, 2 => ManySubsteps });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverChoice {
-    /// Never [`Solver::Auto`].
+    /// The solver; never [`Solver::Auto`].
     pub solver: Solver,
-    /// Why.
+    /// The reason for the solver.
     pub reason: ChoiceReason,
-    /// Explicit substeps that a step of `step` seconds would take at the positions of creation; 0 where the solver was given.
+    /// The explicit substeps of a step of `step` seconds at the initial positions; 0 if the solver was given.
     pub substeps: u32,
-    /// The length of a step that was assumed, s; 0 where the solver was given.
+    /// The assumed step length (s); 0 if the solver was given.
     pub step: f32,
 }
 
 saved! { SolverChoice { solver, reason, substeps, step } }
 
 impl SolverChoice {
-    /// The definition names it.
+    /// The choice of a definition that names its solver.
     pub(crate) fn given(solver: Solver) -> Self {
         Self {
             solver,

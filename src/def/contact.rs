@@ -1,10 +1,10 @@
-//! What meets what, and what a body asks of contact.
+//! Contact settings of bodies, collision filters and detection methods.
 
 use crate::base::{Error, Result, StateHasher, ensure, not_negative};
 use crate::codec::{saved, saved_enum};
-use crate::mesh::FURTHEST;
+use crate::mesh::MAX_COORDINATE;
 
-/// How a tool finds what it touches.
+/// The contact detection method of a tool.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -26,15 +26,16 @@ pub enum Detection {
     /// Exact distances, swept over the step.
     #[default]
     Exact,
-    /// Virtual rays cast through a depth buffer (CInDeR; Halic et al., section 2.1).
+    /// Virtual rays through a depth buffer (CInDeR; Halic et al., section 2.1).
     ImageSpace,
-    /// A sampled signed distance; for meshes alone.
+    /// A sampled signed distance field; for meshes only.
     DistanceField,
 }
 
 saved_enum!(Detection { 0 => Exact, 1 => ImageSpace, 2 => DistanceField });
 
-/// Which tools and bodies meet: two do where each has a category that the other's mask has.
+/// The categories of tools and bodies that collide. Two objects collide if each has a category that is in the other's
+/// mask.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -53,9 +54,9 @@ saved_enum!(Detection { 0 => Exact, 1 => ImageSpace, 2 => DistanceField });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CollisionFilter {
-    /// The categories that it belongs to, a bit for each.
+    /// The categories of the object, one bit each.
     pub category: u32,
-    /// The categories that it meets, a bit for each.
+    /// The categories that the object collides with, one bit each.
     pub mask: u32,
 }
 
@@ -68,7 +69,7 @@ impl Default for CollisionFilter {
 }
 
 impl CollisionFilter {
-    /// Of the first category; meets all.
+    /// The first category, colliding with all.
     pub const ALL: Self = Self {
         category: 1,
         mask: u32::MAX,
@@ -80,13 +81,13 @@ impl CollisionFilter {
         }
     }
 
-    /// Whether both meet each other.
+    /// True if both filters accept each other.
     pub(crate) fn meets(self, other: Self) -> bool {
         self.category & other.mask != 0 && other.category & self.mask != 0
     }
 }
 
-/// What a body asks of contact.
+/// The contact settings of a body.
 ///
 /// ```
 /// # use glam::{Quat, Vec3, vec3};
@@ -106,31 +107,35 @@ impl CollisionFilter {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyContact {
-    /// What tools and other tissue keep off its surface, m, 0 to 1e9: the thickness of a cloth on either side.
+    /// The distance that tools and other tissue keep from the surface (m), from 0 to 1e9: the thickness of a cloth on
+    /// either side.
     pub thickness: f32,
-    /// The Coulomb coefficient of friction with other tissue and with itself, at least 0; of two bodies that meet, the larger holds. A
-    /// tool's own holds with tools.
+    /// The Coulomb friction coefficient with other tissue and with itself, at least 0. Between two bodies the larger
+    /// value applies. Contact with a tool uses the tool's coefficient.
     pub friction: f32,
-    /// Whether it meets other bodies that want it too.
+    /// True if the body collides with other bodies that have this setting too.
     pub with_bodies: bool,
-    /// Whether it meets itself.
+    /// True if the body collides with itself.
     ///
-    /// The two sides of a cut meet from then on, at no distance: they part freely, and where they are pressed together again they rest against each
-    /// other as before the cut, whatever the thickness. A solid's sides are told by their faces. The rims of a sheet lie in one place, and may slide
-    /// over each other until they have parted by a ten-thousandth of a short edge.
+    /// The two sides of a cut then collide at distance 0, whatever the thickness. They separate freely, and if pressed
+    /// together they rest against each other as before the cut. Faces tell the two sides of a solid apart. The
+    /// cut-boundary edges of a sheet coincide, and may slide over each other until they are a ten-thousandth of a short
+    /// edge apart.
     pub with_itself: bool,
-    /// How it and other bodies find each other: [`Detection::Exact`], or [`Detection::ImageSpace`], which one of two has to ask for; itself
-    /// it always meets exactly. [`Detection::DistanceField`] is for rigid tools and refused.
+    /// The contact detection with other bodies: [`Detection::Exact`], or [`Detection::ImageSpace`] if at least one of
+    /// two bodies sets it. Self-contact is always exact. [`Detection::DistanceField`] is for rigid tools and is
+    /// refused.
     ///
-    /// In image space both are drawn in each substep along three axes where their boxes overlap; the triangles of one that are seen
-    /// within the thicknesses of the other's nodes and edges, over the way that they go, are compared exactly, so that a pixel does not
-    /// show in where bodies come to rest. Each triangle is seen by one ray at least; of one that is many pixels long and thinner than a pixel
-    /// the ends may not be. (Halic et al., section 2.1; Shade et al. 1998.)
+    /// In image space both bodies are rendered in each substep along three axes where their boxes overlap. Triangles of
+    /// one body within the thickness of the other's swept nodes and edges are then tested exactly, so resting positions
+    /// do not depend on the pixel size. Each triangle is hit by at least one ray. The ends of a triangle that is many
+    /// pixels long and thinner than a pixel may be missed. (Halic et al., section 2.1; Shade et al. 1998.)
     pub detection: Detection,
-    /// [`Detection::ImageSpace`]: the side of a pixel, m, at least 0; 0: half of the surface's mean edge. An image of a body has
-    /// at most 2^24 pixels, else it is refused. A body that grows to twice its size may be drawn in pixels twice as large.
+    /// The pixel size of [`Detection::ImageSpace`] (m), at least 0. 0: half of the surface's mean edge length. An image
+    /// of a body may have at most 2^24 pixels, otherwise the body is refused. A body that grows to twice its size may
+    /// be rendered with pixels of twice the size.
     pub resolution: f32,
-    /// Which tools and bodies it meets.
+    /// The collision filter for tools and bodies.
     pub filter: CollisionFilter,
 }
 
@@ -143,7 +148,7 @@ impl Default for BodyContact {
 }
 
 impl BodyContact {
-    /// It meets tools alone, and nothing keeps off its surface.
+    /// Collides with tools only, without thickness.
     pub const NOTHING: Self = Self {
         thickness: 0.0,
         friction: 0.0,
@@ -154,7 +159,7 @@ impl BodyContact {
         filter: CollisionFilter::ALL,
     };
 
-    /// Adds the bits that the next step depends on.
+    /// Hashes the settings that the next step depends on.
     pub(crate) fn hash(&self, hasher: &mut StateHasher) {
         hasher.write_floats(&[self.thickness, self.friction, self.resolution]);
         for choice in [self.with_bodies as u64, self.with_itself as u64, self.detection as u64] {
@@ -178,8 +183,11 @@ impl BodyContact {
     }
 }
 
-/// Refuses a length with which squares of distances would not stay finite.
+/// Returns an error for a length with which squared distances could overflow.
 pub(crate) fn check_reach(name: &str, value: f32) -> Result<()> {
-    ensure!(value <= FURTHEST, "{name} is {value}: must be at most {FURTHEST:e} m");
+    ensure!(
+        value <= MAX_COORDINATE,
+        "{name} is {value}: must be at most {MAX_COORDINATE:e} m"
+    );
     Ok(())
 }

@@ -1,12 +1,14 @@
-//! The law of tetrahedra that are elements.
+//! The hyperelastic law of tetrahedra that are elements.
 
 use crate::base::{Error, Result, ensure};
 use crate::codec::saved_enum;
 
-/// The hyperelastic law of tetrahedra that are elements. All have the Young's modulus and Poisson's ratio of the material at small strains.
+/// The hyperelastic law of tetrahedra that are elements. At small strains all laws have the Young's modulus and
+/// Poisson's ratio of the material.
 ///
-/// Of F, the deformation, energies have `I1 = |F|²`, `I2 = |cof F|²` and `J = det F`. All have `lambda/2 (J - 1)²` beside what is given here, of all
-/// tetrahedra at a node together from a Poisson's ratio of 0.4 on.
+/// With the deformation gradient F, the energies use `I1 = |F|²`, `I2 = |cof F|²` and `J = det F`. Each law adds
+/// `lambda/2 (J - 1)²` to the given energy. From a Poisson's ratio of 0.4 on, the tetrahedra around a node share that
+/// term (average nodal pressure).
 ///
 /// ```
 #[doc = include_str!("../doctest/block.txt")]
@@ -19,12 +21,14 @@ use crate::codec::saved_enum;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ElementLaw {
-    /// St Venant and Kirchhoff's law with a signed volume term: the fastest. It stiffens as it is stretched.
+    /// The St. Venant-Kirchhoff law with a signed volume term: the fastest. It stiffens when stretched.
     #[default]
     StVenantKirchhoff,
-    /// The stable neo-Hookean law (Smith, de Goes, Kim 2018): `2/3 mu (I1 - 3 - ln((I1 + 1)/4)) - mu (J - 1) + 5/12 mu (J - 1)²`.
+    /// The stable neo-Hookean law (Smith, de Goes, Kim 2018): `2/3 mu (I1 - 3 - ln((I1 + 1)/4)) - mu (J - 1) + 5/12 mu
+    /// (J - 1)²`.
     NeoHookean,
-    /// Mooney and Rivlin's law for any J: `c1 (I1 - 3) + c2 (I2 - 3) - (2 c1 + 4 c2)(J - 1) + c1 (J - 1)²`, with `c1 + c2 = mu/2`.
+    /// The Mooney-Rivlin law for any J: `c1 (I1 - 3) + c2 (I2 - 3) - (2 c1 + 4 c2)(J - 1) + c1 (J - 1)²`, with `c1 +
+    /// c2 = mu/2`.
     MooneyRivlin {
         /// `c2 / (c1 + c2)`, from 0 to 1.
         ratio: f32,
@@ -34,7 +38,7 @@ pub enum ElementLaw {
 saved_enum!(ElementLaw { 0 => StVenantKirchhoff, 1 => NeoHookean, 2 => MooneyRivlin { ratio } });
 
 impl ElementLaw {
-    /// Its name in C.
+    /// The name of the law in C.
     fn name(self) -> &'static str {
         match self {
             Self::StVenantKirchhoff => "SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF",
@@ -43,7 +47,8 @@ impl ElementLaw {
         }
     }
 
-    /// Refuses a number out of its range, and what only the default law can have: what else a body has is told by name and value.
+    /// Returns an error for a parameter out of range, or for a setting that only the default law supports. `refused`
+    /// lists these by name and value.
     pub(crate) fn check(self, is_of_elements: bool, refused: [(&str, f32); 2]) -> Result<()> {
         if let Self::MooneyRivlin { ratio } = self
             && !(0.0..=1.0).contains(&ratio)

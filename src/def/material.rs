@@ -1,9 +1,9 @@
-//! A material by a laboratory's numbers.
+//! Materials by their measured parameters.
 
 use super::{BodyDefinition, Values};
 use crate::base::{Error, Result, above_zero, ensure, not_negative};
 
-/// How a material's numbers become forces.
+/// The mechanical model that a material's parameters apply to.
 ///
 /// ```
 #[doc = include_str!("../doctest/block.txt")]
@@ -17,37 +17,39 @@ use crate::base::{Error, Result, above_zero, ensure, not_negative};
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Model {
-    /// Springs along the edges of the elements. Poisson's ratio is what such springs imply: 1/4 for tetrahedra and cells, 1/3
+    /// Springs along the edges of the elements. Such springs imply Poisson's ratio: 1/4 for tetrahedra and cells, 1/3
     /// in the plane for triangles.
     ///
-    /// - *Tetrahedra*: `k = sum E V / L²` over the tetrahedra at an edge (Van Gelder 1998), V their volume, L the edge's length.
-    ///   What nodes would do in a body deformed evenly, each moved by the same affine map, has this E and nu 1/4 in the mean over
-    ///   directions, on any mesh. In an irregular mesh nodes give way: one that TetGen filled is 4 to 8 % softer, nu 0.25; nodes
-    ///   moved about by a fifth of an edge cost 5 %. A body that is one or two tetrahedra thick has half to a third of E. Cubes cut
-    ///   in five are 19 % stiffer along the axes, with nu 0.19, and 14 % softer along their diagonals.
-    /// - *Cells*, cubes of edge a: `k = 0.4 E a` for their edges and the diagonals of their faces alike, at an outer face or edge
-    ///   the share of the cells that meet there, a quarter each of the cells at an edge and half of those at a diagonal. E along
-    ///   the axes and nu = 1/4 are exact for small strains, and the same in every direction.
-    /// - *Triangles* of a thickness t: `k = sum E t A / L²` over the triangles at an edge, A their area; for equilateral ones
-    ///   sqrt(3)/2 E t, and half at the border. For these E and nu = 1/3 in the plane are exact for small strains, the same in
-    ///   every direction; with nodes moved about by a fifth of an edge E is 5 % lower, nu 0.34. Squares cut in two are 19 % stiffer
-    ///   along their sides, with nu 0.19. There is no bending.
+    /// - *Tetrahedra*: `k = sum E V / L²` over the tetrahedra at an edge (Van Gelder 1998), with their volume V and the
+    ///   edge length L. Under an affine deformation any mesh has this E and nu = 1/4, averaged over directions. In
+    ///   irregular meshes nodes yield: a mesh from TetGen is 4 to 8 % softer with nu = 0.25. Moving nodes by a fifth of
+    ///   an edge costs 5 %. A body of one or two tetrahedra in thickness has one third to one half of E. Cubes cut in
+    ///   five are 19 % stiffer along the axes, with nu = 0.19, and 14 % softer along their diagonals.
+    /// - *Cells*, cubes of edge a: `k = 0.4 E a` for their edges and the diagonals of their faces. An outer edge or
+    ///   diagonal has the share of the cells that meet there: a quarter per cell at an edge, half at a diagonal. E and
+    ///   nu = 1/4 are exact along the axes for small strains, and the same in every direction.
+    /// - *Triangles* of thickness t: `k = sum E t A / L²` over the triangles at an edge, with their area A. Equilateral
+    ///   triangles have sqrt(3)/2 E t, and half at the border; for them E and nu = 1/3 in the plane are exact for small
+    ///   strains and the same in every direction. With nodes moved by a fifth of an edge, E is 5 % lower and nu = 0.34.
+    ///   Squares cut in two are 19 % stiffer along their sides, with nu = 0.19. There is no bending.
     ///
-    /// All follow from the even deformation of a network of springs, whose stiffness is `sum k L² n n n n / V` (Cauchy-Born).
-    /// Springs turn stiffer as they are stretched: along an axis of the cubic lattice the secant E shifts by 0.7 of the strain.
+    /// All follow from the affine deformation of a spring network, whose stiffness is `sum k L² n n n n / V`
+    /// (Cauchy-Born). Springs stiffen when stretched: along an axis of the cubic lattice the secant E shifts by 0.7 of
+    /// the strain.
     #[default]
     Springs,
-    /// Tetrahedra as finite elements: St Venant and Kirchhoff's law with a signed volume term, of any Poisson's ratio from 0 to 0.49.
+    /// Tetrahedra as finite elements: the St. Venant-Kirchhoff law with a signed volume term, for Poisson's ratios from
+    /// 0 to 0.49.
     ///
-    /// The energy of a tetrahedron of volume V at rest is `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)`, with E Green's strain
-    /// and J how much larger its volume is (negative where it is inside out); lambda + kappa and mu are those of Young's
-    /// modulus and Poisson's ratio, and kappa is lambda + kappa, or a quarter of lambda + kappa + 2 mu where that is more. Forces are
-    /// right up to compressions of some 20 %, and stable beyond. There are no springs but those that are given; removing the
-    /// spring between two nodes takes away the tetrahedra that have this edge.
+    /// A tetrahedron of rest volume V has the energy `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)`. E is the
+    /// Green strain and J the volume ratio, negative if it is inverted. Young's modulus and Poisson's ratio give
+    /// lambda + kappa and mu. kappa is lambda + kappa, or a quarter of lambda + kappa + 2 mu if that is larger. Forces
+    /// are accurate up to compressions of about 20 %, and stable beyond. The only springs are those that are given.
+    /// Removing the spring between two nodes removes the tetrahedra with that edge.
     Tetrahedra,
 }
 
-/// What a body is made of, by its numbers. Plain data.
+/// The material of a body by its parameters. Plain data.
 ///
 /// ```
 #[doc = include_str!("../doctest/block.txt")]
@@ -67,21 +69,22 @@ pub enum Model {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Material {
-    /// How they become forces.
+    /// The mechanical model.
     pub model: Model,
-    /// Young's modulus at small strains, Pa, above 0.
+    /// Young's modulus at small strains (Pa), above 0.
     pub young_modulus: f32,
-    /// Poisson's ratio. [`Model::Springs`]: 0, or what it implies within 0.001. [`Model::Tetrahedra`]: from 0 to 0.49.
+    /// Poisson's ratio. [`Model::Springs`]: 0, or the implied value within 0.001. [`Model::Tetrahedra`]: from 0 to
+    /// 0.49.
     pub poisson_ratio: f32,
-    /// kg/m³, at least 0. Above 0: each node has its share of the mass of the elements that it belongs to, a quarter of a
-    /// tetrahedron, an eighth of a cell, a third of a triangle; the definition's masses must be 0 then. 0: the definition's masses.
+    /// The density (kg/m³), at least 0. 0: the definition gives the masses. Above 0: each element distributes its mass
+    /// equally to its nodes, and the definition's masses must be 0.
     pub density: f32,
-    /// m: for bodies of triangles alone, above 0; 0 for all others.
+    /// The thickness of a body of triangles alone (m), above 0. It is 0 for other bodies.
     pub thickness: f32,
 }
 
 impl Material {
-    /// Refuses numbers out of their ranges, and what a definition may not give beside a material.
+    /// Returns an error for parameters out of range, and for settings that are not allowed with a material.
     pub(crate) fn check(&self, definition: &BodyDefinition) -> Result<()> {
         above_zero("young_modulus", self.young_modulus)?;
         not_negative("density", self.density)?;
@@ -97,7 +100,7 @@ impl Material {
     }
 }
 
-/// There are tetrahedra, and Poisson's ratio is one that they can have.
+/// Checks that there are tetrahedra and that Poisson's ratio is in their range.
 fn check_tetrahedra(material: &Material, definition: &BodyDefinition) -> Result<()> {
     const HIGHEST: f32 = 0.49;
     ensure!(
@@ -117,7 +120,7 @@ fn check_tetrahedra(material: &Material, definition: &BodyDefinition) -> Result<
     Ok(())
 }
 
-/// Springs come from the material alone.
+/// Checks that only the material defines springs.
 fn check_springs(definition: &BodyDefinition) -> Result<()> {
     ensure!(
         definition.springs.is_none(),
@@ -131,7 +134,7 @@ fn check_springs(definition: &BodyDefinition) -> Result<()> {
     }
 }
 
-/// Masses come from the density alone.
+/// Checks that only the density defines masses.
 fn check_no_masses(masses: Values) -> Result<()> {
     match masses {
         Values::Uniform(0.0) => Ok(()),

@@ -1,4 +1,4 @@
-//! What callers say of bodies, as plain data that checks itself, and what bodies report.
+//! Plain data that define bodies and validate themselves, and the reports of bodies.
 
 mod anchor;
 mod body;
@@ -17,7 +17,7 @@ mod yielding;
 
 pub use anchor::{Anchor, SurfacePoint};
 pub use body::{BodyDefinition, Solver, Storage};
-pub(crate) use body::{MOST_ITERATIONS, SMALLEST_MASS};
+pub(crate) use body::{MAX_ITERATIONS, MIN_MASS};
 pub use choice::{ChoiceReason, SolverChoice};
 pub(crate) use contact::check_reach;
 pub use contact::{BodyContact, CollisionFilter, Detection};
@@ -27,10 +27,10 @@ pub use report::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use sleep::{BodySettings, Sleep};
 pub use spring_law::SpringLaw;
 pub(crate) use springs::{Rounding, Spring, distance};
-pub(crate) use tearing::Withheld;
+pub(crate) use tearing::TearRefusal;
 pub use tearing::{TearReport, Tearing};
 pub use values::Values;
 pub(crate) use values::{check_given, check_values, expect_count, finite_vector, finite_vectors, node_indices};
 pub use viscosity::Viscosity;
-pub(crate) use viscosity::{Carried, RelaxationStep};
+pub(crate) use viscosity::{NodalStiffness, RelaxationStep};
 pub use yielding::Yielding;

@@ -1,8 +1,8 @@
-//! What a body says about itself: energy, memory, cavities, how its solver took the last step.
+//! Reports of a body: energy, memory, cavities, and the solver's last step.
 
 use crate::codec::saved;
 
-/// How much memory the springs of a body take.
+/// The memory of a body's springs.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -15,17 +15,17 @@ use crate::codec::saved;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StorageReport {
-    /// Nodes of the body.
+    /// The number of nodes in the body.
     pub node_count: usize,
-    /// Springs of the body, each counted once.
+    /// The number of springs, each counted once.
     pub spring_count: usize,
-    /// Bytes taken by the springs that exist.
+    /// Bytes used by the existing springs.
     pub bytes_used: usize,
-    /// Bytes held from the allocator, with what is spare.
+    /// Bytes held from the allocator, spare capacity included.
     pub bytes_reserved: usize,
 }
 
-/// What a body encloses: the sums of the cavities that are closed; all 0 where it was not asked to keep or press anything.
+/// The sums over the closed cavities of a body. All values are 0 if the body has no enclosed stiffness or pressure.
 ///
 /// ```
 /// # use sinew::{mesh::Mesh, *};
@@ -42,17 +42,17 @@ pub struct StorageReport {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnclosedReport {
-    /// Cavities that have not been cut open.
+    /// The number of cavities that have not been cut open.
     pub cavity_count: usize,
-    /// m³, at the time of the positions; negative where they are inside out.
+    /// The volume at the current positions (m³); negative if the cavities are inverted.
     pub volume: f64,
-    /// The same at rest, m³.
+    /// The volume at rest (m³).
     pub rest_volume: f64,
-    /// By how much the pressure inside is above that outside, Pa; the mean by volume at rest.
+    /// The overpressure (Pa), averaged by rest volume.
     pub pressure: f64,
 }
 
-/// How a body's solver took the last step.
+/// The report of a body's solver on the last step.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -66,26 +66,26 @@ pub struct EnclosedReport {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SolverReport {
-    /// Products with the matrices of the step's equations; 0 for bodies that are moved explicitly.
+    /// The number of matrix-vector products in the step; 0 for explicit bodies.
     pub iterations: u32,
-    /// How far nodes may be from where the step's equation has them, m; 0 for bodies that are moved explicitly.
-    /// [`Solver::Implicit`](crate::Solver::Implicit): root mean square by mass. [`Solver::Newton`](crate::Solver::Newton): the
-    /// longest way of the last correction, of which about a hundredth is left. What a shorter step would change is not in it.
+    /// The estimated position error of the solve (m); 0 for explicit bodies.
+    /// [`Solver::Implicit`](crate::Solver::Implicit): root mean square, weighted by mass.
+    /// [`Solver::Newton`](crate::Solver::Newton): the largest displacement of the last correction, of which about a
+    /// hundredth remains. The error of the time step is not included.
     pub error: f32,
-    /// By how much mass scaling makes nodes heavier in all, kg; see
+    /// The total mass that mass scaling adds (kg); see
     /// [`BodyDefinition::mass_scaling`](crate::BodyDefinition::mass_scaling).
     pub added_mass: f64,
-    /// Linearised equations solved; 0 for bodies that are moved explicitly.
+    /// The number of linearized equations that were solved; 0 for explicit bodies.
     pub solves: u32,
-    /// Whether every equation was solved as far as the definition asks, or as rounding allows; `false` for bodies that are moved
-    /// explicitly.
+    /// True if every equation reached the required accuracy, or the limit of rounding. `false` for explicit bodies.
     pub has_converged: bool,
 }
 
 saved! { SolverReport { iterations, error, added_mass, solves, has_converged } }
 
 impl SolverReport {
-    /// Before anything was solved.
+    /// The report before the first solve.
     pub(crate) const BEFORE: Self = Self {
         iterations: 0,
         error: 0.0,
@@ -95,7 +95,7 @@ impl SolverReport {
     };
 }
 
-/// Energy in joules, at the time of the positions.
+/// The energy of a body at the current positions (J).
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -110,11 +110,11 @@ impl SolverReport {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
-    /// Of the nodes that are free to move, along the axes along which they are. What mass scaling adds to them does not count: it has no weight
-    /// either, and comes and goes.
+    /// The kinetic energy of free nodes along their free axes. Mass from mass scaling is not included: it has no weight
+    /// and varies.
     pub kinetic: f64,
-    /// Of the springs, of tetrahedra that are elements, and of every other term; less the work that a constant pressure has done.
+    /// The elastic energy of springs, elements and all other terms, minus the work of constant pressures.
     pub elastic: f64,
-    /// Of all nodes, zero at the origin.
+    /// The gravitational energy of all nodes, zero at the origin.
     pub gravitational: f64,
 }

@@ -1,9 +1,9 @@
-//! When a body sleeps, and what of it can be set later.
+//! Sleep settings, and the settings of a body that can change later.
 
 use crate::base::{Result, above_zero, not_negative};
 use crate::codec::saved;
 
-/// When tissue at rest is left alone.
+/// The conditions under which tissue at rest falls asleep.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -19,15 +19,15 @@ use crate::codec::saved;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sleep {
-    /// What is slower is at rest, m/s, at least 0; 0: the body never sleeps, and pays nothing for it.
+    /// The speed below which tissue is at rest (m/s), at least 0. 0: the body never sleeps, and has no cost for it.
     pub speed: f32,
-    /// For how long it has to be at rest, s, above 0: some times what the tissue takes to settle.
+    /// The time at rest before tissue falls asleep (s), above 0. Choose a few times the settling time of the tissue.
     pub time: f32,
 }
 
 saved! { Sleep { speed, time } }
 
-/// What of a body can be set after it was made.
+/// The settings of a body that can change after its creation.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -48,12 +48,12 @@ pub struct BodySettings {
     pub with_bodies: bool,
     /// [`BodyContact::with_itself`](super::BodyContact::with_itself).
     pub with_itself: bool,
-    /// When it sleeps.
+    /// The sleep settings.
     pub sleep: Sleep,
 }
 
 impl Default for Sleep {
-    /// Never; after half a second.
+    /// No sleep; the time is half a second.
     fn default() -> Self {
         Self { speed: 0.0, time: 0.5 }
     }

@@ -1,10 +1,10 @@
-//! How springs stiffen as they are stretched.
+//! Force-strain laws of springs.
 
 use crate::base::{Result, above_zero, ensure};
 use crate::codec::saved_enum;
 
-/// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
-/// the stiffness they are given. Springs that are added later are linear.
+/// The force of a spring as a function of its strain e, relative to `k L0` with its stiffness k and rest length L0.
+/// Springs that are added later are linear.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -23,36 +23,37 @@ use crate::codec::saved_enum;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SpringLaw {
-    /// `e`.
+    /// Linear: `e`.
     #[default]
     Linear,
-    /// Shaped like a J: `(exp(steepness e) - 1) / steepness` for strains from 0 to `limit`; linear beyond, as stiff as there; `e` below 0.
-    /// (Fung 1967 found such a law for soft tissue.)
+    /// A J-shaped curve: `(exp(steepness e) - 1) / steepness` for strains from 0 to `limit`, linear with the same slope
+    /// beyond, and `e` below 0 (found for soft tissue by Fung 1967).
     Exponential {
-        /// Above 0; `steepness limit` is at most 13.8: a spring becomes at most a million times as stiff.
+        /// The exponent per strain, above 0. `steepness limit` must be at most 13.8, so that a spring becomes at most a
+        /// million times as stiff.
         steepness: f32,
-        /// Above 0.
+        /// The strain beyond which the law is linear, above 0.
         limit: f32,
     },
-    /// `e + quadratic e² + cubic e³` up to a strain of `limit`, linear beyond, as stiff as there. `quadratic²` is at most `3 cubic`:
-    /// then a spring that is longer always pulls more.
+    /// `e + quadratic e² + cubic e³` up to a strain of `limit`, and linear with the same slope beyond. `quadratic²`
+    /// must be at most `3 cubic`, so that the force always increases with the length.
     Cubic {
-        /// Any number.
+        /// The quadratic coefficient, any number.
         quadratic: f32,
-        /// At least 0.
+        /// The cubic coefficient, at least 0.
         cubic: f32,
-        /// Above 0.
+        /// The strain beyond which the law is linear, above 0.
         limit: f32,
     },
 }
 
 saved_enum!(SpringLaw { 0 => Linear, 1 => Exponential { steepness, limit }, 2 => Cubic { quadratic, cubic, limit } });
 
-/// A million times as stiff.
+/// The largest exponent: a million times the stiffness.
 const STEEPEST: f32 = 13.8;
 
 impl SpringLaw {
-    /// Refuses numbers out of their ranges.
+    /// Returns an error for parameters out of range.
     pub(crate) fn check(&self) -> Result<()> {
         match *self {
             SpringLaw::Linear => Ok(()),

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::BodyDefinition;
 use crate::base::{Result, ensure, memory};
 
-/// A spring between two nodes, checked.
+/// A validated spring between two nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Spring {
     pub nodes: [u32; 2],
@@ -14,29 +14,28 @@ pub(crate) struct Spring {
     pub damping: f32,
 }
 
-/// Rest lengths that come from positions are merged where they differ by no more than this part of themselves, however
-/// coarse the positions.
-const LARGEST_MERGER: f32 = 1e-3;
+/// The largest relative difference of computed rest lengths that are merged, however coarse the positions are.
+const MAX_MERGE_TOLERANCE: f32 = 1e-3;
 
-/// What rest lengths may differ by, to be one.
+/// The tolerance for equal rest lengths.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounding {
-    /// The largest coordinate that they were computed from, m; 0 where they were given.
+    /// The largest coordinate that rest lengths were computed from, m; 0 if they were given.
     pub reach: f32,
 }
 
 impl Rounding {
-    /// The width within which rest lengths of about this length are one, m.
+    /// The range within which rest lengths near this length are equal, m.
     pub fn width(self, length: f32) -> f32 {
-        // Each end is rounded by up to half a unit in the last place along each axis, and so are the length and its ends'
-        // difference.
+        // Along each axis both ends, their difference and the length are rounded by up to half a unit in the last
+        // place.
         let rounded = 4.0 * f32::EPSILON * self.reach;
-        (4.0 * f32::EPSILON * length).max(rounded.min(LARGEST_MERGER * length))
+        (4.0 * f32::EPSILON * length).max(rounded.min(MAX_MERGE_TOLERANCE * length))
     }
 }
 
 impl BodyDefinition<'_> {
-    /// What rest lengths may differ by, to be one.
+    /// The tolerance for equal rest lengths.
     pub(crate) fn rounding(&self) -> Rounding {
         let rest = self.rest_positions.unwrap_or(self.positions);
         let reach = |reach: f32, position: &Vec3| reach.max(position.abs().max_element());
@@ -80,7 +79,7 @@ impl BodyDefinition<'_> {
     }
 }
 
-/// The distance of two points, in metres, without overflow or loss on the way.
+/// The distance between two points (m), without overflow or cancellation.
 pub(crate) fn distance(a: Vec3, b: Vec3) -> f32 {
     (b.as_dvec3() - a.as_dvec3()).length() as f32
 }

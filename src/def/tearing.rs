@@ -1,20 +1,20 @@
-//! When a body tears, and what it says of it.
+//! Tearing limits and reports.
 
 use super::BodyDefinition;
 use super::Model;
 use crate::base::{Error, Result, ensure, not_negative};
 use crate::codec::{saved, saved_enum};
 
-/// When a body tears.
+/// The limits beyond which a body tears.
 ///
-/// A spring that a step has left beyond its limits tears the surface through one of its nodes, across what pulls that node apart (O'Brien,
-/// Hodgins 1999, equation 13); where a cut ends in a triangle next to the spring, that goes on instead. A tear goes as far as the next triangle
-/// that is simulated, and is a cut in all it does.
+/// A spring beyond its limits after a step tears the surface through one of its nodes. The tear is perpendicular to the
+/// tension at that node (O'Brien and Hodgins 1999, equation 13). If a cut ends in a triangle next to the spring, that
+/// cut is continued instead. A tear extends to the next simulated triangle, and otherwise behaves as a cut.
 ///
-/// A solid tears at that of the spring's nodes about which its material is stretched more, by the mean of (F Fᵀ - 1) / 2 over the tetrahedra there, with
-/// the gradient F of the deformation: the tetrahedra about it whose middles lie on the two sides of the plane across the largest principal
-/// stretch part along their faces, as far as what is drawn stays a closed surface. Of tetrahedra that are elements each edge counts as a spring with a
-/// strain.
+/// A solid tears at the node of the spring with the larger strain. This is (F Fᵀ - 1) / 2 with the deformation gradient
+/// F, averaged over the tetrahedra around the node. These tetrahedra separate along their faces if their centers are on
+/// different sides of the plane perpendicular to the largest principal stretch. The render surface stays closed. Each
+/// edge of an element counts as a spring with a strain.
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
@@ -30,19 +30,22 @@ use crate::codec::{saved, saved_enum};
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tearing {
-    /// The part of its rest length by which a spring may become longer, at least 0; 0: any. A spring without a rest length has no strain.
+    /// The maximum strain of a spring, at least 0. 0: unlimited. A spring without a rest length has no strain.
     pub strain: f32,
-    /// How much a spring may pull, N, at least 0; 0: any. Edges of elements bear any force. What a cut leaves of a spring bears its part.
+    /// The maximum tension of a spring (N), at least 0. 0: unlimited. It does not apply to edges of elements. The
+    /// remainder of a cut spring has its share of the limit.
     pub force: f32,
-    /// The most tears in a step, those of the most loaded springs; 0: the body does not tear, and pays nothing for it.
+    /// The maximum number of tears per step; the most loaded springs tear first. 0: the body does not tear, and has no
+    /// cost for it.
     pub most_per_step: u32,
-    /// A tear that would part a piece with less area in the rest shape, m², of solids with less volume, m³, is not made; at least 0.
+    /// The minimum fragment size at rest, at least 0: area (m²), or volume of solids (m³). A tear that would separate a
+    /// smaller fragment is not made.
     pub smallest_piece: f32,
 }
 
 saved! { Tearing { strain, force, most_per_step, smallest_piece } }
 
-/// What tore in the last step, and what did not.
+/// The tears of the last step, and the springs beyond their limits that did not tear.
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
@@ -61,36 +64,36 @@ saved! { Tearing { strain, force, most_per_step, smallest_piece } }
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TearReport {
-    /// Tears that were made.
+    /// The number of tears.
     pub tears: u32,
-    /// How many more pieces the surface has.
+    /// The number of connected components that the surface gained.
     pub pieces_parted: u32,
-    /// Springs beyond their limits whose turn is to come: there were as many tears as there may be, one beside them, or nothing pulls their nodes
-    /// apart.
+    /// Springs beyond their limits that wait: the maximum number of tears was reached, a tear was made next to them, or
+    /// no tension acts on their nodes.
     pub waiting: u32,
-    /// Springs beyond their limits that would part too small a piece.
+    /// Springs beyond their limits whose tear would separate too small a fragment.
     pub small_pieces: u32,
-    /// Springs beyond their limits for whose tears there is no room: not as many spare nodes, or places in a row of fixed length, or memory.
+    /// Springs beyond their limits whose tear lacks spare nodes, slots for springs, or memory.
     pub no_room: u32,
 }
 
 saved! { TearReport { tears, pieces_parted, waiting, small_pieces, no_room } }
 
-/// Why a spring beyond its limits was not torn. It is not tried again before the topology changes.
+/// The reason why a spring beyond its limits was not torn. It is not tried again until the topology changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Withheld {
+pub(crate) enum TearRefusal {
     SmallPiece,
     NoRoom,
-    NoWay,
+    NoPath,
 }
 
-saved_enum!(Withheld { 0 => SmallPiece, 1 => NoRoom, 2 => NoWay });
+saved_enum!(TearRefusal { 0 => SmallPiece, 1 => NoRoom, 2 => NoPath });
 
 impl Tearing {
-    /// Refuses what is out of its range, or not possible for such a body.
+    /// Returns an error for values out of range or not supported by such a body.
     pub(crate) fn check(&self, definition: &BodyDefinition) -> Result<()> {
-        let of_springs = [("tear_strain", self.strain), ("tear_force", self.force)];
-        for (name, value) in of_springs.into_iter().chain([("smallest_piece", self.smallest_piece)]) {
+        let limits = [("tear_strain", self.strain), ("tear_force", self.force)];
+        for (name, value) in limits.into_iter().chain([("smallest_piece", self.smallest_piece)]) {
             not_negative(name, value)?;
             ensure!(
                 value <= 0.0 || self.most_per_step != 0,
@@ -127,11 +130,11 @@ impl Tearing {
 }
 
 impl TearReport {
-    pub(crate) fn withhold(&mut self, why: Withheld) {
+    pub(crate) fn count_refusal(&mut self, why: TearRefusal) {
         *match why {
-            Withheld::SmallPiece => &mut self.small_pieces,
-            Withheld::NoRoom => &mut self.no_room,
-            Withheld::NoWay => &mut self.waiting,
+            TearRefusal::SmallPiece => &mut self.small_pieces,
+            TearRefusal::NoRoom => &mut self.no_room,
+            TearRefusal::NoPath => &mut self.waiting,
         } += 1;
     }
 }

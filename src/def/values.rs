@@ -1,4 +1,4 @@
-//! Values for nodes and springs, and the checks of lists that callers give.
+//! Values of nodes and springs, and checks of lists from the caller.
 
 use glam::Vec3;
 
@@ -26,7 +26,7 @@ pub enum Values<'a> {
 }
 
 impl Values<'_> {
-    /// The value of number `index`.
+    /// The value at `index`.
     #[inline]
     pub fn get(&self, index: usize) -> f32 {
         match self {
@@ -35,7 +35,7 @@ impl Values<'_> {
         }
     }
 
-    /// The value of all, 0 where each has its own.
+    /// The common value; 0 if each has its own.
     pub(crate) fn uniform(&self) -> f32 {
         match self {
             Values::Uniform(value) => *value,
@@ -43,7 +43,7 @@ impl Values<'_> {
         }
     }
 
-    /// Whether every value is zero.
+    /// True if every value is zero.
     pub(crate) fn all_zero(&self) -> bool {
         match self {
             Values::Uniform(value) => *value == 0.0,
@@ -69,7 +69,7 @@ pub(crate) fn finite_vectors(name: &str, vectors: &[Vec3]) -> Result<()> {
     Ok(())
 }
 
-/// Checks `values` of which each must be finite and at least 0; `name` in the singular.
+/// Checks that each of `values` is finite and at least 0. `name` is in the singular.
 pub(crate) fn check_values(name: &str, values: &Values, count: usize) -> Result<()> {
     match values {
         Values::Uniform(value) => not_negative(name, *value),
@@ -84,7 +84,7 @@ pub(crate) fn check_values(name: &str, values: &Values, count: usize) -> Result<
     }
 }
 
-/// The same for those that are given.
+/// Checks those values that are given.
 pub(crate) fn check_given(given: [(&str, Option<Values>); 2], count: usize) -> Result<()> {
     let mut given = given.iter().filter_map(|(name, values)| Some((name, values.as_ref()?)));
     given.try_for_each(|(name, values)| check_values(name, values, count))

@@ -1,16 +1,16 @@
-//! Viscosity: an arm beside what is elastic, a spring and a dashpot in a row (the standard linear solid; Zener 1948), or the dashpot
-//! alone (Kelvin and Voigt).
+//! Viscosity: a Maxwell branch in parallel with the elastic part, which is a spring in series with a dashpot (the
+//! standard linear solid; Zener 1948), or the dashpot alone (Kelvin-Voigt).
 
 use crate::base::{Error, Result, ensure, not_negative};
 use crate::codec::saved;
-use crate::soa::Rates;
+use crate::soa::FrequencyBound;
 
-/// How tissue resists the speed at which it is deformed. With E the stiffness at rest, of a spring or an element, a dashpot of
-/// `E retardation_time` lies beside it, in a row with a spring of `E retardation_time / relaxation_time`.
+/// The viscosity of tissue. In parallel with a spring or element of stiffness E is a dashpot of `E retardation_time`,
+/// in series with a spring of `E retardation_time / relaxation_time`.
 ///
-/// After a step of strain the stress relaxes as `E (1 + retardation_time / relaxation_time exp(-t / relaxation_time))`: where E0 is
-/// measured at once and E in the end, `retardation_time` is `relaxation_time (E0 / E - 1)`. Any times are stable, with VERLET for the price
-/// of shorter substeps.
+/// After a step in strain the stress relaxes as `E (1 + retardation_time / relaxation_time exp(-t / relaxation_time))`.
+/// From a measured instantaneous E0 and final E, `retardation_time` is `relaxation_time (E0 / E - 1)`. All times are
+/// stable; with VERLET they shorten the substeps.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -30,45 +30,45 @@ use crate::soa::Rates;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Viscosity {
-    /// The dashpot's viscosity over the stiffness, s, at least 0, at most 1e6; 0: there is none. VERLET takes substeps as short as a dashpot
-    /// alone asks for, `2 / w² retardation_time` with w the highest frequency: from about a millisecond on IMPLICIT is the solver for
-    /// it.
+    /// The viscosity of the dashpot divided by the stiffness (s), at least 0, at most 1e6. 0: there is none. VERLET
+    /// takes substeps as short as for a dashpot alone, `2 / w² retardation_time` with the highest frequency w. From
+    /// about a millisecond on, use IMPLICIT.
     pub retardation_time: f32,
-    /// Of the dashpot and the spring in its row, s, from 1e-9 to 1e6, or 0: there is no such spring, and the dashpot acts alone (Kelvin and
-    /// Voigt). Forces on tetrahedra are then of order 1 in the step, all others of order 2.
+    /// The relaxation time of the Maxwell branch (s), from 1e-9 to 1e6. 0: the dashpot acts alone (Kelvin-Voigt).
+    /// Forces on tetrahedra are then first-order accurate in the step, all others second-order.
     pub relaxation_time: f32,
 }
 
 saved! { Viscosity { retardation_time, relaxation_time } }
 
-/// The range of times, s: shorter than any step, and longer than anybody looks on.
+/// The range of times, s: shorter than any step, and longer than any simulation.
 const SHORTEST: f32 = 1e-9;
 const LONGEST: f32 = 1e6;
 
-/// What becomes of an arm in some time: its stress is the part `decay` of what it was, and `gain` times what the elastic stress changed
-/// by. Exact where strain changes evenly (Taylor, Pister, Goudreau 1970).
+/// The relaxation of a Maxwell branch over a time. The new stress is `decay` times the old, plus `gain` times the
+/// change of the elastic stress. It is exact for a constant strain rate (Taylor, Pister, Goudreau 1970).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RelaxationStep {
     pub decay: f64,
     pub gain: f64,
-    /// Whether what is deformed beyond its yield strain stays so.
+    /// True if deformation beyond the yield strain becomes permanent.
     pub yields: bool,
 }
 
 saved! { RelaxationStep { decay, gain, yields } }
 
 impl RelaxationStep {
-    /// None: arms hold what they held.
-    pub const NOTHING: Self = Self {
+    /// No relaxation: branches keep their stress.
+    pub const IDENTITY: Self = Self {
         decay: 1.0,
         gain: 0.0,
         yields: false,
     };
 
-    /// So long that arms hold nothing.
-    pub const FOREVER: Self = Self {
+    /// Complete relaxation: branches have no stress.
+    pub const RELAXED: Self = Self {
         decay: 0.0,
-        ..Self::NOTHING
+        ..Self::IDENTITY
     };
 }
 
@@ -99,7 +99,7 @@ impl Viscosity {
         self.retardation_time == 0.0
     }
 
-    /// The viscosity over the stiffness of a dashpot that acts alone, s.
+    /// The viscosity of a dashpot that acts alone, divided by the stiffness, s.
     pub(crate) fn dashpot(&self) -> f32 {
         if self.relaxation_time == 0.0 {
             self.retardation_time
@@ -108,7 +108,7 @@ impl Viscosity {
         }
     }
 
-    /// In so many seconds, above 0.
+    /// The relaxation over `time` seconds, above 0.
     pub(crate) fn over(&self, time: f64) -> RelaxationStep {
         let (retardation, relaxation) = (f64::from(self.retardation_time), f64::from(self.relaxation_time));
         let ratio = time / relaxation;
@@ -119,23 +119,23 @@ impl Viscosity {
         }
     }
 
-    /// How stiff the arm's spring is against what it lies beside; `None`: there is no such spring.
+    /// The stiffness of the branch's spring relative to the elastic part. `None`: there is no such spring.
     pub(crate) fn stiffening(&self) -> Option<f64> {
         (self.relaxation_time > 0.0).then(|| f64::from(self.retardation_time) / f64::from(self.relaxation_time))
     }
 
-    /// What the rates of something become with an arm beside it. Leapfrog with steps h is stable where `h² w² (1 + 2 gain / (1 + decay))`
-    /// is below 4, and the last part is at most both 2 T/h and T/tau: a dashpot, or a spring.
-    pub(crate) fn rates(&self, rates: Rates) -> Rates {
-        let as_dashpot = Rates {
-            most_damped: rates.most_damped + self.retardation_time * rates.stiffest,
+    /// The frequency bound with a Maxwell branch in parallel. Leapfrog with steps h is stable if `h² w² (1 + 2 gain /
+    /// (1 + decay))` is below 4. The last term is at most 2 T/h, as of a dashpot, and T/tau, as of a spring.
+    pub(crate) fn rates(&self, rates: FrequencyBound) -> FrequencyBound {
+        let as_dashpot = FrequencyBound {
+            damping_rate: rates.damping_rate + self.retardation_time * rates.omega_sq,
             ..rates
         };
         let Some(stiffening) = self.stiffening() else {
             return as_dashpot;
         };
-        let as_spring = Rates {
-            stiffest: rates.stiffest * (1.0 + stiffening) as f32,
+        let as_spring = FrequencyBound {
+            omega_sq: rates.omega_sq * (1.0 + stiffening) as f32,
             ..rates
         };
         if as_dashpot.limit() > as_spring.limit() {
@@ -146,19 +146,20 @@ impl Viscosity {
     }
 }
 
-/// What a node carries of forces that are not those of springs, at rest: twice the sum over all nodes bounds their form.
+/// The nodal stiffness and damping of the forces besides springs, at rest. Twice its sum over all nodes bounds their
+/// quadratic form.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Carried {
+pub(crate) struct NodalStiffness {
     /// N/m
     pub stiffness: f32,
     /// N s/m
     pub damping: f32,
 }
 
-saved! { Carried { stiffness, damping } }
+saved! { NodalStiffness { stiffness, damping } }
 
-impl Carried {
-    /// Adds what forces give with this stiffness, N/m, that have such an arm beside them.
+impl NodalStiffness {
+    /// Adds half of a force's stiffness, N/m, with its Maxwell branch.
     pub fn add(&mut self, stiffness: f32, viscosity: Viscosity) {
         let stiffness = 0.5 * stiffness;
         self.stiffness += stiffness;

@@ -1,9 +1,9 @@
-//! Yielding: what is deformed beyond a strain stays so.
+//! Yielding: deformation beyond a strain becomes permanent.
 
 use crate::base::{Result, ensure, not_negative};
 
-/// From which strain on springs, and tetrahedra that are elements, take a set: they are at rest elsewhere from then on (perfect
-/// plasticity).
+/// The yield strain of springs, and of tetrahedra that are elements. Beyond it their rest shape changes permanently
+/// (perfect plasticity).
 ///
 /// ```
 /// # use glam::Vec3;
@@ -22,15 +22,15 @@ use crate::base::{Result, ensure, not_negative};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Yielding {
-    /// Of a spring, or a rod of tetrahedra, that is stretched or pressed; at least 0; 0: none.
+    /// The yield strain of a spring, or of a rod of tetrahedra, in tension and compression, at least 0. 0: no yielding.
     pub strain: f32,
-    /// The largest part of its length by which it may become longer or shorter for good, above 0 and below 1; beyond that it is elastic
+    /// The maximum plastic strain in tension and compression, above 0 and below 1. Beyond it the material is elastic
     /// again.
     pub largest: f32,
 }
 
 impl Default for Yielding {
-    /// None; a half at most.
+    /// No yielding; the maximum plastic strain is one half.
     fn default() -> Self {
         Self {
             strain: 0.0,

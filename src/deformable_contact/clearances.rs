@@ -1,52 +1,53 @@
-//! How near features of a surface may come to other bodies.
+//! Reduced contact distances of the features of a surface.
 //!
-//! Bodies may be made closer to each other than their thicknesses allow. Parting them would take work, so there the thickness is reduced: a feature
-//! may stay as near as it was made. It gets its thickness back as it moves away, and loses none otherwise.
+//! Bodies can be created closer to each other than their thicknesses allow. Pushing them apart would add energy, so the
+//! thickness of such a feature is reduced to its initial distance. It recovers as the feature moves away, and is
+//! reduced in no other case.
 
 use crate::base::{Result, memory};
 use crate::codec::saved;
 
-/// Of a corner or an edge.
+/// Clearance of a corner or edge.
 #[derive(Clone, Copy, Debug)]
 struct FeatureClearance {
-    /// So near it may come, m; infinity: it is not reduced.
-    allowed: f32,
-    /// What is nearest in the search in progress, m.
+    /// Allowed distance, m; infinity without reduction.
+    allowed_distance: f32,
+    /// Smallest distance in the search in progress, m.
     nearest: f32,
 }
 
-saved! { FeatureClearance { allowed, nearest } }
+saved! { FeatureClearance { allowed_distance, nearest } }
 
-const WHOLE: FeatureClearance = FeatureClearance {
-    allowed: f32::INFINITY,
+const FULL_CLEARANCE: FeatureClearance = FeatureClearance {
+    allowed_distance: f32::INFINITY,
     nearest: f32::INFINITY,
 };
 
 impl FeatureClearance {
-    fn settle(&mut self) {
+    fn update(&mut self) {
         *self = Self {
-            allowed: if self.nearest == f32::INFINITY || self.allowed == f32::INFINITY {
+            allowed_distance: if self.nearest == f32::INFINITY || self.allowed_distance == f32::INFINITY {
                 f32::INFINITY
             } else {
-                self.allowed.max(self.nearest)
+                self.allowed_distance.max(self.nearest)
             },
             nearest: f32::INFINITY,
         };
     }
 }
 
-/// The clearances of one surface.
+/// Clearances of a surface.
 #[derive(Debug)]
 pub(super) struct Clearances {
     corners: Vec<FeatureClearance>,
     edges: Vec<FeatureClearance>,
-    /// Whether the surface has been compared with no other yet.
+    /// True until the surface has been compared with others once.
     pub is_new: bool,
 }
 
 saved! { Clearances { corners, edges, is_new } }
 
-/// A corner or an edge of a surface.
+/// A corner or edge of a surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum SurfaceFeature {
     Corner(usize),
@@ -54,57 +55,57 @@ pub(super) enum SurfaceFeature {
 }
 
 impl Clearances {
-    /// For a surface with so many corners and edges.
+    /// Creates the clearances of a surface with this number of corners and edges.
     pub fn new(corners: usize, edges: usize) -> Result<Self> {
         Ok(Self {
-            corners: memory::filled(WHOLE, corners)?,
-            edges: memory::filled(WHOLE, edges)?,
+            corners: memory::filled(FULL_CLEARANCE, corners)?,
+            edges: memory::filled(FULL_CLEARANCE, edges)?,
             is_new: true,
         })
     }
 
-    fn get_mut(&mut self, part: SurfaceFeature) -> Option<&mut FeatureClearance> {
-        match part {
+    fn get_mut(&mut self, feature: SurfaceFeature) -> Option<&mut FeatureClearance> {
+        match feature {
             SurfaceFeature::Corner(corner) => self.corners.get_mut(corner),
             SurfaceFeature::Edge(edge) => self.edges.get_mut(edge),
         }
     }
 
-    /// How near a part may come, m; infinity: it is not reduced.
-    pub fn allowed(&self, part: SurfaceFeature) -> f32 {
-        let known = match part {
+    /// Returns the allowed distance of a feature, m; infinity without reduction.
+    pub fn allowed_distance(&self, feature: SurfaceFeature) -> f32 {
+        let clearance = match feature {
             SurfaceFeature::Corner(corner) => self.corners.get(corner),
             SurfaceFeature::Edge(edge) => self.edges.get(edge),
         };
-        known.map_or(f32::INFINITY, |known| known.allowed)
+        clearance.map_or(f32::INFINITY, |clearance| clearance.allowed_distance)
     }
 
-    /// Reduces the clearance of a part to this distance, m.
-    pub fn reduce(&mut self, part: SurfaceFeature, distance: f32) {
-        if let Some(known) = self.get_mut(part) {
-            known.allowed = known.allowed.min(distance);
+    /// Reduces the clearance of a feature to this distance, m.
+    pub fn reduce(&mut self, feature: SurfaceFeature, distance: f32) {
+        if let Some(clearance) = self.get_mut(feature) {
+            clearance.allowed_distance = clearance.allowed_distance.min(distance);
         }
     }
 
-    /// Takes into account how far from a part something is, m.
-    pub fn see(&mut self, part: SurfaceFeature, distance: f32) {
-        if let Some(known) = self.get_mut(part) {
-            known.nearest = known.nearest.min(distance);
+    /// Records the distance of a feature from another, m.
+    pub fn observe(&mut self, feature: SurfaceFeature, distance: f32) {
+        if let Some(clearance) = self.get_mut(feature) {
+            clearance.nearest = clearance.nearest.min(distance);
         }
     }
 
-    /// Gives back what a part has moved away since it was reduced, once all that is near has been seen. Edges that pass through tissue are near
-    /// whatever was seen: those that were made so touch it, others keep what they have.
-    pub fn settle(&mut self, pierces: &[bool]) {
-        self.corners.iter_mut().for_each(FeatureClearance::settle);
-        for (number, edge) in self.edges.iter_mut().enumerate() {
-            if pierces.get(number).copied().unwrap_or(false) {
+    /// Updates the clearances after a complete search. Crossing edges touch tissue at any distance. Edges
+    /// that cross from the start get a clearance of 0, others keep theirs.
+    pub fn update(&mut self, is_crossing: &[bool]) {
+        self.corners.iter_mut().for_each(FeatureClearance::update);
+        for (index, edge) in self.edges.iter_mut().enumerate() {
+            if is_crossing.get(index).copied().unwrap_or(false) {
                 edge.nearest = f32::INFINITY;
                 if self.is_new {
-                    edge.allowed = 0.0;
+                    edge.allowed_distance = 0.0;
                 }
             } else {
-                edge.settle();
+                edge.update();
             }
         }
         self.is_new = false;

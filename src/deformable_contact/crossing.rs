@@ -1,32 +1,32 @@
-//! Edges of one surface that pass through triangles of another: what contact is to prevent, and what it left.
+//! Detection of surface edges that cross triangles, which contact should prevent.
 
 use super::DeformableContact;
+use super::collision_surface::{CollisionSurface, NONE};
 use super::plan::are_asleep;
 use super::search::shift;
-use super::skin::{NONE, Skin};
-use super::{join_movers, meet_each_other};
-use crate::geometry::Bounds;
+use super::{can_collide, share_attachment};
+use crate::geometry::Aabb;
 use crate::geometry::predicates::crosses;
 use crate::solver::Systems;
 
 impl DeformableContact {
-    /// Finds the edges of bodies that go together that pass through tissue when a step begins, or as one that was tried ends: how many
-    /// there are.
+    /// Finds the crossing edges of all islands at the start of a step, or at the end of an attempted one. Returns their
+    /// number.
     pub fn find_crossings(&mut self, bodies: &impl Systems, at_end: bool) -> u32 {
         let mut count = 0_u32;
         let islands = std::mem::take(&mut self.islands);
         for island in 0..islands.count() {
-            let members = islands.members(island).iter().map(|&place| place as usize);
+            let members = islands.members(island).iter().map(|&body_index| body_index as usize);
             if are_asleep(islands.members(island), bodies) {
-                let skins = members.filter_map(|place| self.skins.get(place)?.as_ref());
-                count = skins.fold(count, |count, skin| count.saturating_add(skin.crossings));
+                let surfaces = members.filter_map(|body_index| self.surfaces.get(body_index)?.as_ref());
+                count = surfaces.fold(count, |count, surface| count.saturating_add(surface.crossings));
                 continue;
             }
-            for place in members.clone() {
-                if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at(place)) {
-                    skin.stand(body, at_end);
-                    skin.pierces.fill(false);
-                    skin.crossings = 0;
+            for body_index in members.clone() {
+                if let (Some(Some(surface)), Some(body)) = (self.surfaces.get_mut(body_index), bodies.at(body_index)) {
+                    surface.set_static(body, at_end);
+                    surface.is_crossing.fill(false);
+                    surface.crossings = 0;
                 }
             }
             for a in members {
@@ -36,12 +36,12 @@ impl DeformableContact {
             }
             for [a, b] in islands.pairs(island) {
                 if let (Some(first), Some(second)) = (bodies.at(a), bodies.at(b))
-                    && meet_each_other(first, second)
+                    && can_collide(first, second)
                 {
-                    let of_pair = [[a, b], [b, a]].map(|pair| self.mark_crossings(bodies, pair));
-                    count = of_pair.into_iter().fold(count, u32::saturating_add);
+                    let counts = [[a, b], [b, a]].map(|pair| self.mark_crossings(bodies, pair));
+                    count = counts.into_iter().fold(count, u32::saturating_add);
                     if !at_end {
-                        self.entangle([a, b], of_pair != [0; 2]);
+                        self.update_interpenetration([a, b], counts != [0; 2]);
                     }
                 }
             }
@@ -50,110 +50,122 @@ impl DeformableContact {
         count
     }
 
-    /// Which body has the most of those that were found last.
+    /// Returns the body with the most crossing edges in the last search.
     pub fn most_crossing(&self) -> Option<usize> {
         let members = (0..self.islands.count()).flat_map(|island| self.islands.members(island));
-        members.map(|&place| place as usize).max_by_key(|&place| {
-            self.skins
-                .get(place)
-                .and_then(Option::as_ref)
-                .map(|skin| skin.crossings)
-        })
+        members
+            .map(|&body_index| body_index as usize)
+            .max_by_key(|&body_index| {
+                self.surfaces
+                    .get(body_index)
+                    .and_then(Option::as_ref)
+                    .map(|surface| surface.crossings)
+            })
     }
 
-    /// Has two open surfaces that were made through each other let go, and those that no longer cross keep each other off again, from as near as
-    /// they are.
-    fn entangle(&mut self, pair: [usize; 2], cross: bool) {
-        let [Some(Some(first)), Some(Some(second))] = pair.map(|place| self.skins.get(place)) else {
+    /// Turns off contact between open surfaces that were created through each other. Once they no longer cross, contact
+    /// is on again, with their distance as clearance.
+    fn update_interpenetration(&mut self, pair: [usize; 2], are_crossing: bool) {
+        let [Some(Some(first)), Some(Some(second))] = pair.map(|body_index| self.surfaces.get(body_index)) else {
             return;
         };
-        let Ok([Some(kept_a), Some(kept_b)]) = self.clearances.get_disjoint_mut(pair) else {
+        let Ok([Some(clearances_a), Some(clearances_b)]) = self.clearances.get_disjoint_mut(pair) else {
             return;
         };
-        if !cross {
-            if self.entangled.remove(pair) {
-                (kept_a.is_new, kept_b.is_new) = (true, true);
+        if !are_crossing {
+            if self.interpenetrating_pairs.remove(pair) {
+                (clearances_a.is_new, clearances_b.is_new) = (true, true);
             }
             return;
         }
         let are_open = !first.is_closed && !second.is_closed;
-        if are_open && (kept_a.is_new || kept_b.is_new) {
+        if are_open && (clearances_a.is_new || clearances_b.is_new) {
             // Surfaces that lie flush on each other cross by rounding.
-            let depth = first.least_thickness().min(second.least_thickness());
-            if is_deep(first, second, depth) || is_deep(second, first, depth) {
-                self.entangled.add(pair);
+            let depth = first.min_thickness().min(second.min_thickness());
+            if crosses_deeper_than(first, second, depth) || crosses_deeper_than(second, first, depth) {
+                self.interpenetrating_pairs.add(pair);
             }
         }
     }
 
-    /// Marks the edges of the first of two bodies, or of one, that pass through triangles of the second: how many there are.
+    /// Marks the edges of body `a` that cross triangles of body `b`, which may be the same. Returns their number.
     fn mark_crossings(&mut self, bodies: &impl Systems, [a, b]: [usize; 2]) -> u32 {
-        // It is written to while both are read.
-        let Some(Some(first)) = self.skins.get_mut(a) else {
+        // Moved out, because it is written while both surfaces are read.
+        let Some(Some(first)) = self.surfaces.get_mut(a) else {
             return 0;
         };
-        let mut pierces = std::mem::take(&mut first.pierces);
+        let mut is_crossing = std::mem::take(&mut first.is_crossing);
         let mut count = 0;
-        if let (Some(Some(first)), Some(Some(second))) = (self.skins.get(a), self.skins.get(b)) {
+        if let (Some(Some(first)), Some(Some(second))) = (self.surfaces.get(a), self.surfaces.get(b)) {
             let are_joined = |edge: &[u32], triangle: &[u32]| {
                 a == b && edge.iter().any(|node| triangle.contains(node))
-                    || !self.bonds.are_none() && join_movers(&self.bonds, bodies, [a, b], [edge, triangle])
+                    || !self.attachments.is_empty()
+                        && share_attachment(&self.attachments, bodies, [a, b], [edge, triangle])
             };
-            count = mark(first, second, are_joined, &mut pierces);
+            count = mark_crossing_edges(first, second, are_joined, &mut is_crossing);
         }
-        if let Some(Some(first)) = self.skins.get_mut(a) {
-            first.pierces = pierces;
+        if let Some(Some(first)) = self.surfaces.get_mut(a) {
+            first.is_crossing = is_crossing;
             first.crossings = first.crossings.saturating_add(count);
         }
         count
     }
 }
 
-/// Marks the edges of `first` that pass through triangles of `second`, as their trees have them, but for those that are joined with the
-/// edge: how many there are.
-fn mark(first: &Skin, second: &Skin, are_joined: impl Fn(&[u32], &[u32]) -> bool, pierces: &mut [bool]) -> u32 {
+/// Marks the edges of `first` that cross triangles of `second`, except triangles joined with the edge. The trees must
+/// be current. Returns their number.
+fn mark_crossing_edges(
+    first: &CollisionSurface,
+    second: &CollisionSurface,
+    are_joined: impl Fn(&[u32], &[u32]) -> bool,
+    is_crossing: &mut [bool],
+) -> u32 {
     let mut count = 0;
     let shift = shift(first, second);
-    let is_of_one = std::ptr::eq(first, second);
-    let edges = first.edges.iter().zip(pierces);
-    for (edge, pierces) in edges.filter(|(edge, _)| edge[0] != NONE) {
+    let is_same_surface = std::ptr::eq(first, second);
+    let edges = first.edges.iter().zip(is_crossing);
+    for (edge, is_crossing) in edges.filter(|(edge, _)| edge[0] != NONE) {
         let ends = edge.map(|node| first.start(node) + shift);
-        let mut passes = false;
-        let around = Bounds::of(ends.into_iter());
-        let see = |triangle: usize| {
+        let mut crosses_any = false;
+        let around = Aabb::of(ends.into_iter());
+        let test_triangle = |triangle: usize| {
             let nodes = second.triangles[triangle];
-            if passes || are_joined(edge, &nodes) {
+            if crosses_any || are_joined(edge, &nodes) {
                 return;
             }
             let corners = nodes.map(|node| second.start(node));
-            // What a cut has parted touches.
-            let depth = if is_of_one {
+            // Sides that a cut separated touch.
+            let depth = if is_same_surface {
                 first.crossing_depth(*edge, &nodes)
             } else {
                 0.0
             };
-            passes = crosses(ends[0], ends[1], corners, depth);
+            crosses_any = crosses(ends[0], ends[1], corners, depth);
         };
-        second.near(&around, 0.0, see);
-        if passes {
-            *pierces = true;
+        second.visit_near(&around, 0.0, test_triangle);
+        if crosses_any {
+            *is_crossing = true;
             count += 1;
         }
     }
     count
 }
 
-/// Whether an edge of `first` passes through a triangle of `second` by more than `depth`, m.
-fn is_deep(first: &Skin, second: &Skin, depth: f32) -> bool {
+/// Returns true if an edge of `first` crosses a triangle of `second` by more than `depth`, m.
+fn crosses_deeper_than(first: &CollisionSurface, second: &CollisionSurface, depth: f32) -> bool {
     let shift = shift(first, second);
-    let mut crossing = first.edges.iter().zip(&first.pierces).filter(|(_, pierces)| **pierces);
+    let mut crossing = first
+        .edges
+        .iter()
+        .zip(&first.is_crossing)
+        .filter(|(_, is_crossing)| **is_crossing);
     crossing.any(|(edge, _)| {
         let ends = edge.map(|node| first.start(node) + shift);
-        let mut passes = false;
-        second.near(&Bounds::of(ends.into_iter()), 0.0, |triangle| {
+        let mut crosses_any = false;
+        second.visit_near(&Aabb::of(ends.into_iter()), 0.0, |triangle| {
             let corners = second.triangles[triangle].map(|node| second.start(node));
-            passes |= crosses(ends[0], ends[1], corners, f64::from(depth));
+            crosses_any |= crosses(ends[0], ends[1], corners, f64::from(depth));
         });
-        passes
+        crosses_any
     })
 }

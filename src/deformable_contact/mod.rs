@@ -1,511 +1,562 @@
-//! Tissue against tissue, and with itself.
+//! Contact between deformable bodies, and self-contact.
 //!
-//! Bodies that are near each other take their substeps together (`lockstep.rs`). In each, what would come too close on the straight ways of
-//! the nodes is stopped by impulses, with friction, as against a tool: never a pull, nothing stored, nothing that shortens the substep
-//! (sequential impulses, Catto 2005, on the pairs of Bridson, Fedkiw, Anderson 2002: nodes with faces, edges with edges). Both sides get the same
-//! impulse, with opposite signs, in the same place: no momentum is made.
+//! Bodies that are near each other take their substeps together (`coupled_step.rs`). In each substep, impulses with
+//! friction stop nodes that would come too close on their straight paths, as in contact with tools. Contacts only push,
+//! store nothing and do not shorten the substep. The solver uses sequential impulses (Catto 2005) on pairs of nodes
+//! with faces and of edges with edges (Bridson, Fedkiw, Anderson 2002). Both sides get equal and opposite impulses at
+//! the same point, so momentum is conserved.
 
-mod bonds;
-mod change;
+mod attachments;
+mod candidate_pairs;
 mod clearances;
+mod collision_surface;
+mod contact_reports;
+mod coupled_step;
 mod crossing;
-mod entangled;
-mod flatness;
-mod groups;
+mod edge_curvature;
 mod images;
+mod interpenetrating_pairs;
 mod islands;
-mod link;
-mod lockstep;
 mod narrow_phase;
-mod pairs;
-mod passing;
+mod pair_contact;
 mod plan;
 mod search;
-mod skin;
-mod touches;
-mod touching;
+mod sleep_groups;
+mod topology_change;
+mod touching_pairs;
+mod tunneling;
 mod warm_start;
 mod wound;
 
-pub(crate) use self::bonds::{BondPoint, Bonds, Lead, Thread, are_one, distance};
-pub(crate) use self::change::{SkinChange, SurfaceToBe};
+pub(crate) use self::attachments::{AttachmentPoint, LinearPath, PointAttachments, SutureThread, are_one, distance};
+use self::candidate_pairs::CandidatePairs;
 use self::clearances::Clearances;
-use self::entangled::Entangled;
-use self::groups::Groups;
+pub(crate) use self::collision_surface::CollisionSurface;
+use self::contact_reports::ContactReports;
+pub(crate) use self::coupled_step::CoupledGroup;
+use self::interpenetrating_pairs::InterpenetratingPairs;
 use self::islands::Islands;
-use self::link::Link;
-pub(crate) use self::lockstep::CoupledGroup;
-use self::pairs::Pairs;
-pub(crate) use self::skin::Skin;
-use self::touches::Touches;
-use self::touching::TouchingPairs;
-use self::warm_start::{Pushes, give_again};
+use self::pair_contact::PairContact;
+use self::sleep_groups::SleepGroups;
+pub(crate) use self::topology_change::{NewCollisionSurface, PreparedSurfaceChange};
+use self::touching_pairs::TouchingPairs;
+use self::warm_start::{WarmStartCache, apply_warm_start};
 
 use glam::Vec3A;
 
 use crate::base::{Count, Result, Stage, Stopwatch, memory};
 use crate::codec::saved;
 use crate::contact::Contacts;
-use crate::contact::impulses::{Effort, Sweep, relax};
-use crate::geometry::Bounds;
-use crate::solver::{Span, System, Systems};
+use crate::contact::impulses::{PgsLimits, PgsPass, relax};
+use crate::geometry::Aabb;
+use crate::solver::{SubstepSpan, System, Systems};
 
-/// How often what meets is searched for: impulses lead nodes elsewhere.
-const SEARCHES: u32 = 16;
+/// Maximum number of contact searches in a substep. Impulses deflect nodes, so the search is repeated.
+const MAX_SEARCHES: u32 = 16;
 
-/// Contacts of tissue begin with the impulses of the last substep, and the next one corrects what few sweeps leave.
-const EFFORT: Effort = Effort {
+/// Solver effort of a substep. Sweeps begin with the impulses of the last substep, and the next substep corrects the
+/// remaining error.
+const EFFORT: PgsLimits = PgsLimits {
     sweeps: 32,
-    converged: 2.5e-4,
-    goes_on_later: true,
+    tolerance: 2.5e-4,
+    defers_slow_tail: true,
 };
 
-/// How fast one contact moves what began too close apart at most, as a part of the smaller body's extent, 1/s. The bodies keep about this speed, so
-/// it bounds the energy that they gain.
-const PARTING_SPEED: f32 = 0.3;
+/// Maximum speed of the position correction of one contact, as a fraction of the smaller body's extent, 1/s. The bodies
+/// keep about this speed, so it bounds the energy that they gain.
+const CORRECTION_SPEED: f32 = 0.3;
 
-/// Contacts whose sides would pass each other are solved again, so often and with so many sweeps in a substep: between sides that nearly face each
-/// other what is missing travels slowly.
-const LACKS: u32 = 8;
-const EFFORT_AGAIN: Effort = Effort {
+/// Maximum number of retries in a substep, and their solver effort, for contacts whose sides would pass each other. The
+/// effort is higher because errors between nearly parallel sides converge slowly.
+const MAX_TUNNELING_RETRIES: u32 = 8;
+const RETRY_EFFORT: PgsLimits = PgsLimits {
     sweeps: 512,
-    goes_on_later: false,
+    defers_slow_tail: false,
     ..EFFORT
 };
 
-/// So many times contacts part their sides in turn: each knows where those before it have moved them.
-const PARTINGS: u32 = 4;
+/// Passes of the position correction over all contacts. Each contact uses the positions that earlier contacts have
+/// corrected.
+const CORRECTION_PASSES: u32 = 4;
 
-/// What moves three corners, each of them bound to four nodes at most.
-const MOST_MOVERS: usize = 12;
+/// Maximum number of simulation nodes that move three corners, each bound to at most four nodes.
+const MAX_MOVERS: usize = 12;
 
-/// Contacts that there is room for, for each node, edge and face of the surfaces.
-const ROOM: usize = 1;
+/// Capacity for contacts, per node, edge and face of the surfaces.
+const CONTACTS_PER_FEATURE: usize = 1;
 
-/// Contacts of tissue with tissue; kept only in worlds with bodies that ask for them.
+/// Contacts between deformable bodies. It exists only in worlds with bodies that enable them.
 #[derive(Debug, Default)]
 pub(crate) struct DeformableContact {
     pub islands: Islands,
-    /// By a body's place in the world.
-    skins: Vec<Option<Skin>>,
-    /// Likewise, of bodies that meet others.
+    /// Collision surfaces, by body index.
+    surfaces: Vec<Option<CollisionSurface>>,
+    /// Reduced thicknesses, by body index, of bodies that collide with others.
     clearances: Vec<Option<Clearances>>,
-    /// Bodies that were made through each other.
-    entangled: Entangled,
-    links: Vec<Link>,
-    /// How long the substep of these was, s.
+    /// Open surfaces that were created through each other.
+    interpenetrating_pairs: InterpenetratingPairs,
+    pair_contacts: Vec<PairContact>,
+    /// Duration of the substep of these contacts, s.
     duration: f32,
-    /// The contacts of earlier searches in the order of their sides.
-    known: Vec<u32>,
-    /// What contacts gave before.
-    pub pushes: Pushes,
-    /// Where bodies press each other.
-    pub touches: Touches,
-    /// Which bodies do.
-    pub touching: TouchingPairs,
-    /// What bodies are near each other with.
-    pairs: Pairs,
-    /// Bodies that fell asleep together.
-    pub groups: Groups,
-    /// What is attached.
-    pub bonds: Bonds,
+    /// Indices of contacts of earlier searches, sorted by their sides.
+    contact_order: Vec<u32>,
+    /// Impulses of earlier substeps.
+    pub warm_start: WarmStartCache,
+    /// Contacts as reported to the caller.
+    pub contact_reports: ContactReports,
+    /// Pairs of bodies in contact.
+    pub touching_pairs: TouchingPairs,
+    /// Features that are near each other.
+    candidate_pairs: CandidatePairs,
+    /// Groups of bodies that fell asleep together.
+    pub sleep_groups: SleepGroups,
+    /// Attachments between points of bodies.
+    pub attachments: PointAttachments,
 }
 
-saved! { DeformableContact { islands, skins, clearances, entangled, links, duration, known, pushes, touches, touching, pairs, groups, bonds } }
+saved! { DeformableContact {
+    islands, surfaces, clearances, interpenetrating_pairs, pair_contacts, duration, contact_order, warm_start,
+    contact_reports, touching_pairs, candidate_pairs, sleep_groups, attachments,
+} }
 
 impl DeformableContact {
-    /// Makes room for a body at this place in the world, which meets tissue.
-    pub fn join(&mut self, place: usize, body: &System) -> Result<()> {
-        let mut skin = Skin::new(body)?;
-        self.add_images(&mut skin)?;
-        self.islands.make_place(place)?;
-        self.groups.make_place(place)?;
-        self.entangled.reserve(self.skins.iter().flatten().count())?;
-        let more = ROOM * skin.room;
-        let room = self.room() + more;
-        self.links.try_reserve(room.saturating_sub(self.links.len()))?;
-        self.known.try_reserve(room.saturating_sub(self.known.len()))?;
-        self.pushes.reserve(room)?;
-        self.touches.reserve(room)?;
-        self.touching.reserve(room)?;
+    /// Adds a body with contact, and reserves the memory that it needs.
+    pub fn add_body(&mut self, body_index: usize, body: &System) -> Result<()> {
+        let mut surface = CollisionSurface::new(body)?;
+        self.add_images(&mut surface)?;
+        self.islands.reserve_body(body_index)?;
+        self.sleep_groups.reserve_body(body_index)?;
+        self.interpenetrating_pairs
+            .reserve(self.surfaces.iter().flatten().count())?;
+        let added_room = CONTACTS_PER_FEATURE * surface.feature_capacity;
+        let contact_room = self.contact_capacity() + added_room;
+        self.pair_contacts
+            .try_reserve(contact_room.saturating_sub(self.pair_contacts.len()))?;
+        self.contact_order
+            .try_reserve(contact_room.saturating_sub(self.contact_order.len()))?;
+        self.warm_start.reserve(contact_room)?;
+        self.contact_reports.reserve(contact_room)?;
+        self.touching_pairs.reserve(contact_room)?;
         let mut features = [0; 2];
-        for skin in self.skins.iter().flatten().chain([&skin]) {
-            let own = skin.nodes.capacity() + skin.edges.capacity();
-            features[0] += if skin.meets_bodies { own } else { 0 };
-            features[1] += if skin.firsts.is_some() { own } else { 0 };
+        for surface in self.surfaces.iter().flatten().chain([&surface]) {
+            let feature_count = surface.nodes.capacity() + surface.edges.capacity();
+            features[0] += if surface.collides_with_bodies { feature_count } else { 0 };
+            features[1] += if surface.initial_positions.is_some() {
+                feature_count
+            } else {
+                0
+            };
         }
-        let lists = self.islands.room() + self.skins.len() + 1;
-        self.pairs.reserve(lists, features)?;
+        let lists = self.islands.pair_capacity() + self.surfaces.len() + 1;
+        self.candidate_pairs.reserve(lists, features)?;
         let spare = body.spare_nodes();
-        let of_corners_and_edges = || Clearances::new(skin.nodes.len() + spare, skin.edges.len() + 3 * spare);
-        let clearances = body.contact.with_bodies.then(of_corners_and_edges).transpose()?;
-        while self.skins.len() <= place {
-            memory::push(&mut self.skins, None)?;
+        let new_clearances = || Clearances::new(surface.nodes.len() + spare, surface.edges.len() + 3 * spare);
+        let clearances = body.contact.with_bodies.then(new_clearances).transpose()?;
+        while self.surfaces.len() <= body_index {
+            memory::push(&mut self.surfaces, None)?;
         }
-        while self.clearances.len() <= place {
+        while self.clearances.len() <= body_index {
             memory::push(&mut self.clearances, None)?;
         }
-        self.clearances[place] = clearances;
-        self.skins[place] = Some(skin);
+        self.clearances[body_index] = clearances;
+        self.surfaces[body_index] = Some(surface);
         Ok(())
     }
 
-    /// Makes room for so many attachments between the bodies at these places.
-    pub fn reserve_bonds(&mut self, places: [usize; 2], count: usize) -> Result<()> {
-        for place in places {
-            self.islands.make_place(place)?;
+    /// Reserves memory for `count` attachments between these bodies.
+    pub fn reserve_attachments(&mut self, body_indices: [usize; 2], count: usize) -> Result<()> {
+        for body_index in body_indices {
+            self.islands.reserve_body(body_index)?;
         }
-        self.bonds.reserve(count)
+        self.attachments.reserve(count)
     }
 
-    /// Has a new surface, and those that it may meet, be found in images where one of two asks for that.
-    fn add_images(&mut self, skin: &mut Skin) -> Result<()> {
-        for other in self.skins.iter_mut().flatten() {
-            if skin.meets_bodies && other.meets_bodies && (skin.asks_for_images || other.asks_for_images) {
+    /// Creates images of a new surface, and of surfaces that it can collide with, if one of each pair uses images.
+    fn add_images(&mut self, surface: &mut CollisionSurface) -> Result<()> {
+        for other in self.surfaces.iter_mut().flatten() {
+            if surface.collides_with_bodies
+                && other.collides_with_bodies
+                && (surface.wants_images || other.wants_images)
+            {
                 other.add_images()?;
-                skin.add_images()?;
+                surface.add_images()?;
             }
         }
-        // The first of its world too is refused what it asks for.
-        if skin.asks_for_images {
-            skin.add_images()?;
+        // The first surface of a world also needs its images here, so that an invalid resolution is refused.
+        if surface.wants_images {
+            surface.add_images()?;
         }
         Ok(())
     }
 
-    /// The skin of the body at this place, if it meets tissue.
-    pub fn skin_mut(&mut self, place: usize) -> Option<&mut Skin> {
-        self.skins.get_mut(place)?.as_mut()
+    /// Returns the collision surface of a body, if it has contact.
+    pub fn surface_mut(&mut self, body_index: usize) -> Option<&mut CollisionSurface> {
+        self.surfaces.get_mut(body_index)?.as_mut()
     }
 
-    /// A body is gone.
-    pub fn leave(&mut self, bodies: &mut impl Systems, place: usize) {
-        self.bonds.leave(bodies, place);
-        for other in self.groups.others(place) {
+    /// Removes a body that was destroyed.
+    pub fn remove_body(&mut self, bodies: &mut impl Systems, body_index: usize) {
+        self.attachments.remove_body(bodies, body_index);
+        for other in self.sleep_groups.others(body_index) {
             if let Some(body) = bodies.at_mut(other) {
                 body.wake();
             }
         }
-        self.groups.leave(place);
-        self.touching.leave(place);
-        self.shed(place);
+        self.sleep_groups.remove(body_index);
+        self.touching_pairs.remove_body(body_index);
+        self.remove_surface(body_index);
     }
 
-    /// A body meets no tissue any more; what is attached of it stays so.
-    pub fn shed(&mut self, place: usize) {
-        self.entangled.leave(place);
-        self.pushes.leave(place);
-        self.touches.leave(place);
-        if let Some(skin) = self.skins.get_mut(place) {
-            *skin = None;
+    /// Removes the surface of a body whose contact is turned off. Its attachments stay.
+    pub fn remove_surface(&mut self, body_index: usize) {
+        self.interpenetrating_pairs.remove_body(body_index);
+        self.warm_start.remove_body(body_index);
+        self.contact_reports.remove_body(body_index);
+        if let Some(surface) = self.surfaces.get_mut(body_index) {
+            *surface = None;
         }
-        if let Some(clearances) = self.clearances.get_mut(place) {
+        if let Some(clearances) = self.clearances.get_mut(body_index) {
             *clearances = None;
         }
     }
 
-    fn room(&self) -> usize {
-        let of_skins = self.skins.iter().flatten();
-        of_skins.map(|skin| ROOM * skin.room).sum()
+    fn contact_capacity(&self) -> usize {
+        let all_surfaces = self.surfaces.iter().flatten();
+        all_surfaces
+            .map(|surface| CONTACTS_PER_FEATURE * surface.feature_capacity)
+            .sum()
     }
 
-    /// The box of all velocities of a body, given that of those before the contacts of a substep.
-    pub fn velocities(&self, place: usize, before: Bounds) -> Bounds {
-        let before = self.bonds.velocities(place, before);
-        match self.skins.get(place) {
-            Some(Some(skin)) => before.and(&skin.given),
+    /// Returns the bounds of all velocities of a body. `before` are the bounds before the contacts of a substep.
+    pub fn velocity_bounds(&self, body_index: usize, before: Aabb) -> Aabb {
+        let before = self.attachments.velocity_bounds(body_index, before);
+        match self.surfaces.get(body_index) {
+            Some(Some(surface)) => before.and(&surface.velocity_bounds),
             _ => before,
         }
     }
 
-    /// Stops what meets in a substep of the bodies of an island.
-    pub fn meet(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) {
-        let watch = Stopwatch::start(moment.profile);
-        if moment.begins {
+    /// Finds and solves the contacts of an island in a substep.
+    pub fn resolve_contacts(&mut self, island: usize, bodies: &mut impl Systems, span: &SubstepSpan) {
+        let watch = Stopwatch::start(span.profile);
+        if span.begins {
             let members = self.islands.members(island);
-            // Attached points are drawn together where contacts part them: what these gave would grow from step to step.
-            let are_attached = members.iter().any(|&place| self.bonds.concern(place as usize));
-            self.pushes.begin_island(members, !are_attached);
-            self.pairs.forget();
-            self.touching.begin_island(members);
+            // Attachments pull points together that contacts push apart, so the impulses of both would grow from step
+            // to step.
+            let are_attached = members
+                .iter()
+                .any(|&body_index| self.attachments.has_body(body_index as usize));
+            self.warm_start.begin_island(members, !are_attached);
+            self.candidate_pairs.reset();
+            self.touching_pairs.begin_island(members);
         } else {
-            self.pushes.keep(&self.links);
-            self.touching.note(&self.links);
+            self.warm_start.store(&self.pair_contacts);
+            self.touching_pairs.record(&self.pair_contacts);
         }
-        // What closes a step is half a kick, of VERLET alone.
-        if !moment.drifts {
-            self.touches.note(&self.links, self.duration, |places| {
-                !any_takes_half_kicks(bodies, places)
-            });
+        // The last span of a step is a half kick, which only VERLET has.
+        if !span.drifts {
+            self.contact_reports
+                .record(&self.pair_contacts, self.duration, |body_indices| {
+                    !any_takes_half_kicks(bodies, body_indices)
+                });
             let members = self.islands.members(island).iter();
-            if !any_takes_half_kicks(bodies, members.map(|&place| place as usize)) {
+            if !any_takes_half_kicks(bodies, members.map(|&body_index| body_index as usize)) {
                 return;
             }
-        } else if moment.begins {
-            self.touches.begin_island(self.islands.members(island));
+        } else if span.begins {
+            self.contact_reports.begin_island(self.islands.members(island));
         }
-        self.duration = moment.duration;
-        self.links.clear();
-        for &place in self.islands.members(island) {
-            let place = place as usize;
-            if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at_mut(place))
-                && moment.concerns(body)
+        self.duration = span.duration;
+        self.pair_contacts.clear();
+        for &body_index in self.islands.members(island) {
+            let body_index = body_index as usize;
+            if let (Some(Some(surface)), Some(body)) = (self.surfaces.get_mut(body_index), bodies.at_mut(body_index))
+                && span.concerns(body)
             {
-                body.release_pressed(moment.duration);
-                skin.follow(body, moment.duration, moment.begins);
+                body.release_pressed(span.duration);
+                surface.begin_substep(body, span.duration, span.begins);
             }
         }
-        self.pairs.advance(self.islands.searches(island), &self.skins, true);
-        self.bonds.follow(bodies, &self.skins, moment);
-        self.draw(island, bodies, moment);
-        watch.stop(moment.profile, Stage::BroadPhase);
-        let watch = Stopwatch::start(moment.profile);
-        self.stop_what_meets(island, bodies, moment);
-        if !moment.drifts {
-            self.touches.note(&self.links, 0.5 * self.duration, |places| {
-                any_takes_half_kicks(bodies, places)
-            });
+        self.candidate_pairs
+            .advance_motion(self.islands.searches(island), &self.surfaces, true);
+        self.attachments.begin_substep(bodies, &self.surfaces, span);
+        self.draw_images(island, bodies, span);
+        watch.stop(span.profile, Stage::BroadPhase);
+        let watch = Stopwatch::start(span.profile);
+        self.solve_and_apply(island, bodies, span);
+        if !span.drifts {
+            self.contact_reports
+                .record(&self.pair_contacts, 0.5 * self.duration, |body_indices| {
+                    any_takes_half_kicks(bodies, body_indices)
+                });
         }
-        watch.stop(moment.profile, Stage::ContactSolver);
-        if let Some(profile) = moment.profile {
-            profile.count(Count::TissueContacts, self.links.len());
+        watch.stop(span.profile, Stage::ContactSolver);
+        if let Some(profile) = span.profile {
+            profile.count(Count::TissueContacts, self.pair_contacts.len());
         }
     }
 
-    fn stop_what_meets(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) {
-        let have_acted = self.solve(island, bodies, moment);
-        for &place in self.islands.members(island) {
-            let place = place as usize;
-            if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at_mut(place))
-                && moment.concerns(body)
+    fn solve_and_apply(&mut self, island: usize, bodies: &mut impl Systems, span: &SubstepSpan) {
+        let has_solved = self.solve_contacts(island, bodies, span);
+        for &body_index in self.islands.members(island) {
+            let body_index = body_index as usize;
+            if let (Some(Some(surface)), Some(body)) = (self.surfaces.get_mut(body_index), bodies.at_mut(body_index))
+                && span.concerns(body)
             {
-                skin.remember(body);
+                surface.record_velocity_changes(body);
             }
         }
-        for link in &self.links {
-            for (index, (side, sign)) in link.sides.iter().zip([1.0, -1.0]).enumerate() {
-                if let (Some(skin), Some(body)) = (&mut self.skins[side.body], bodies.at_mut(side.body)) {
-                    for (node, part) in link.movers(index) {
+        for contact in &self.pair_contacts {
+            for (index, (side, sign)) in contact.sides.iter().zip([1.0, -1.0]).enumerate() {
+                if let (Some(surface), Some(body)) = (&mut self.surfaces[side.body], bodies.at_mut(side.body)) {
+                    for (node, weight) in contact.movers(index) {
                         let node = node as usize;
-                        let velocity = skin.velocities[node].into();
-                        skin.given = skin.given.with(velocity);
-                        let impulse = link.given() * (sign * part);
-                        body.nudge(node, velocity, impulse, moment);
-                        if moment.drifts {
-                            body.press(node as u32, impulse);
+                        let velocity = surface.velocities[node].into();
+                        surface.velocity_bounds = surface.velocity_bounds.with(velocity);
+                        let impulse = contact.total_impulse() * (sign * weight);
+                        body.set_mean_velocity(node, velocity, impulse, span);
+                        if span.drifts {
+                            body.record_contact_impulse(node as u32, impulse);
                         }
                     }
                 }
             }
         }
-        if have_acted {
-            self.end_with_tools(island, bodies, moment);
+        if has_solved {
+            self.apply_tool_contacts(island, bodies, span);
         }
-        self.bonds.give(bodies, &self.skins, moment);
-        if moment.drifts {
-            self.part(bodies, moment.duration);
-            self.bonds.part(bodies, moment.duration);
-            for &place in self.islands.members(island) {
-                if let Some(body) = bodies.at_mut(place as usize)
-                    && let Some(contacts) = body.contacts.as_ref().filter(|contacts| contacts.may_press())
+        self.attachments.apply_impulses(bodies, &self.surfaces, span);
+        if span.drifts {
+            self.correct_penetration(bodies, span.duration);
+            self.attachments.correct_positions(bodies, span.duration);
+            for &body_index in self.islands.members(island) {
+                if let Some(body) = bodies.at_mut(body_index as usize)
+                    && let Some(contacts) = body.contacts.as_ref().filter(|contacts| contacts.may_touch())
                 {
-                    contacts.keep_out(body.state.substep().next_positions);
+                    contacts.push_nodes_out(body.state.substep().next_positions);
                 }
             }
         }
     }
 
-    /// The bodies of an island have ended their step, of which this was the last moment.
+    /// Stores the impulses of an island at the end of its step.
     pub fn end_island(&mut self) {
-        self.pushes.keep(&self.links);
-        self.touching.note(&self.links);
-        self.pushes.end_island();
+        self.warm_start.store(&self.pair_contacts);
+        self.touching_pairs.record(&self.pair_contacts);
+        self.warm_start.end_island();
     }
 
-    /// Has VERLET bodies that press implicit ones be seen as fast as they are now, before their last half kick: nothing stops that.
-    pub fn show_early(&self, bodies: &mut impl Systems) {
-        for link in self.links.iter().filter(|link| link.presses()) {
-            let places = link.sides.map(|side| side.body);
-            let take_half_kicks = places.map(|place| takes_half_kicks(bodies, place));
+    /// Reports the current velocities of VERLET bodies that press implicit ones, before their last half kick. Contact
+    /// does not stop that half kick.
+    pub fn show_early_velocities(&self, bodies: &mut impl Systems) {
+        for contact in self.pair_contacts.iter().filter(|contact| contact.is_pressing()) {
+            let body_indices = contact.sides.map(|side| side.body);
+            let take_half_kicks = body_indices.map(|body_index| takes_half_kicks(bodies, body_index));
             for index in 0..2 {
                 if take_half_kicks[index]
                     && !take_half_kicks[1 - index]
-                    && let Some(body) = bodies.at_mut(places[index])
+                    && let Some(body) = bodies.at_mut(body_indices[index])
                 {
-                    body.show_early();
+                    body.publish_pre_kick_velocities();
                 }
             }
         }
     }
 
-    /// Gives nodes and tools what contacts with tools have done beside those of tissue.
-    fn end_with_tools(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) {
+    /// Applies the impulses of tool contacts that were solved together with deformable contacts, to nodes and tools.
+    fn apply_tool_contacts(&mut self, island: usize, bodies: &mut impl Systems, span: &SubstepSpan) {
         let members = self.islands.members(island);
-        each_pressed(members, &mut self.skins, bodies, moment, |skin, body, contacts| {
-            let Skin { velocities, given, .. } = skin;
+        for_each_tool_contact(members, &mut self.surfaces, bodies, span, |surface, body, contacts| {
+            let CollisionSurface {
+                velocities,
+                velocity_bounds,
+                ..
+            } = surface;
             contacts.end_sweeps(velocities, |node, impulse| {
                 let velocity = velocities[node].into();
-                *given = given.with(velocity);
-                body.nudge(node, velocity, impulse, moment);
+                *velocity_bounds = velocity_bounds.with(velocity);
+                body.set_mean_velocity(node, velocity, impulse, span);
             });
         });
     }
 
-    /// Finds contacts and gives their impulses, with those of tools, until they lead to no others: whether there were any.
-    fn solve(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) -> bool {
-        let mut first = None;
+    /// Finds contacts and solves them together with tool contacts, until the solution leads to no new ones. Returns
+    /// true if any were solved.
+    fn solve_contacts(&mut self, island: usize, bodies: &mut impl Systems, span: &SubstepSpan) -> bool {
+        let mut first_change = None;
         let mut has_begun = false;
-        let (mut lacks, mut again) = (0, EFFORT_AGAIN);
-        for _ in 0..SEARCHES {
-            let known = self.links.len();
-            let (mut searches, mut lack) = (true, false);
+        let (mut retries, mut retry_effort) = (0, RETRY_EFFORT);
+        for _ in 0..MAX_SEARCHES {
+            let known_count = self.pair_contacts.len();
+            let (mut needs_search, mut is_retry) = (true, false);
             if has_begun {
-                self.go_on(island, bodies, moment);
-                lack = lacks < LACKS && again.sweeps > 0 && self.hold_sides(moment);
-                lacks += u32::from(lack);
-                searches = !self.has_foreseen(island, bodies, moment);
+                self.update_motions(island, bodies, span);
+                is_retry = retries < MAX_TUNNELING_RETRIES && retry_effort.sweeps > 0 && self.prevent_tunneling(span);
+                retries += u32::from(is_retry);
+                needs_search = !self.is_search_complete(island, bodies, span);
             }
-            if searches {
-                let watch = Stopwatch::start(moment.profile);
-                self.find(island, bodies, moment, has_begun);
-                watch.stop(moment.profile, Stage::NarrowPhase);
-                watch.take_off(moment.profile, Stage::ContactSolver);
+            if needs_search {
+                let watch = Stopwatch::start(span.profile);
+                self.find_contacts(island, bodies, span, has_begun);
+                watch.stop(span.profile, Stage::NarrowPhase);
+                watch.subtract_from(span.profile, Stage::ContactSolver);
             }
-            if self.links.len() == known && !lack && (has_begun || !self.bonds.act()) {
+            if self.pair_contacts.len() == known_count && !is_retry && (has_begun || !self.attachments.any_active()) {
                 break;
             }
             let Self {
-                links,
-                skins,
-                bonds,
+                pair_contacts,
+                surfaces,
+                attachments,
                 islands,
-                pushes,
+                warm_start,
                 ..
             } = self;
             let members = islands.members(island);
             if !has_begun {
-                // Contacts with tools go on from what they have done in the substep.
-                each_pressed(members, skins, bodies, moment, |skin, body, contacts| {
-                    contacts.begin_sweeps(|node| skin.velocities[node] = body.mean_velocity(node).into());
+                // Tool contacts continue from their impulses in the substep.
+                for_each_tool_contact(members, surfaces, bodies, span, |surface, body, contacts| {
+                    contacts.begin_sweeps(|node| surface.velocities[node] = body.mean_velocity(node).into());
                 });
             }
             has_begun = true;
-            bonds.loosen(links, moment);
-            let recalled = give_again(&mut links[known..], pushes.most(), skins);
-            if recalled > 0.0 {
-                first = Some(first.map_or(recalled, |first: f32| first.max(recalled)));
+            attachments.soften_threads(pair_contacts, span);
+            let warm_started = apply_warm_start(&mut pair_contacts[known_count..], warm_start.max_fraction(), surfaces);
+            if warm_started > 0.0 {
+                first_change =
+                    Some(first_change.map_or(warm_started, |first_change: f32| first_change.max(warm_started)));
             }
-            let effort = if lack { again } else { EFFORT };
-            first = Some(relax(effort, first, |sweep| {
-                again.sweeps -= u32::from(lack);
-                let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
-                let changes = links.map(|link| link.solve(skins));
-                let mut changed = changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment));
-                each_pressed(members, skins, bodies, moment, |skin, _, contacts| {
-                    changed = changed.max(contacts.sweep(&mut skin.velocities, sweep));
+            let effort = if is_retry { retry_effort } else { EFFORT };
+            first_change = Some(relax(effort, first_change, |sweep| {
+                retry_effort.sweeps -= u32::from(is_retry);
+                let pair_contacts = pair_contacts
+                    .iter_mut()
+                    .filter(|contact| sweep == PgsPass::All || contact.is_pressing());
+                let velocity_changes = pair_contacts.map(|contact| contact.solve(surfaces));
+                let mut largest_change = velocity_changes
+                    .fold(0.0, f32::max)
+                    .max(attachments.solve_sweep(surfaces, span));
+                for_each_tool_contact(members, surfaces, bodies, span, |surface, _, contacts| {
+                    largest_change = largest_change.max(contacts.sweep(&mut surface.velocities, sweep));
                 });
-                changed
+                largest_change
             }));
         }
         has_begun
     }
 
-    /// Has what impulses did to nodes be seen in what is bound to them.
-    fn go_on(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
-        for &place in self.islands.members(island) {
-            let place = place as usize;
-            if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at(place))
-                && moment.concerns(body)
+    /// Updates bound points and predicted motions after impulses changed the velocities of nodes.
+    fn update_motions(&mut self, island: usize, bodies: &impl Systems, span: &SubstepSpan) {
+        for &body_index in self.islands.members(island) {
+            let body_index = body_index as usize;
+            if let (Some(Some(surface)), Some(body)) = (self.surfaces.get_mut(body_index), bodies.at(body_index))
+                && span.concerns(body)
             {
-                skin.go_on(body, moment.duration);
+                surface.update_motion(body, span.duration);
             }
         }
-        self.pairs.advance(self.islands.searches(island), &self.skins, false);
+        self.candidate_pairs
+            .advance_motion(self.islands.searches(island), &self.surfaces, false);
     }
 
-    /// Moves what began too close apart, without giving it speed, and nothing past what is beside it.
-    fn part(&mut self, bodies: &mut impl Systems, duration: f32) {
-        let Self { links, skins, .. } = self;
-        if links.iter().all(|link| link.depth <= 0.0) {
+    /// Corrects penetration at the start of the substep without changing velocities. No node moves past a neighboring
+    /// contact.
+    fn correct_penetration(&mut self, bodies: &mut impl Systems, duration: f32) {
+        let Self {
+            pair_contacts,
+            surfaces,
+            ..
+        } = self;
+        if pair_contacts.iter().all(|contact| contact.depth <= 0.0) {
             return;
         }
-        // What was expected is known by now: the nodes' ways take its place.
-        for link in links.iter() {
-            for (place, node) in link.all_movers() {
-                if let Some(skin) = &mut skins[place] {
-                    skin.expected[node] = Vec3A::ZERO;
+        // Predicted velocities are no longer needed, so the same memory holds the displacements of nodes.
+        for contact in pair_contacts.iter() {
+            for (body_index, node) in contact.all_movers() {
+                if let Some(surface) = &mut surfaces[body_index] {
+                    surface.predicted_velocities[node] = Vec3A::ZERO;
                 }
             }
         }
-        for _ in 0..PARTINGS {
-            for link in links.iter_mut() {
-                let extents = link
+        for _ in 0..CORRECTION_PASSES {
+            for contact in pair_contacts.iter_mut() {
+                let extents = contact
                     .sides
-                    .map(|side| skins[side.body].as_ref().map_or(0.0, |skin| skin.extent));
-                let most = PARTING_SPEED * extents[0].min(extents[1]) * duration;
-                link.part(most, duration, skins);
+                    .map(|side| surfaces[side.body].as_ref().map_or(0.0, |surface| surface.extent));
+                let max_displacement = CORRECTION_SPEED * extents[0].min(extents[1]) * duration;
+                contact.correct_penetration(max_displacement, duration, surfaces);
             }
         }
-        for (place, node) in links.iter().flat_map(Link::all_movers) {
-            if let (Some(skin), Some(body)) = (&mut skins[place], bodies.at_mut(place)) {
-                let way = std::mem::take(&mut skin.expected[node]);
-                if way != Vec3A::ZERO {
-                    body.part_substep(node, way.into());
+        for (body_index, node) in pair_contacts.iter().flat_map(PairContact::all_movers) {
+            if let (Some(surface), Some(body)) = (&mut surfaces[body_index], bodies.at_mut(body_index)) {
+                let displacement = std::mem::take(&mut surface.predicted_velocities[node]);
+                if displacement != Vec3A::ZERO {
+                    body.displace_node(node, displacement.into());
                 }
             }
         }
     }
 }
 
-/// Whether the body at this place takes half kicks.
-fn takes_half_kicks(bodies: &impl Systems, place: usize) -> bool {
-    bodies.at(place).is_none_or(|body| body.integrator.takes_half_kicks())
+/// Returns true if a body takes half kicks.
+fn takes_half_kicks(bodies: &impl Systems, body_index: usize) -> bool {
+    bodies
+        .at(body_index)
+        .is_none_or(|body| body.integrator.takes_half_kicks())
 }
 
-/// Whether one of the bodies at these places does.
-fn any_takes_half_kicks(bodies: &impl Systems, places: impl IntoIterator<Item = usize>) -> bool {
-    places.into_iter().any(|place| takes_half_kicks(bodies, place))
+/// Returns true if any of these bodies takes half kicks.
+fn any_takes_half_kicks(bodies: &impl Systems, body_indices: impl IntoIterator<Item = usize>) -> bool {
+    body_indices
+        .into_iter()
+        .any(|body_index| takes_half_kicks(bodies, body_index))
 }
 
-/// Does something with each of these bodies that tools press, or may press as tissue moves it, its skin and its contacts with tools.
-fn each_pressed(
+/// Calls `f` with the body, surface and tool contacts of each body that tools press, or may press after deformable
+/// contacts move it.
+fn for_each_tool_contact(
     members: &[u32],
-    skins: &mut [Option<Skin>],
+    surfaces: &mut [Option<CollisionSurface>],
     bodies: &mut impl Systems,
-    moment: &Span,
-    mut act: impl FnMut(&mut Skin, &mut System, &mut Contacts),
+    span: &SubstepSpan,
+    mut f: impl FnMut(&mut CollisionSurface, &mut System, &mut Contacts),
 ) {
-    for &place in members {
-        let place = place as usize;
-        if let (Some(Some(skin)), Some(body)) = (skins.get_mut(place), bodies.at_mut(place))
-            && moment.concerns(body)
-            // What is done with the body changes nothing of these.
-            && let Some(mut contacts) = body.contacts.take_if(|contacts| contacts.may_press())
+    for &body_index in members {
+        let body_index = body_index as usize;
+        if let (Some(Some(surface)), Some(body)) = (surfaces.get_mut(body_index), bodies.at_mut(body_index))
+            && span.concerns(body)
+            // `f` does not access the contacts through the body.
+            && let Some(mut contacts) = body.contacts.take_if(|contacts| contacts.may_touch())
         {
-            act(skin, body, &mut contacts);
+            f(surface, body, &mut contacts);
             body.contacts = Some(contacts);
         }
     }
 }
 
-/// The same of corners of surfaces: what those are bound to counts.
-fn join_movers(bonds: &Bonds, bodies: &impl Systems, places: [usize; 2], corners: [&[u32]; 2]) -> bool {
-    let mut movers = [[0; MOST_MOVERS]; 2];
+/// Returns true if an attachment joins simulation nodes that move these corners of two surfaces.
+fn share_attachment(
+    attachments: &PointAttachments,
+    bodies: &impl Systems,
+    body_indices: [usize; 2],
+    corners: [&[u32]; 2],
+) -> bool {
+    let mut mover_nodes = [[0; MAX_MOVERS]; 2];
     let mut counts = [0; 2];
     for side in 0..2 {
-        let body = bodies.at(places[side]);
+        let body = bodies.at(body_indices[side]);
         let all = corners[side]
             .iter()
             .flat_map(|&corner| body.into_iter().flat_map(move |body| body.movers(corner)));
-        for (to, (node, _)) in movers[side].iter_mut().zip(all) {
+        for (to, (node, _)) in mover_nodes[side].iter_mut().zip(all) {
             *to = node;
             counts[side] += 1;
         }
     }
-    bonds.join(places, [0, 1].map(|side| &movers[side][..counts[side]]))
+    attachments.join_nodes(body_indices, [0, 1].map(|side| &mover_nodes[side][..counts[side]]))
 }
 
-fn meet_each_other(first: &System, second: &System) -> bool {
+fn can_collide(first: &System, second: &System) -> bool {
     let (a, b) = (&first.contact, &second.contact);
     a.with_bodies && b.with_bodies && a.filter.meets(b.filter)
 }

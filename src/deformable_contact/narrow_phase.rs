@@ -1,245 +1,274 @@
-//! Finds the contacts of bodies that take a substep together.
+//! Contact search between bodies that take a substep together.
 
 use super::DeformableContact;
-use super::bonds::Bonds;
-use super::entangled::Entangled;
-use super::link::{ContactSide, Link};
-use super::plan::FASTER;
-use super::search::{Measure, PairSearch, Party, shift};
-use super::skin::Skin;
-use super::{join_movers, meet_each_other};
-use crate::geometry::Bounds;
-use crate::solver::{Span, System, Systems};
+use super::attachments::PointAttachments;
+use super::collision_surface::CollisionSurface;
+use super::interpenetrating_pairs::InterpenetratingPairs;
+use super::pair_contact::{ContactSide, PairContact};
+use super::plan::SPEED_MARGIN;
+use super::search::{ClearanceUpdate, PairSearch, SearchSide, shift};
+use super::{can_collide, share_attachment};
+use crate::geometry::Aabb;
+use crate::solver::{SubstepSpan, System, Systems};
 
-/// What keeps off a surface without thickness, as a part of its short edges: in `f32` something must.
-pub(super) const LEAST_THICKNESS: f32 = 1e-3;
+/// Contact distance of a surface without thickness, as a fraction of its short edges. It exceeds rounding in `f32`.
+pub(super) const MIN_THICKNESS: f32 = 1e-3;
 
 impl DeformableContact {
-    /// Draws what of each surface is near others that it is found by in images, as the substep begins.
-    pub(super) fn draw(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
+    /// Draws the part of each surface that is near others that use its images, at the start of a substep.
+    pub(super) fn draw_images(&mut self, island: usize, bodies: &impl Systems, span: &SubstepSpan) {
         for member in 0..self.islands.members(island).len() {
             let a = self.islands.members(island)[member] as usize;
-            // It is written to while others are read.
-            let Some(mut first) = self.skins.get_mut(a).and_then(Option::take) else {
+            // Moved out, because it is written while others are read.
+            let Some(mut first) = self.surfaces.get_mut(a).and_then(Option::take) else {
                 continue;
             };
             if let Some(body) = bodies.at(a)
                 && first.images.is_some()
-                && moment.concerns(body)
+                && span.concerns(body)
             {
-                let mut part = Bounds::EMPTY;
+                let mut drawn_bounds = Aabb::EMPTY;
                 for &b in self.islands.members(island) {
                     let b = b as usize;
-                    if let (Some(Some(other)), Some(other_body)) = (self.skins.get(b), bodies.at(b))
-                        && moment.concerns(other_body)
-                        && meet_in_images(&first, other)
+                    if let (Some(Some(other)), Some(other_body)) = (self.surfaces.get(b), bodies.at(b))
+                        && span.concerns(other_body)
+                        && find_in_images(&first, other)
                     {
-                        let parties = [(a, &first), (b, other)].map(|(place, skin)| Party { place, skin });
-                        if let Some(radius) = radius(&parties[0], &parties[1], [body, other_body]) {
-                            part = part.and(&near(&first, other, radius));
+                        let search_sides =
+                            [(a, &first), (b, other)].map(|(body_index, surface)| SearchSide { body_index, surface });
+                        if let Some(radius) = contact_distance(&search_sides[0], &search_sides[1], [body, other_body]) {
+                            drawn_bounds = drawn_bounds.and(&overlap_bounds(&first, other, radius));
                         }
                     }
                 }
-                first.draw(&part);
+                first.draw_images(&drawn_bounds);
             }
-            self.skins[a] = Some(first);
+            self.surfaces[a] = Some(first);
         }
     }
 
-    /// Whether what may meet where impulses have led nodes was found before they acted.
-    pub(super) fn has_foreseen(&self, island: usize, bodies: &impl Systems, moment: &Span) -> bool {
+    /// Returns true if the first search of the substep found all that impulses may make touch.
+    pub(super) fn is_search_complete(&self, island: usize, bodies: &impl Systems, span: &SubstepSpan) -> bool {
         self.islands.searches(island).all(|pair| {
-            let search = Self::search((&self.skins, &self.entangled), pair, bodies, moment);
-            search.is_none_or(|search| search.has_foreseen())
+            let search = Self::pair_search((&self.surfaces, &self.interpenetrating_pairs), pair, bodies, span);
+            search.is_none_or(|search| search.is_search_complete())
         })
     }
 
-    /// The search of one of the near pairs of bodies, or of one body, in a substep, if they meet then.
-    fn search<'a>(
-        (skins, entangled): (&'a [Option<Skin>], &Entangled),
+    /// Returns the search of a near pair of bodies, or of a body with itself, if they collide.
+    fn pair_search<'a>(
+        (surfaces, interpenetrating_pairs): (&'a [Option<CollisionSurface>], &InterpenetratingPairs),
         [a, b]: [usize; 2],
         bodies: &impl Systems,
-        moment: &Span,
+        span: &SubstepSpan,
     ) -> Option<PairSearch<'a>> {
-        let party = |place: usize| {
-            let skin = skins.get(place)?.as_ref()?;
-            Some(Party { place, skin })
+        let side = |body_index: usize| {
+            let surface = surfaces.get(body_index)?.as_ref()?;
+            Some(SearchSide { body_index, surface })
         };
-        let both = [bodies.at(a)?, bodies.at(b)?];
-        let (mut first, mut second) = (party(a)?, party(b)?);
-        let radius = radius(&first, &second, both)?;
-        // Each edge of the first meets one edge of the second: of a long edge across short ones, that would be one of many.
-        if second.skin.short < first.skin.short {
+        let bodies_of_pair = [bodies.at(a)?, bodies.at(b)?];
+        let (mut first, mut second) = (side(a)?, side(b)?);
+        let radius = contact_distance(&first, &second, bodies_of_pair)?;
+        // The side with shorter edges comes first, because each of its edges touches few edges of the second.
+        if second.surface.short_edge < first.surface.short_edge {
             std::mem::swap(&mut first, &mut second);
         }
-        let is_looked_at = both.into_iter().all(|body| moment.concerns(body));
-        let [own, others] = [first.skin, second.skin];
-        (is_looked_at && !entangled.has([a, b])).then(|| PairSearch {
-            parties: [first, second],
-            dt: moment.duration,
+        let both_take_part = bodies_of_pair.into_iter().all(|body| span.concerns(body));
+        let [first_surface, second_surface] = [first.surface, second.surface];
+        (both_take_part && !interpenetrating_pairs.contains([a, b])).then(|| PairSearch {
+            search_sides: [first, second],
+            dt: span.duration,
             radius,
-            ahead: own.ahead().min(others.ahead()),
-            motion: own.spread + others.spread + (own.drift - others.drift).length() * moment.duration,
-            in_images: a != b && meet_in_images(own, others),
-            again: false,
-            measures: Measure::Nothing,
-            may_be_inside: a != b && (own.crossings > 0 || others.crossings > 0 || are_in_each_other(own, others)),
+            speculative_margin: first_surface
+                .speculative_margin()
+                .min(second_surface.speculative_margin()),
+            motion: first_surface.displacement_spread
+                + second_surface.displacement_spread
+                + (first_surface.center_velocity - second_surface.center_velocity).length() * span.duration,
+            uses_images: a != b && find_in_images(first_surface, second_surface),
+            is_repeated: false,
+            clearance_update: ClearanceUpdate::Nothing,
+            may_be_inside: a != b
+                && (first_surface.crossings > 0
+                    || second_surface.crossings > 0
+                    || may_contain_each_other(first_surface, second_surface)),
         })
     }
 
-    /// The same of a pair that is not found in images.
-    fn search_by_distance<'a>(
-        skins: (&'a [Option<Skin>], &Entangled),
+    /// Returns the same search if it does not use images.
+    fn tree_search<'a>(
+        surfaces: (&'a [Option<CollisionSurface>], &InterpenetratingPairs),
         pair: [usize; 2],
         bodies: &impl Systems,
-        moment: &Span,
+        span: &SubstepSpan,
     ) -> Option<PairSearch<'a>> {
-        Self::search(skins, pair, bodies, moment).filter(|search| !search.in_images)
+        Self::pair_search(surfaces, pair, bodies, span).filter(|search| !search.uses_images)
     }
 
-    /// Has what is near be known of the pairs of an island, or trees be where surfaces are.
-    fn know_pairs(&mut self, island: usize, bodies: &impl Systems, moment: &Span, again: bool) {
+    /// Updates the candidates of an island, or refits the trees if candidates do not fit into memory.
+    fn update_candidates(&mut self, island: usize, bodies: &impl Systems, span: &SubstepSpan, is_repeated: bool) {
         let Self {
-            skins,
-            entangled,
-            pairs,
+            surfaces,
+            interpenetrating_pairs,
+            candidate_pairs,
             islands,
             ..
         } = self;
-        for (number, pair) in islands.searches(island).enumerate() {
-            let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
-            if search.is_none_or(|search| again && search.has_foreseen() || pairs.holds(number, &search)) {
+        for (pair_index, pair) in islands.searches(island).enumerate() {
+            let search = Self::tree_search((surfaces, interpenetrating_pairs), pair, bodies, span);
+            if search.is_none_or(|search| {
+                is_repeated && search.is_search_complete() || candidate_pairs.covers(pair_index, &search)
+            }) {
                 continue;
             }
-            for place in pair {
-                skins[place].iter_mut().for_each(Skin::fit);
+            for body_index in pair {
+                surfaces[body_index].iter_mut().for_each(CollisionSurface::refit_trees);
             }
-            let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
-            if search.is_some_and(|search| pairs.renew(number, &search)) {
+            let search = Self::tree_search((surfaces, interpenetrating_pairs), pair, bodies, span);
+            if search.is_some_and(|search| candidate_pairs.relist(pair_index, &search)) {
                 continue;
             }
-            for &place in islands.members(island) {
-                if let Some(Some(skin)) = skins.get_mut(place as usize) {
-                    skin.fit();
+            for &body_index in islands.members(island) {
+                if let Some(Some(surface)) = surfaces.get_mut(body_index as usize) {
+                    surface.refit_trees();
                 }
             }
-            let (skins, entangled) = (&*skins, &*entangled);
-            let all = islands.searches(island);
-            pairs.find(all.map(|pair| Self::search_by_distance((skins, entangled), pair, bodies, moment)));
+            let (surfaces, interpenetrating_pairs) = (&*surfaces, &*interpenetrating_pairs);
+            let all_pairs = islands.searches(island);
+            candidate_pairs.list_all(
+                all_pairs.map(|pair| Self::tree_search((surfaces, interpenetrating_pairs), pair, bodies, span)),
+            );
             return;
         }
     }
 
-    /// Adds the contacts that are not known yet, of those that meet; again in the same substep: where impulses have led further than was looked.
-    pub(super) fn find(&mut self, island: usize, bodies: &impl Systems, moment: &Span, again: bool) {
-        let measures = moment.begins && !again;
-        self.know_pairs(island, bodies, moment, again);
+    /// Finds contacts and adds those that are not listed yet. `is_repeated` marks further searches in a substep.
+    pub(super) fn find_contacts(
+        &mut self,
+        island: usize,
+        bodies: &impl Systems,
+        span: &SubstepSpan,
+        is_repeated: bool,
+    ) {
+        let updates_clearances = span.begins && !is_repeated;
+        self.update_candidates(island, bodies, span, is_repeated);
         let Self {
-            skins,
+            surfaces,
             clearances,
-            entangled,
-            links,
-            known,
-            pushes,
-            pairs,
-            bonds,
+            interpenetrating_pairs,
+            pair_contacts,
+            contact_order,
+            warm_start,
+            candidate_pairs,
+            attachments,
             islands,
             ..
         } = self;
-        let key = Link::key;
-        known.clear();
-        known.extend(0..links.len() as u32);
-        known.sort_unstable_by_key(|&link| key(&links[link as usize]));
-        let first_new = links.len();
-        // Without room for all, what only comes near gives way to what meets.
-        let mut replaced = links.len()..links.capacity();
-        for (number, [a, b]) in islands.searches(island).enumerate() {
-            let Some(mut search) = Self::search((skins, entangled), [a, b], bodies, moment) else {
+        let key = PairContact::key;
+        contact_order.clear();
+        contact_order.extend(0..pair_contacts.len() as u32);
+        contact_order.sort_unstable_by_key(|&contact| key(&pair_contacts[contact as usize]));
+        let first_new = pair_contacts.len();
+        // Without capacity, contacts that touch replace speculative ones.
+        let mut replaceable = pair_contacts.len()..pair_contacts.capacity();
+        for (pair_index, [a, b]) in islands.searches(island).enumerate() {
+            let Some(mut search) = Self::pair_search((surfaces, interpenetrating_pairs), [a, b], bodies, span) else {
                 continue;
             };
-            if again && search.has_foreseen() {
+            if is_repeated && search.is_search_complete() {
                 continue;
             }
-            search.again = again;
-            let [a, b] = search.parties.map(|party| party.place);
+            search.is_repeated = is_repeated;
+            let [a, b] = search.search_sides.map(|search_side| search_side.body_index);
             let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {
                 continue;
             };
             let friction = body_a.contact.friction.max(body_b.contact.friction);
-            let number = Some(number).filter(|_| !search.in_images);
-            // A place is lent to neither where it is its own partner.
-            let mut none = [None, None];
-            let [kept_a, kept_b] = match clearances.get_disjoint_mut([a, b]) {
+            let pair_index = Some(pair_index).filter(|_| !search.uses_images);
+            // Self-contact has no clearances.
+            let mut no_clearances = [None, None];
+            let [clearances_a, clearances_b] = match clearances.get_disjoint_mut([a, b]) {
                 Ok(both) => both,
-                Err(_) => none.each_mut(),
+                Err(_) => no_clearances.each_mut(),
             };
-            if measures && [&*kept_a, &*kept_b].into_iter().flatten().any(|kept| kept.is_new) {
-                search.measures = Measure::Reductions;
-                let known = number.and_then(|number| pairs.of(number));
-                search.run([&mut *kept_a, &mut *kept_b], known, |_| {});
+            if updates_clearances
+                && [&*clearances_a, &*clearances_b]
+                    .into_iter()
+                    .flatten()
+                    .any(|clearances_of_body| clearances_of_body.is_new)
+            {
+                search.clearance_update = ClearanceUpdate::Reductions;
+                let candidates = pair_index.and_then(|pair_index| candidate_pairs.view(pair_index));
+                search.run([&mut *clearances_a, &mut *clearances_b], candidates, |_| {});
             }
-            search.measures = if measures { Measure::Distances } else { Measure::Nothing };
-            let near = number.and_then(|number| pairs.of(number));
-            search.run([kept_a, kept_b], near, |touch| {
-                let sides = touch.sides.map(|side| side.key());
-                let is_known = known
-                    .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
+            search.clearance_update = if updates_clearances {
+                ClearanceUpdate::Distances
+            } else {
+                ClearanceUpdate::Nothing
+            };
+            let candidates = pair_index.and_then(|pair_index| candidate_pairs.view(pair_index));
+            search.run([clearances_a, clearances_b], candidates, |found| {
+                let sides = found.sides.map(|side| side.key());
+                let is_in_list = contact_order
+                    .binary_search_by_key(&sides, |&contact| key(&pair_contacts[contact as usize]))
                     .is_ok();
-                if is_known || are_joined(bonds, bodies, &touch.sides) {
+                if is_in_list || are_joined(attachments, bodies, &found.sides) {
                     return;
                 }
-                let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });
-                if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides) {
-                    link.friction = friction;
-                    (link.is_parted, link.is_ahead) = (touch.is_parted, touch.is_ahead);
-                    link.allow_gap(touch.gap, moment.duration);
-                    pushes.recall(&mut link);
-                    if links.len() < links.capacity() {
-                        links.push(link);
-                    } else if !link.is_ahead
-                        && let Some(place) = replaced.find(|&place| links[place].is_ahead)
+                let side_bodies = found.sides.map(|side| if side.body == a { body_a } else { body_b });
+                if let Some(mut contact) = PairContact::new(found.sides, found.normal, side_bodies) {
+                    contact.friction = friction;
+                    (contact.is_cut_apart, contact.is_speculative) = (found.is_cut_apart, found.is_speculative);
+                    contact.set_gap(found.gap, span.duration);
+                    warm_start.restore(&mut contact);
+                    if pair_contacts.len() < pair_contacts.capacity() {
+                        pair_contacts.push(contact);
+                    } else if !contact.is_speculative
+                        && let Some(contact_index) =
+                            replaceable.find(|&contact_index| pair_contacts[contact_index].is_speculative)
                     {
-                        links[place] = link;
+                        pair_contacts[contact_index] = contact;
                     }
                 }
             });
         }
-        pushes.recall_beside(&mut links[first_new..]);
-        if measures {
-            for &place in islands.members(island) {
-                if let Some(Some(kept)) = clearances.get_mut(place as usize) {
-                    let skin = skins.get(place as usize).and_then(Option::as_ref);
-                    kept.settle(skin.map_or(&[], |skin| &skin.pierces));
+        warm_start.restore_from_neighbors(&mut pair_contacts[first_new..]);
+        if updates_clearances {
+            for &body_index in islands.members(island) {
+                if let Some(Some(clearances_of_body)) = clearances.get_mut(body_index as usize) {
+                    let surface = surfaces.get(body_index as usize).and_then(Option::as_ref);
+                    clearances_of_body.update(surface.map_or(&[], |surface| &surface.is_crossing));
                 }
             }
         }
     }
 }
 
-/// Whether a bond makes one point of nodes of both sides.
-fn are_joined(bonds: &Bonds, bodies: &impl Systems, sides: &[ContactSide; 2]) -> bool {
+/// Returns true if an attachment joins nodes of both sides.
+fn are_joined(attachments: &PointAttachments, bodies: &impl Systems, sides: &[ContactSide; 2]) -> bool {
     let [a, b] = sides;
-    !bonds.are_none() && join_movers(bonds, bodies, [a.body, b.body], [&a.nodes, &b.nodes])
+    !attachments.is_empty() && share_attachment(attachments, bodies, [a.body, b.body], [&a.nodes, &b.nodes])
 }
 
-/// How far two bodies, or one with itself, keep apart, m; `None` where they do not meet.
-fn radius(first: &Party, second: &Party, bodies: [&System; 2]) -> Option<f32> {
+/// Returns the contact distance of two bodies, or of one with itself, m; `None` if they do not collide.
+fn contact_distance(first: &SearchSide, second: &SearchSide, bodies: [&System; 2]) -> Option<f32> {
     let [a, b] = bodies.map(|body| &body.contact);
-    if first.place == second.place {
-        return first.skin.radius_with_itself(a);
+    if first.body_index == second.body_index {
+        return first.surface.self_contact_radius(a);
     }
-    let shortest = first.skin.short.min(second.skin.short);
-    let apart = (a.thickness + b.thickness).max(LEAST_THICKNESS * shortest);
-    meet_each_other(bodies[0], bodies[1]).then_some(apart)
+    let shortest = first.surface.short_edge.min(second.surface.short_edge);
+    let distance = (a.thickness + b.thickness).max(MIN_THICKNESS * shortest);
+    can_collide(bodies[0], bodies[1]).then_some(distance)
 }
 
-/// Whether two bodies that meet are found in images.
-fn meet_in_images(first: &Skin, second: &Skin) -> bool {
-    first.asks_for_images || second.asks_for_images
+/// Returns true if two bodies that collide use images.
+fn find_in_images(first: &CollisionSurface, second: &CollisionSurface) -> bool {
+    first.wants_images || second.wants_images
 }
 
-/// Whether one of two surfaces may be inside the other as a whole: else nothing of it is, without edges that pass through faces.
-fn are_in_each_other(first: &Skin, second: &Skin) -> bool {
+/// Returns true if one surface may be completely inside the other. Otherwise, without crossing edges, nothing is
+/// inside.
+fn may_contain_each_other(first: &CollisionSurface, second: &CollisionSurface) -> bool {
     let (a, b) = (
         first.forest.bounds(),
         second.forest.bounds().moved(second.origin - first.origin),
@@ -247,46 +276,46 @@ fn are_in_each_other(first: &Skin, second: &Skin) -> bool {
     a.contains(&b) || b.contains(&a)
 }
 
-/// A box about what of a surface another may meet that it keeps `radius` away from.
-fn near(skin: &Skin, other: &Skin, radius: f32) -> Bounds {
-    let margin = radius + skin.short + FASTER * (skin.travel + other.travel);
-    let shift = shift(other, skin);
-    let (own, others) = (skin.forest.bounds(), other.forest.bounds());
-    Bounds {
-        min: (others.min + shift - margin).max(own.min),
-        max: (others.max + shift + margin).min(own.max),
+/// Returns bounds of the part of a surface that another may touch at the distance `radius`, m.
+fn overlap_bounds(surface: &CollisionSurface, other: &CollisionSurface, radius: f32) -> Aabb {
+    let margin = radius + surface.short_edge + SPEED_MARGIN * (surface.max_displacement + other.max_displacement);
+    let shift = shift(other, surface);
+    let (own_bounds, other_bounds) = (surface.forest.bounds(), other.forest.bounds());
+    Aabb {
+        min: (other_bounds.min + shift - margin).max(own_bounds.min),
+        max: (other_bounds.max + shift + margin).min(own_bounds.max),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::link::Link;
-    use super::super::pairs::tests::world;
+    use super::super::candidate_pairs::tests::world;
+    use super::super::pair_contact::PairContact;
     use crate::mesh::Mesh;
     use crate::{Solver, World};
 
-    fn links(world: &mut World) -> &mut Vec<Link> {
-        &mut world.tissue.as_mut().expect("it meets itself").links
+    fn pair_contacts(world: &mut World) -> &mut Vec<PairContact> {
+        &mut world.tissue.as_mut().expect("it meets itself").pair_contacts
     }
 
     #[test]
-    fn what_only_comes_near_gives_way_to_what_meets() {
+    fn touching_contacts_replace_speculative_ones() {
         let sheet = Mesh::cloth([0.1; 2], [8; 2]).expect("a cloth");
         let (mut world, _) = world(&sheet, Solver::Verlet, 0.002);
         let mut seen = 0;
         for _ in 0..40 {
             let before = world.save().expect("a snapshot");
             world.step(1e-3).expect("a step");
-            let found = links(&mut world);
-            let meeting = found.iter().filter(|link| !link.is_ahead).count();
+            let found = pair_contacts(&mut world);
+            let meeting = found.iter().filter(|contact| !contact.is_speculative).count();
             if meeting < found.len() && meeting > 4 {
                 let mut other = World::load(&before, 1, None).expect("the snapshot");
-                // Room for some of what meets.
-                *links(&mut other) = Vec::with_capacity(meeting / 2);
+                // Capacity for half of the contacts that touch.
+                *pair_contacts(&mut other) = Vec::with_capacity(meeting / 2);
                 other.step(1e-3).expect("a step");
-                let found = links(&mut other);
+                let found = pair_contacts(&mut other);
                 assert_eq!(found.len(), found.capacity());
-                assert!(found.iter().all(|link| !link.is_ahead));
+                assert!(found.iter().all(|contact| !contact.is_speculative));
                 seen += 1;
             }
         }

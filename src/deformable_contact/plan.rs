@@ -1,183 +1,207 @@
-//! Which bodies take a step together, and in how many substeps.
+//! Islands of bodies that take a step together, and their number of substeps.
 
 use glam::{DVec3, FloatExt, Vec3};
 
 use super::DeformableContact;
-use super::islands::Reach;
-use super::link::Key;
-use super::meet_each_other;
-use super::skin::Skin;
-use crate::geometry::Bounds;
-use crate::nodes::parts;
+use super::can_collide;
+use super::collision_surface::CollisionSurface;
+use super::islands::SweptBody;
+use super::pair_contact::ContactKey;
+use crate::geometry::Aabb;
+use crate::nodes::weighted_nodes;
 use crate::solver::{System, Systems};
 
-/// It is foreseen that a body becomes so many times as fast in a step; where it is faster, the step is taken again.
-pub(super) const FASTER: f32 = 2.0;
+/// Assumed maximum factor by which a body becomes faster in a step. If it becomes faster, the step is repeated.
+pub(super) const SPEED_MARGIN: f32 = 2.0;
 
-/// How far bodies come against each other in a substep, as a part of the short edges.
-const TRAVEL: f32 = 0.5;
+/// Maximum relative displacement in a substep, as a fraction of the short edges.
+const MAX_TRAVEL: f32 = 0.5;
 
-/// The longest substep in which a body of IMPLICIT follows what contacts give after its equation, times the frequency that the pressed nodes would
-/// have if all others were held. With 2.2, bodies of 60 kPa press each other 3 % too weakly; with 4.9, those of 250 kPa 8 %, and energy is gained.
-const FOLLOWED: f32 = 1.0;
+/// Maximum product of an IMPLICIT substep and the frequency of pressed nodes with all others fixed. With 2.2, bodies of
+/// 60 kPa press each other 3 % too weakly; with 4.9, those of 250 kPa 8 %, and energy grows.
+const MAX_PHASE: f32 = 1.0;
 
-/// How much further than they can come bodies count as near, as a part of their extents.
-const MARGIN: f32 = 0.005;
+/// Additional distance at which bodies count as near, as a fraction of their extents.
+const BROAD_PHASE_MARGIN: f32 = 0.005;
 
 impl DeformableContact {
-    /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, those that are attached,
-    /// and by themselves those that meet themselves.
+    /// Builds the islands of the next step of `dt` seconds: bodies that may come near each other, attached bodies, and
+    /// single bodies with self-contact.
     pub fn plan(&mut self, bodies: &impl Systems, dt: f32) {
-        self.islands.part(|place| {
-            let meets_itself = |body: &System| body.meets_tissue() && body.contact.with_itself;
-            bodies.at(place).is_some_and(meets_itself)
+        self.islands.reset(|body_index| {
+            let has_self_contact = |body: &System| body.collides_with_tissue() && body.contact.with_itself;
+            bodies.at(body_index).is_some_and(has_self_contact)
         });
-        for [first, second] in self.bonds.bodies() {
-            self.islands.join(first, second);
+        for [first, second] in self.attachments.bodies() {
+            self.islands.merge(first, second);
         }
-        let common = self.common_velocity(bodies);
+        let common_velocity = self.common_velocity(bodies);
         let origin = self.origin(bodies);
-        let reaches = meeting(&self.skins, bodies).map(|(place, body)| {
-            let margin = body.contact.thickness + MARGIN * body.extent();
+        let swept_bodies = colliding_bodies(&self.surfaces, bodies).map(|(body_index, body)| {
+            let margin = body.contact.thickness + BROAD_PHASE_MARGIN * body.extent();
             let bounds = body.local_bounds().moved(body.origin - origin).extended(margin);
-            Reach::new(place, bounds, &velocities(body), common, FASTER * dt)
+            SweptBody::new(
+                body_index,
+                bounds,
+                &velocity_bounds(body),
+                common_velocity,
+                SPEED_MARGIN * dt,
+            )
         });
-        let are_near = |one: &Reach, other: &Reach| {
-            let both = [one, other].map(|reach| bodies.at(reach.place as usize));
+        let are_near = |first_body: &SweptBody, second_body: &SweptBody| {
+            let both = [first_body, second_body].map(|swept_body| bodies.at(swept_body.body_index as usize));
             let [Some(first), Some(second)] = both else {
                 return false;
             };
-            let travel = FASTER * dt * relative_speed(first, second);
-            meet_each_other(first, second) && one.bounds.extended(travel).overlaps(&other.bounds)
+            let travel = SPEED_MARGIN * dt * relative_speed(first, second);
+            can_collide(first, second) && first_body.bounds.extended(travel).overlaps(&second_body.bounds)
         };
-        self.islands.join_near(reaches, are_near);
-        self.islands.settle();
+        self.islands.merge_near(swept_bodies, are_near);
+        self.islands.sort();
     }
 
-    /// Has bodies go together that came near each other in a step that was tried, and were not known to: whether there are such.
-    pub fn plan_again(&mut self, bodies: &impl Systems, dt: f32) -> bool {
+    /// Merges islands of bodies that came near each other in an attempted step unexpectedly. Returns true if there are
+    /// any.
+    pub fn replan(&mut self, bodies: &impl Systems, dt: f32) -> bool {
         let origin = self.origin(bodies);
-        let common = self.common_velocity(bodies) * dt;
-        let reaches = meeting(&self.skins, bodies).map(|(place, body)| Reach {
-            place: place as u32,
-            bounds: swept(body, common).moved(body.origin - origin),
+        let common_displacement = self.common_velocity(bodies) * dt;
+        let swept_bodies = colliding_bodies(&self.surfaces, bodies).map(|(body_index, body)| SweptBody {
+            body_index: body_index as u32,
+            bounds: swept(body, common_displacement).moved(body.origin - origin),
             travel: 0.0,
         });
-        let are_near = |one: &Reach, other: &Reach| {
-            let both = [one, other].map(|reach| bodies.at(reach.place as usize));
-            matches!(both, [Some(first), Some(second)] if meet_each_other(first, second))
+        let are_near = |first_body: &SweptBody, second_body: &SweptBody| {
+            let both = [first_body, second_body].map(|swept_body| bodies.at(swept_body.body_index as usize));
+            matches!(both, [Some(first), Some(second)] if can_collide(first, second))
         };
-        let is_changed = self.islands.join_near(reaches, are_near);
-        self.islands.settle();
+        let is_changed = self.islands.merge_near(swept_bodies, are_near);
+        self.islands.sort();
         is_changed
     }
 
-    /// The mean of the velocities in the middle of what bodies have, m/s.
+    /// Returns the mean of the centers of the bodies' velocity bounds, m/s.
     fn common_velocity(&self, bodies: &impl Systems) -> Vec3 {
-        let middles = meeting(&self.skins, bodies).map(|(_, body)| {
-            let all = velocities(body);
-            0.5 * (all.min + all.max)
+        let centers = colliding_bodies(&self.surfaces, bodies).map(|(_, body)| {
+            let bounds = velocity_bounds(body);
+            0.5 * (bounds.min + bounds.max)
         });
-        let (count, sum) = middles.fold((0, Vec3::ZERO), |(count, sum), middle| (count + 1, sum + middle));
+        let (count, sum) = centers.fold((0, Vec3::ZERO), |(count, sum), center| (count + 1, sum + center));
         sum / (count.max(1) as f32)
     }
 
-    /// Where the coordinates begin in which bodies are compared.
+    /// Returns the origin of the coordinates in which bodies are compared.
     fn origin(&self, bodies: &impl Systems) -> DVec3 {
-        meeting(&self.skins, bodies)
+        colliding_bodies(&self.surfaces, bodies)
             .next()
             .map_or(DVec3::ZERO, |(_, body)| body.origin)
     }
 
-    /// Whether all bodies of an island sleep: then nothing of it changes.
+    /// Returns true if all bodies of an island sleep, so that nothing changes.
     pub fn is_asleep(&self, island: usize, bodies: &impl Systems) -> bool {
         are_asleep(self.islands.members(island), bodies)
     }
 
-    /// Whether all bodies of an island have been at rest for long enough, and may sleep: what is attached does not.
+    /// Returns true if all bodies of an island are at rest and may sleep. Attached bodies do not sleep.
     pub fn is_at_rest(&self, island: usize, bodies: &impl Systems) -> bool {
         let members = self.islands.members(island);
-        let mut bound = self.bonds.bodies().flatten();
+        let mut attached_bodies = self.attachments.bodies().flatten();
         members
             .iter()
-            .all(|&place| bodies.at(place as usize).is_some_and(System::is_at_rest))
-            && !bound.any(|place| members.contains(&(place as u32)))
+            .all(|&body_index| bodies.at(body_index as usize).is_some_and(System::is_at_rest))
+            && !attached_bodies.any(|body_index| members.contains(&(body_index as u32)))
     }
 
-    /// In how many substeps bodies of an island come no further against each other in one, or parts of one that meets itself, than what they are
-    /// made of is small.
-    pub fn substeps_wished(&self, island: usize, bodies: &impl Systems, dt: f32) -> u32 {
-        let short = |place: usize| self.skins.get(place)?.as_ref().map(|skin| skin.short);
-        let wished = |[a, b]: [usize; 2]| {
-            let speed = relative_speed(bodies.at(a)?, bodies.at(b)?);
-            Some(dt * speed / (TRAVEL * short(a)?.min(short(b)?)))
+    /// Returns the number of substeps for which relative displacements in an island stay below a fraction of a short
+    /// edge.
+    pub fn wanted_substeps(&self, island: usize, bodies: &impl Systems, dt: f32) -> u32 {
+        let short_edge = |body_index: usize| {
+            self.surfaces
+                .get(body_index)?
+                .as_ref()
+                .map(|surface| surface.short_edge)
         };
-        let members = self.islands.members(island).iter().map(|&place| place as usize);
-        let meets_itself = |place: &usize| bodies.at(*place).is_some_and(|body| body.contact.with_itself);
-        let of_one = members.filter(meets_itself).map(|place| [place; 2]);
-        let all = of_one.chain(self.islands.pairs(island)).filter_map(wished);
-        let wished = all.fold(1.0, f32::max).ceil().min(1e6) as u32;
-        let settled = self.pushes.settled(self.islands.members(island));
-        let settled = settled.map(|(sides, impulse)| (sides, impulse, 0.0));
-        wished.max(self.substeps_pressed(island, bodies, dt, settled))
+        let wanted = |[a, b]: [usize; 2]| {
+            let speed = relative_speed(bodies.at(a)?, bodies.at(b)?);
+            Some(dt * speed / (MAX_TRAVEL * short_edge(a)?.min(short_edge(b)?)))
+        };
+        let members = self
+            .islands
+            .members(island)
+            .iter()
+            .map(|&body_index| body_index as usize);
+        let has_self_contact = |body_index: &usize| bodies.at(*body_index).is_some_and(|body| body.contact.with_itself);
+        let self_pairs = members.filter(has_self_contact).map(|body_index| [body_index; 2]);
+        let all = self_pairs.chain(self.islands.pairs(island)).filter_map(wanted);
+        let wanted = all.fold(1.0, f32::max).ceil().min(1e6) as u32;
+        let committed_contacts = self.warm_start.committed(self.islands.members(island));
+        let committed_contacts = committed_contacts.map(|(sides, impulse)| (sides, impulse, 0.0));
+        wanted.max(self.substeps_for_contacts(island, bodies, dt, committed_contacts))
     }
 
-    /// The same as the contacts of the substep in progress press.
-    pub fn substeps_pressed_now(&self, island: usize, bodies: &impl Systems, dt: f32) -> u32 {
-        let pressing = self.links.iter().filter(|link| link.presses());
-        let all = pressing.map(|link| (link.key(), link.impulses().0, link.fresh_share()));
-        self.substeps_pressed(island, bodies, dt, all)
+    /// Returns the number of substeps for the contacts of the substep in progress.
+    pub fn substeps_for_current_contacts(&self, island: usize, bodies: &impl Systems, dt: f32) -> u32 {
+        let pressing = self.pair_contacts.iter().filter(|contact| contact.is_pressing());
+        let all = pressing.map(|contact| (contact.key(), contact.impulses().0, contact.new_fraction()));
+        self.substeps_for_contacts(island, bodies, dt, all)
     }
 
-    /// In how many substeps the forces within bodies follow these contacts, of which each gives so much after the equations of implicit ones, N s, and
-    /// such a part of that afresh: by the mean, as nodes of slivers bear little. What goes on the softer side follows; a blow stretches the stiffer one.
-    fn substeps_pressed(
+    /// Returns the number of substeps in which internal forces follow these contacts. Each has a normal impulse that is
+    /// applied after implicit solves, N s, and the fraction of it that is new. Frequencies are averaged, because nodes
+    /// of slivers carry little load. A sustained load follows the softer side; an impact stretches the stiffer one.
+    fn substeps_for_contacts(
         &self,
         island: usize,
         bodies: &impl Systems,
         dt: f32,
-        pressing: impl Iterator<Item = (Key, f32, f32)>,
+        pressing: impl Iterator<Item = (ContactKey, f32, f32)>,
     ) -> u32 {
         let members = self.islands.members(island);
-        let solution = |&place: &u32| bodies.at(place as usize)?.integrator.solution();
+        let solution = |&body_index: &u32| bodies.at(body_index as usize)?.integrator.solution();
         if members.iter().find_map(solution).is_none() {
             return 0;
         }
-        let rates = pressing.filter_map(|(sides, impulse, fresh)| {
-            let of_side = |(place, nodes): (usize, [u32; 3])| bodies.at(place).and_then(|body| rate(body, nodes));
-            let [a, b] = sides.map(of_side);
+        let weighted_frequencies = pressing.filter_map(|(sides, impulse, new_fraction)| {
+            let frequency_of_side = |(body_index, nodes): (usize, [u32; 3])| {
+                bodies.at(body_index).and_then(|body| local_frequency(body, nodes))
+            };
+            let [a, b] = sides.map(frequency_of_side);
             let (low, high) = match (a, b) {
                 (Some(a), Some(b)) => (a.min(b), a.max(b)),
-                (one, other) => [one.or(other)?; 2].into(),
+                (first, other) => [first.or(other)?; 2].into(),
             };
-            let rate = (low * low).lerp(high * high, fresh * fresh).sqrt();
-            Some([impulse * rate, impulse])
+            let local_frequency = (low * low).lerp(high * high, new_fraction * new_fraction).sqrt();
+            Some([impulse * local_frequency, impulse])
         });
-        let [all, impulse] = rates.fold([0.0; 2], |sums, more| [sums[0] + more[0], sums[1] + more[1]]);
+        let [sum, impulse] =
+            weighted_frequencies.fold([0.0; 2], |sums, added| [sums[0] + added[0], sums[1] + added[1]]);
         let substeps = if impulse > 0.0 {
-            dt / FOLLOWED * (all / impulse)
+            dt / MAX_PHASE * (sum / impulse)
         } else {
             0.0
         };
         substeps.ceil().min(1e6) as u32
     }
 
-    /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after a step in this gravity.
-    pub fn fastest(&self, island: usize, bodies: &impl Systems, gravity: Vec3, dt: f32) -> f32 {
+    /// Returns the speed of the fastest node of an island after a step with this gravity, m/s, as far as velocities are
+    /// tracked.
+    pub fn max_speed(&self, island: usize, bodies: &impl Systems, gravity: Vec3, dt: f32) -> f32 {
         let members = self.islands.members(island).iter();
-        let members = members.filter_map(|&place| bodies.at(place as usize));
+        let members = members.filter_map(|&body_index| bodies.at(body_index as usize));
         let speeds = members.map(|body| {
-            let all = velocities(body);
-            all.magnitudes().length() + dt * body.pull(gravity).length()
+            let bounds = velocity_bounds(body);
+            bounds.magnitudes().length() + dt * body.body_acceleration(gravity).length()
         });
         speeds.fold(0.0, f32::max)
     }
 }
 
-/// How fast these nodes would swing if all others were held, 1/s; `None` where nothing moves them.
-fn rate(body: &System, nodes: [u32; 3]) -> Option<f32> {
+/// Returns the natural frequency of these nodes with all others fixed, 1/s; `None` if they cannot move.
+fn local_frequency(body: &System, nodes: [u32; 3]) -> Option<f32> {
     let [mut stiffness, mut mass] = [0.0; 2];
-    for (node, _) in nodes.into_iter().flat_map(|node| parts(body.bindings.as_ref(), node)) {
+    for (node, _) in nodes
+        .into_iter()
+        .flat_map(|node| weighted_nodes(body.bindings.as_ref(), node))
+    {
         if body.inverse_masses[node as usize] > 0.0 {
             stiffness += body.forces.stiffness_at(node as usize, 0.0);
             mass += body.masses[node as usize];
@@ -186,43 +210,48 @@ fn rate(body: &System, nodes: [u32; 3]) -> Option<f32> {
     (mass > 0.0).then(|| (stiffness / mass).sqrt())
 }
 
-/// Whether the bodies at all these places sleep.
-pub(super) fn are_asleep(places: &[u32], bodies: &impl Systems) -> bool {
-    let mut places = places.iter();
-    places.all(|&place| bodies.at(place as usize).is_some_and(System::is_asleep))
+/// Returns true if all these bodies sleep.
+pub(super) fn are_asleep(body_indices: &[u32], bodies: &impl Systems) -> bool {
+    let mut body_indices = body_indices.iter();
+    body_indices.all(|&body_index| bodies.at(body_index as usize).is_some_and(System::is_asleep))
 }
 
-/// The bodies that meet tissue, with their places in the world.
-fn meeting<'a, B: Systems>(
-    skins: &'a [Option<Skin>],
+/// Returns bodies with contact, and their indices.
+fn colliding_bodies<'a, B: Systems>(
+    surfaces: &'a [Option<CollisionSurface>],
     bodies: &'a B,
 ) -> impl Iterator<Item = (usize, &'a System)> + use<'a, B> {
-    let with_skin = skins.iter().enumerate().filter(|(_, skin)| skin.is_some());
-    with_skin.filter_map(|(place, _)| Some((place, bodies.at(place)?)))
+    let with_surface = surfaces.iter().enumerate().filter(|(_, surface)| surface.is_some());
+    with_surface.filter_map(|(body_index, _)| Some((body_index, bodies.at(body_index)?)))
 }
 
-/// A box about the velocities of a body, m/s, as far as that is kept.
-fn velocities(body: &System) -> Bounds {
-    let velocities = body.carry.gravity.velocities;
-    if velocities.min.is_finite() && velocities.max.is_finite() {
-        velocities
+/// Returns the bounds of a body's velocities, m/s, or 0 if they are not tracked.
+fn velocity_bounds(body: &System) -> Aabb {
+    let bounds = body.carry.gravity.velocities;
+    if bounds.min.is_finite() && bounds.max.is_finite() {
+        bounds
     } else {
-        Bounds {
+        Aabb {
             min: Vec3::ZERO,
             max: Vec3::ZERO,
         }
     }
 }
 
-/// No node of a body is faster against one of another, or of the same, m/s, as far as their velocities are kept.
+/// Returns an upper bound of the relative speed of nodes of two bodies, or of one body, m/s.
 fn relative_speed(first: &System, second: &System) -> f32 {
-    let [a, b] = [first, second].map(velocities);
+    let [a, b] = [first, second].map(velocity_bounds);
     (a.max - b.min).abs().max((b.max - a.min).abs()).length()
 }
 
-/// A box about a body as a step that was tried begins, and as it ends beside the displacement that all bodies have in common, and what keeps off it,
-/// in its own coordinates.
-fn swept(body: &System, common: Vec3) -> Bounds {
-    let ends = body.state.newest().0.iter().map(|position| position - common);
-    Bounds::of(body.state.positions().iter().chain(ends)).extended(body.contact.thickness + 1e-3 * body.extent())
+/// Returns the bounds of a body over an attempted step, minus a common displacement, plus its contact distance, in its
+/// own coordinates.
+fn swept(body: &System, common_displacement: Vec3) -> Aabb {
+    let ends = body
+        .state
+        .newest()
+        .0
+        .iter()
+        .map(|position| position - common_displacement);
+    Aabb::of(body.state.positions().iter().chain(ends)).extended(body.contact.thickness + 1e-3 * body.extent())
 }

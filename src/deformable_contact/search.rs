@@ -1,493 +1,566 @@
-//! Which parts of two surfaces, or of one, meet within a step: the first touch of each node with a face and of each edge with an edge, both
-//! moving, by conservative advancement.
+//! Contact search between two surfaces, or within one. It finds the first contact of each moving node with faces, and
+//! of each moving edge with edges, by conservative advancement.
 
 use glam::{Vec3, Vec3A};
 
+use super::candidate_pairs::{CandidateFeature, CandidateView};
 use super::clearances::{Clearances, SurfaceFeature};
-use super::link::ContactSide;
-use super::pairs::{Known, Near};
-use super::skin::{Clearance, NONE, NodeWay, PARTED, Skin};
+use super::collision_surface::{COINCIDENT_DISTANCE, Clearance, CollisionSurface, NONE, NodeMotion};
+use super::pair_contact::ContactSide;
 use super::wound::Wound;
-use crate::contact::sweep::{Corners, Extent, Segment, Separation};
-use crate::geometry::Bounds;
+use crate::contact::time_of_impact::{Corners, Extent, Segment, Separation};
+use crate::geometry::Aabb;
 
-/// Distances that are the same but for this part are those of faces that share the closest point: which side it is on says the one that is
-/// seen most squarely.
-const SAME: f32 = 1e-4;
+/// Relative difference below which distances are equal. Faces that share the closest point differ by less. The face
+/// seen most squarely then decides the side of a point.
+const EQUAL_DISTANCE: f32 = 1e-4;
 
-/// Faces of another body that meet a corner in points, and from directions, less than this part of the distance from each other hold it alike: the
-/// closest one does. A surface that crumples needs them all.
-const ALIKE: f32 = 0.05;
+/// Faces of another body are redundant for a corner if their points and directions differ by less than this fraction of
+/// the distance. The closest one suffices. A surface that crumples needs all.
+const SIMILAR: f32 = 0.05;
 
-/// Edges of two bodies need not meet that come closest nearer than this part of what they keep apart to an end of one of them: its corner meets faces
-/// there. With a quarter what lies on a tip trembles.
-const NEAR_END: f32 = 0.05;
+/// Distance from an edge's end within which edges of two bodies do not touch, as a fraction of the contact distance.
+/// The corner touches faces there. With a quarter, a body that rests on a tip trembles.
+const EDGE_END_MARGIN: f32 = 0.05;
 
-/// A corner meets so many faces at most. With the closest alone, a corner in a fold would be pushed out of one face into the next, and tremble; with
-/// three, so would a tip in a hole of its shape, where eight triangles meet.
-const FACES: usize = 8;
+/// Maximum number of faces that a corner touches. With the closest one alone, a corner in a fold would be pushed from
+/// face to face and tremble. With three, so would a tip in a matching hole, where eight triangles meet.
+const MAX_FACES: usize = 8;
 
-/// An edge meets so many edges at most. With the closest alone, an edge that lies across several would be held up by each in turn, and tremble.
-const EDGES: usize = 8;
+/// Maximum number of edges that an edge touches. With the closest one alone, an edge across several would be supported
+/// by each in turn and tremble.
+const MAX_EDGES: usize = 8;
 
-/// A face that a corner meets, or an edge that an edge meets: whether it only comes near, how far away it is, which it is, where they meet and how far
-/// they keep apart.
-type FeatureMet<Feature> = (bool, f32, Feature, (Separation, Clearance));
+/// A contact with a face or edge: whether it is speculative, the distance at the start, the feature, the separation and
+/// the clearance.
+type FeatureContact<Feature> = (bool, f32, Feature, (Separation, Clearance));
 
-/// A body in a search, by its place in the world.
+/// A body in a search.
 #[derive(Clone, Copy)]
-pub(super) struct Party<'a> {
-    pub place: usize,
-    pub skin: &'a Skin,
+pub(super) struct SearchSide<'a> {
+    pub body_index: usize,
+    pub surface: &'a CollisionSurface,
 }
 
-/// What was found.
+/// A contact found by the search.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PairTouch {
+pub(super) struct FoundContact {
     pub sides: [ContactSide; 2],
-    /// From the second side to the first.
+    /// Unit vector from the second side to the first.
     pub normal: Vec3,
-    /// How far apart they are along it when the step begins, less what they keep off, m.
+    /// Distance along the normal at the start of the step, minus the contact distance, m.
     pub gap: f32,
-    /// Whether they were one until a cut parted them.
-    pub is_parted: bool,
-    /// Whether they only come near.
-    pub is_ahead: bool,
+    /// True if a cut separated the two sides.
+    pub is_cut_apart: bool,
+    /// True if the sides only come near.
+    pub is_speculative: bool,
 }
 
-/// Where those features come from that may be near a corner or an edge.
-enum From<'a> {
+/// The source of features near a corner or edge.
+enum FeatureSource<'a> {
     /// Trees or images.
     Search,
-    /// They are known: triangles near a corner, edges near an edge; how far the bodies have moved since these were listed, and how far away anything is
-    /// at most that it can meet, m.
-    Known(&'a mut [Near], [f32; 2]),
+    /// Candidates: triangles near a corner or edges near an edge. The numbers are the accumulated motion and the
+    /// distance within which contact is possible, m.
+    Listed(&'a mut [CandidateFeature], [f32; 2]),
 }
 
-/// A search over a step of `dt` seconds for what comes closer than `radius`, m, and for what comes within `ahead` of that, m: impulses may lead it there.
+/// A search over a substep of `dt` seconds for features closer than `radius`, m, or within `speculative_margin` of
+/// that, m.
 pub(super) struct PairSearch<'a> {
-    pub parties: [Party<'a>; 2],
+    pub search_sides: [SearchSide<'a>; 2],
     pub dt: f32,
     pub radius: f32,
-    pub ahead: f32,
-    /// How far anything of one party goes against anything of the other at most, m.
+    pub speculative_margin: f32,
+    /// Maximum relative displacement of the two sides, m.
     pub motion: f32,
-    /// Whether they find each other in images.
-    pub in_images: bool,
-    /// Whether it is not the first of the substep: what impulses have led nowhere else is passed over.
-    pub again: bool,
-    pub measures: Measure,
-    /// Whether corners of one body may have been inside the other as the step began.
+    /// True if the search uses images.
+    pub uses_images: bool,
+    /// True if it is not the first search of the substep. It then skips features that impulses have not deflected.
+    pub is_repeated: bool,
+    pub clearance_update: ClearanceUpdate,
+    /// True if corners of one body may be inside the other at the start of the step.
     pub may_be_inside: bool,
 }
 
-/// What of two bodies that are near each other is remembered.
+/// The information about near bodies that a search records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Measure {
+pub(super) enum ClearanceUpdate {
     Nothing,
-    /// How near they are.
+    /// Distances, from which clearances recover.
     Distances,
-    /// That they were made so near.
+    /// Distances at which bodies were created, which reduce clearances.
     Reductions,
 }
 
 impl PairSearch<'_> {
-    /// Shows all that meets. `kept` are the clearances of the two parties; a surface with itself has none. What of two bodies is near may be known.
-    pub fn run(&self, kept: [&mut Option<Clearances>; 2], known: Option<Known>, mut see: impl FnMut(PairTouch)) {
-        let [first, second] = self.parties;
-        let [mut of_first, of_second] = kept.map(Option::as_mut);
-        if let Some(Known { runs, features, moved }) = known {
+    /// Calls `visit` with all contacts. `clearances` are those of both sides; self-contact has none. Candidates replace
+    /// trees and images if given.
+    pub fn run(
+        &self,
+        clearances: [&mut Option<Clearances>; 2],
+        candidates: Option<CandidateView>,
+        mut visit: impl FnMut(FoundContact),
+    ) {
+        let [first, second] = self.search_sides;
+        let [mut first_clearances, second_clearances] = clearances.map(Option::as_mut);
+        if let Some(CandidateView {
+            runs,
+            features,
+            accumulated_motion,
+        }) = candidates
+        {
             let [corners, others, edges] = runs;
-            for (runs, [of_nodes, of_faces], mut kept) in [
-                (corners, [first, second], of_first.as_deref_mut()),
-                (others, [second, first], of_second),
+            for (runs, [corner_side, face_side], mut clearances) in [
+                (corners, [first, second], first_clearances.as_deref_mut()),
+                (others, [second, first], second_clearances),
             ] {
                 for run in runs {
-                    let reach = run.reach(self, moved);
-                    if !(run.apart - moved <= reach) {
+                    let reach = run.contact_reach(self, accumulated_motion);
+                    if !(run.distance_bound - accumulated_motion <= reach) {
                         continue;
                     }
-                    let corner = run.number as usize;
-                    let near = run.of(features);
-                    let (parties, node) = ([of_nodes, of_faces], [of_nodes.skin.nodes[corner]]);
-                    let face = |near: &Near| &of_faces.skin.triangles[near.feature as usize];
-                    if !near.iter().any(|near| self.may_find(parties, &node, face(near))) {
+                    let corner = run.index as usize;
+                    let listed = run.slice(features);
+                    let (search_sides, node) = ([corner_side, face_side], [corner_side.surface.nodes[corner]]);
+                    let face = |candidate: &CandidateFeature| &face_side.surface.triangles[candidate.feature as usize];
+                    if !listed
+                        .iter()
+                        .any(|candidate| self.needs_test(search_sides, &node, face(candidate)))
+                    {
                         continue;
                     }
-                    let from = From::Known(near, [moved, reach]);
-                    let least;
-                    (least, run.is_outside) =
-                        self.node_with_faces(parties, corner, from, kept.as_deref_mut(), &mut see);
-                    run.apart = moved + least;
+                    let source = FeatureSource::Listed(listed, [accumulated_motion, reach]);
+                    let lower_bound;
+                    (lower_bound, run.was_outside) =
+                        self.node_with_faces(search_sides, corner, source, clearances.as_deref_mut(), &mut visit);
+                    run.distance_bound = accumulated_motion + lower_bound;
                 }
             }
-            let reach = self.reach_of_edges();
-            for run in edges.iter_mut().filter(|run| run.apart - moved <= reach) {
-                let edge = run.number as usize;
-                let near = run.of(features);
-                let ends = &first.skin.edges[edge];
-                let other = |near: &Near| &second.skin.edges[near.feature as usize];
-                if !near.iter().any(|near| self.may_find_edges(ends, other(near))) {
+            let reach = self.edge_reach();
+            for run in edges
+                .iter_mut()
+                .filter(|run| run.distance_bound - accumulated_motion <= reach)
+            {
+                let edge = run.index as usize;
+                let listed = run.slice(features);
+                let ends = &first.surface.edges[edge];
+                let other = |candidate: &CandidateFeature| &second.surface.edges[candidate.feature as usize];
+                if !listed
+                    .iter()
+                    .any(|candidate| self.edges_need_test(ends, other(candidate)))
+                {
                     continue;
                 }
-                let from = From::Known(near, [moved, reach]);
-                run.apart = moved + self.edge_with_edges(edge, from, of_first.as_deref_mut(), &mut see);
+                let source = FeatureSource::Listed(listed, [accumulated_motion, reach]);
+                run.distance_bound = accumulated_motion
+                    + self.edge_with_edges(edge, source, first_clearances.as_deref_mut(), &mut visit);
             }
         } else {
-            self.nodes_with_faces([first, second], of_first.as_deref_mut(), &mut see);
-            if !self.is_of_one() {
-                self.nodes_with_faces([second, first], of_second, &mut see);
+            self.nodes_with_faces([first, second], first_clearances.as_deref_mut(), &mut visit);
+            if !self.is_self_contact() {
+                self.nodes_with_faces([second, first], second_clearances, &mut visit);
             }
-            for edge in 0..first.skin.edges.len() {
-                self.edge_with_edges(edge, From::Search, of_first.as_deref_mut(), &mut see);
+            for edge in 0..first.surface.edges.len() {
+                self.edge_with_edges(edge, FeatureSource::Search, first_clearances.as_deref_mut(), &mut visit);
             }
         }
-        if self.is_of_one() {
-            self.across_wounds(&mut see);
-            self.edges_across_wounds(&mut see);
+        if self.is_self_contact() {
+            self.report_wound_corners(&mut visit);
+            self.report_wound_edges(&mut visit);
         }
     }
 
-    /// Whether all that may meet now, as impulses have led the nodes, was found before they acted. Wounds turn as these lead them.
-    pub fn has_foreseen(&self) -> bool {
-        let strayed: f32 = self.parties.iter().map(|party| party.skin.strayed).sum();
-        let is_open = self.is_of_one() && self.parties[0].skin.wound().is_some_and(Wound::is_open);
-        !is_open && !self.have_bent() && strayed <= self.ahead
+    /// Returns true if the first search of the substep found all that impulses may make touch. Wounds change with the
+    /// motion and are never complete.
+    pub fn is_search_complete(&self) -> bool {
+        let max_deviation: f32 = self
+            .search_sides
+            .iter()
+            .map(|search_side| search_side.surface.max_deviation)
+            .sum();
+        let is_open = self.is_self_contact() && self.search_sides[0].surface.wound().is_some_and(Wound::is_open);
+        !is_open && !self.curvature_changed() && max_deviation <= self.speculative_margin
     }
 
-    /// Whether edges that met nothing, as they were flat, may meet now.
-    fn have_bent(&self) -> bool {
-        self.parties.iter().any(|party| party.skin.has_bent)
+    /// Returns true if the curvature was measured again, so that edges skipped as flat may touch now.
+    fn curvature_changed(&self) -> bool {
+        self.search_sides
+            .iter()
+            .any(|search_side| search_side.surface.was_remeasured)
     }
 
-    /// The same of two edges as [`Self::may_find`].
-    fn may_find_edges(&self, edge: &[u32], other: &[u32]) -> bool {
-        self.have_bent() || self.may_find(self.parties, edge, other)
+    /// Returns true if two edges need a test, like [`Self::needs_test`].
+    fn edges_need_test(&self, edge: &[u32], other: &[u32]) -> bool {
+        self.curvature_changed() || self.needs_test(self.search_sides, edge, other)
     }
 
-    /// Whether two features of these nodes may meet where the searches before it in the substep have not found that they do: impulses have led them
-    /// further than was looked.
-    fn may_find(&self, [a, b]: [Party; 2], nodes: &[u32], others: &[u32]) -> bool {
-        !self.again || a.skin.strayed_of(nodes) + b.skin.strayed_of(others) > self.ahead
+    /// Returns true if a search needs to test two features: it is the first of the substep, or impulses deflected them
+    /// beyond the margin.
+    fn needs_test(&self, [a, b]: [SearchSide; 2], nodes: &[u32], others: &[u32]) -> bool {
+        !self.is_repeated || a.surface.deviation_of(nodes) + b.surface.deviation_of(others) > self.speculative_margin
     }
 
-    /// How deep what lies within one of the bodies may be to be led out of it, m.
-    pub(super) fn depth_in(&self, party: Party) -> f32 {
-        if self.may_be_inside && party.skin.is_closed {
-            party.skin.depth()
+    /// Returns the maximum depth from which a node inside one of the bodies is pushed out, m.
+    pub(super) fn ejection_depth_in(&self, search_side: SearchSide) -> f32 {
+        if self.may_be_inside && search_side.surface.is_closed {
+            search_side.surface.ejection_depth()
         } else {
             0.0
         }
     }
 
-    pub(super) fn is_of_one(&self) -> bool {
-        self.parties[0].place == self.parties[1].place
+    pub(super) fn is_self_contact(&self) -> bool {
+        self.search_sides[0].body_index == self.search_sides[1].body_index
     }
 
-    /// Shows the triangles that a corner comes within `reach` of on its way through a box; those that are
-    /// seen there where they are to be found in images. Answers how far any of them is, m, at least, as `see` tells of each.
-    fn near_corner(
+    /// Calls `visit` with the triangles within `reach` of a corner's swept bounds, from candidates, images or trees.
+    /// `visit` returns the distance of a triangle. Returns the smallest one, m.
+    fn visit_near_corner(
         &self,
-        from: From,
-        skin: &Skin,
-        bounds: &Bounds,
+        source: FeatureSource,
+        surface: &CollisionSurface,
+        bounds: &Aabb,
         reach: f32,
-        mut see: impl FnMut(usize) -> f32,
+        mut visit: impl FnMut(usize) -> f32,
     ) -> f32 {
-        if let From::Known(triangles, [moved, reach]) = from {
-            return nearest_of(triangles, (moved, reach), |triangle| see(triangle as usize));
+        if let FeatureSource::Listed(triangles, [accumulated_motion, reach]) = source {
+            return visit_listed(triangles, (accumulated_motion, reach), |triangle| {
+                visit(triangle as usize)
+            });
         }
-        let mut least = f32::INFINITY;
-        let see = |triangle| least = least.min(see(triangle));
-        match &skin.images {
-            Some(images) if self.in_images => images.near(skin, bounds, reach, see),
-            _ => skin.near(bounds, reach, see),
+        let mut lower_bound = f32::INFINITY;
+        let visit = |triangle| lower_bound = lower_bound.min(visit(triangle));
+        match &surface.images {
+            Some(images) if self.uses_images => images.visit_near(surface, bounds, reach, visit),
+            _ => surface.visit_near(bounds, reach, visit),
         }
-        least
+        lower_bound
     }
 
-    /// How far a part of a surface keeps from another body, m.
-    fn radius_of(&self, kept: Option<&Clearances>, part: SurfaceFeature) -> f32 {
-        let allowed = kept.map_or(f32::INFINITY, |kept| kept.allowed(part));
-        let [first, second] = self.parties.map(|party| party.skin.least_thickness());
-        self.radius.min(allowed.max(first.min(second)))
+    /// Returns the distance that a feature keeps from the other body, m.
+    fn contact_radius(&self, clearances: Option<&Clearances>, feature: SurfaceFeature) -> f32 {
+        let allowed_distance = clearances.map_or(f32::INFINITY, |clearances| clearances.allowed_distance(feature));
+        let [first, second] = self.search_sides.map(|search_side| search_side.surface.min_thickness());
+        self.radius.min(allowed_distance.max(first.min(second)))
     }
 
-    /// Remembers how near to a part of a surface another body is where the step begins.
-    fn measure(&self, kept: Option<&mut Clearances>, part: SurfaceFeature, nearest: f32) {
-        if let Some(kept) = kept.filter(|_| nearest < self.radius) {
-            match self.measures {
-                Measure::Nothing => {}
-                Measure::Distances => kept.see(part, nearest),
-                Measure::Reductions => kept.reduce(part, nearest),
+    /// Records the distance of a feature from the other body at the start of the step.
+    fn update_clearance(&self, clearances: Option<&mut Clearances>, feature: SurfaceFeature, nearest: f32) {
+        if let Some(clearances) = clearances.filter(|_| nearest < self.radius) {
+            match self.clearance_update {
+                ClearanceUpdate::Nothing => {}
+                ClearanceUpdate::Distances => clearances.observe(feature, nearest),
+                ClearanceUpdate::Reductions => clearances.reduce(feature, nearest),
             }
         }
     }
 
     fn nodes_with_faces(
         &self,
-        parties: [Party; 2],
-        mut kept: Option<&mut Clearances>,
-        see: &mut impl FnMut(PairTouch),
+        search_sides: [SearchSide; 2],
+        mut clearances: Option<&mut Clearances>,
+        visit: &mut impl FnMut(FoundContact),
     ) {
-        for corner in 0..parties[0].skin.nodes.len() {
-            self.node_with_faces(parties, corner, From::Search, kept.as_deref_mut(), see);
+        for corner in 0..search_sides[0].surface.nodes.len() {
+            self.node_with_faces(
+                search_sides,
+                corner,
+                FeatureSource::Search,
+                clearances.as_deref_mut(),
+                visit,
+            );
         }
     }
 
-    /// Shows where a corner of the first surface meets the second: how far anything that it was compared with is from it at first, m, and whether it is
-    /// outside.
+    /// Reports the contacts of a corner of the first side with faces of the second. Returns a lower bound of its
+    /// distance at the start, m, and whether it is outside.
     fn node_with_faces(
         &self,
-        [of_nodes, of_faces]: [Party; 2],
+        [corner_side, face_side]: [SearchSide; 2],
         corner: usize,
-        from: From,
-        kept: Option<&mut Clearances>,
-        see: &mut impl FnMut(PairTouch),
+        source: FeatureSource,
+        clearances: Option<&mut Clearances>,
+        visit: &mut impl FnMut(FoundContact),
     ) -> (f32, bool) {
-        let shift = shift(of_nodes.skin, of_faces.skin);
-        let node = of_nodes.skin.nodes[corner];
-        let NodeWay { start: place, step } = of_nodes.skin.way(node, (shift, of_faces.skin.drift), self.dt);
-        let radius = self.radius_of(kept.as_deref(), SurfaceFeature::Corner(corner));
+        let shift = shift(corner_side.surface, face_side.surface);
+        let node = corner_side.surface.nodes[corner];
+        let NodeMotion {
+            start: position,
+            displacement,
+        } = corner_side
+            .surface
+            .relative_motion(node, (shift, face_side.surface.center_velocity), self.dt);
+        let radius = self.contact_radius(clearances.as_deref(), SurfaceFeature::Corner(corner));
         let segment = Segment {
-            ends: [place; 2],
-            steps: [step; 2],
+            ends: [position; 2],
+            steps: [displacement; 2],
             radius,
         };
-        let mut front = f32::INFINITY;
-        let mut touched: [Option<FeatureMet<usize>>; FACES] = [None; FACES];
-        // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
+        let mut front_distance = f32::INFINITY;
+        let mut closest: [Option<FeatureContact<usize>>; MAX_FACES] = [None; MAX_FACES];
+        // Distance of the nearest face of a closed surface and its height above it, and whether the corner is behind
+        // it.
         let mut nearest = (f32::INFINITY, 0.0_f32);
         let mut behind: Option<(usize, Separation)> = None;
-        let around = Bounds::of([place, place + step].map(Vec3::from).into_iter());
-        let is_solid = of_faces.skin.is_closed && !self.is_of_one();
-        let depth = self.depth_in(of_faces);
-        // Of a crushed solid a face may come from its inner side at what is outside. What lies flush on one may seem to by rounding.
-        let flush = of_nodes.skin.least_thickness().min(of_faces.skin.least_thickness());
+        let around = Aabb::of([position, position + displacement].map(Vec3::from).into_iter());
+        let is_solid = face_side.surface.is_closed && !self.is_self_contact();
+        let depth = self.ejection_depth_in(face_side);
+        // In crushed solids, a face may approach an outside corner with its inner side. Rounding may also put flush
+        // corners behind a face.
+        let flush = corner_side
+            .surface
+            .min_thickness()
+            .min(face_side.surface.min_thickness());
         let within_behind = if self.may_be_inside { f32::INFINITY } else { flush };
-        let reach = (self.radius + self.ahead).max(depth) + of_faces.skin.spread;
-        let far = match from {
-            From::Search => self.reach(),
-            From::Known(_, [_, reach]) => reach,
+        let reach = (self.radius + self.speculative_margin).max(depth) + face_side.surface.displacement_spread;
+        let max_distance = match source {
+            FeatureSource::Search => self.contact_reach(),
+            FeatureSource::Listed(_, [_, reach]) => reach,
         };
-        let near_it = self.worth_comparing(&segment, far);
+        let comparison = self.comparison_bounds(&segment, max_distance);
         let anywhere = |_: &Separation| true;
-        let least = self.near_corner(from, of_faces.skin, &around, reach, |triangle| {
-            let nodes = of_faces.skin.triangles[triangle];
-            if self.is_of_one() && (nodes.contains(&node) || of_faces.skin.are_of_wound([node; 2], &nodes)) {
+        let lower_bound = self.visit_near_corner(source, face_side.surface, &around, reach, |triangle| {
+            let nodes = face_side.surface.triangles[triangle];
+            if self.is_self_contact() && (nodes.contains(&node) || face_side.surface.are_in_wound([node; 2], &nodes)) {
                 return f32::INFINITY;
             }
-            let corners = of_faces.skin.corners(&nodes);
-            let (start, distance) = match self.separation(&corners, &segment, &near_it) {
+            let corners = face_side.surface.corners(&nodes);
+            let (start, distance) = match self.separation(&corners, &segment, &comparison) {
                 Ok(found) => found,
-                Err(apart) => return apart,
+                Err(lower_bound) => return lower_bound,
             };
-            if distance > far {
+            if distance > max_distance {
                 return distance;
             }
-            let height = if is_solid { height(&corners, &start) } else { 0.0 };
-            let is_before = !(height < 0.0 && distance <= within_behind);
-            if is_before {
-                front = front.min(distance);
+            let height = if is_solid { height_above(&corners, &start) } else { 0.0 };
+            let is_in_front = !(height < 0.0 && distance <= within_behind);
+            if is_in_front {
+                front_distance = front_distance.min(distance);
             }
-            let is_nearer =
-                distance < nearest.0 * (1.0 - SAME) || distance < nearest.0 * (1.0 + SAME) && height.abs() > nearest.1;
+            let is_nearer = distance < nearest.0 * (1.0 - EQUAL_DISTANCE)
+                || distance < nearest.0 * (1.0 + EQUAL_DISTANCE) && height.abs() > nearest.1;
             if is_solid && is_nearer {
                 nearest = (distance, height.abs());
-                behind = (!is_before).then_some((triangle, start));
+                behind = (!is_in_front).then_some((triangle, start));
             }
-            if self.may_find([of_nodes, of_faces], &[node], &nodes)
-                && let Some((found, is_ahead)) = self.approach(
-                    of_faces.skin,
+            if self.needs_test([corner_side, face_side], &[node], &nodes)
+                && let Some((found, is_speculative)) = self.first_contact(
+                    face_side.surface,
                     ([node; 2], &segment),
                     (&nodes, &corners),
                     start,
                     anywhere,
                 )
             {
-                keep_closest(&mut touched, (is_ahead, distance, triangle, found));
+                insert_closest(&mut closest, (is_speculative, distance, triangle, found));
             }
             distance
         });
-        // What was made within another is led out as far as its thickness asks for; what lies flush on it by rounding touches it.
-        let nearest_there = match behind {
-            Some(_) if self.measures == Measure::Reductions && nearest.0 > flush => f32::INFINITY,
+        // A corner created inside another body is pushed out by the full thickness. A flush corner touches.
+        let nearest_distance = match behind {
+            Some(_) if self.clearance_update == ClearanceUpdate::Reductions && nearest.0 > flush => f32::INFINITY,
             Some(_) => 0.0,
-            None => front,
+            None => front_distance,
         };
-        self.measure(kept, SurfaceFeature::Corner(corner), nearest_there);
-        // On the wrong side it is led out, or let out where it is deep.
+        self.update_clearance(clearances, SurfaceFeature::Corner(corner), nearest_distance);
+        // A corner on the wrong side is pushed out, or left alone if it is too deep.
         let is_behind = behind.is_some();
         if let Some((triangle, start)) = behind {
             let is_near = nearest.0 < self.radius.max(depth);
-            touched = [None; FACES];
-            touched[0] = is_near.then_some((false, nearest.0, triangle, (start, Clearance::of(radius))));
+            closest = [None; MAX_FACES];
+            closest[0] = is_near.then_some((false, nearest.0, triangle, (start, Clearance::of(radius))));
         }
         let side_of = |triangle: usize, found: &Separation| ContactSide {
-            body: of_faces.place,
-            nodes: of_faces.skin.triangles[triangle],
+            body: face_side.body_index,
+            nodes: face_side.surface.triangles[triangle],
             weights: found.weights,
         };
-        let place_of = |side: &ContactSide| side.weighted(|node| of_faces.skin.start(node));
-        let alike = if self.is_of_one() { SAME } else { ALIKE };
-        for place in 0..FACES {
-            let Some((is_ahead, _, triangle, (found, clearance))) = touched[place] else {
+        let position_of = |side: &ContactSide| side.weighted(|node| face_side.surface.start(node));
+        let similar = if self.is_self_contact() {
+            EQUAL_DISTANCE
+        } else {
+            SIMILAR
+        };
+        for slot in 0..MAX_FACES {
+            let Some((is_speculative, _, triangle, (found, clearance))) = closest[slot] else {
                 break;
             };
             let side = side_of(triangle, &found);
-            let is_alike = |(_, _, closer, (other, _)): &FeatureMet<usize>| {
-                let most = alike * found.offset.length();
-                (other.offset - found.offset).length() <= most
-                    && place_of(&side_of(*closer, other)).distance(place_of(&side)) <= most
+            let is_similar = |(_, _, closer, (other, _)): &FeatureContact<usize>| {
+                let max_difference = similar * found.offset.length();
+                (other.offset - found.offset).length() <= max_difference
+                    && position_of(&side_of(*closer, other)).distance(position_of(&side)) <= max_difference
             };
-            if touched[..place].iter().flatten().any(is_alike) {
+            if closest[..slot].iter().flatten().any(is_similar) {
                 continue;
             }
             let mut offset = Vec3::from(if is_behind { found.offset } else { -found.offset });
             if is_solid && offset == Vec3::ZERO {
-                offset = outwards(&of_faces.skin.corners(&side.nodes)).into();
+                offset = face_normal(&face_side.surface.corners(&side.nodes)).into();
             }
-            let sides = [ContactSide::of_node(of_nodes.place, node), side];
-            self.show(sides, (offset, is_ahead), (clearance, shift), see);
+            let sides = [ContactSide::of_node(corner_side.body_index, node), side];
+            self.report_contact(sides, (offset, is_speculative), (clearance, shift), visit);
         }
-        (least, !is_behind)
+        (lower_bound, !is_behind)
     }
 
-    /// The same of an edge of the first surface and edges of the second.
+    /// Reports the contacts of an edge of the first side with edges of the second. Returns a lower bound of its
+    /// distance at the start, m.
     fn edge_with_edges(
         &self,
         index: usize,
-        from: From,
-        kept: Option<&mut Clearances>,
-        see: &mut impl FnMut(PairTouch),
+        source: FeatureSource,
+        clearances: Option<&mut Clearances>,
+        visit: &mut impl FnMut(FoundContact),
     ) -> f32 {
-        let [first, second] = self.parties;
-        let shift = shift(first.skin, second.skin);
-        let edge = first.skin.edges[index];
-        if first.skin.pierces[index] || edge[0] == NONE {
+        let [first, second] = self.search_sides;
+        let shift = shift(first.surface, second.surface);
+        let edge = first.surface.edges[index];
+        if first.surface.is_crossing[index] || edge[0] == NONE {
             return f32::INFINITY;
         }
-        let ridge = first.skin.flatness.of(index);
-        let is_measured = self.is_measured(kept.as_deref(), index);
-        let ways = edge.map(|node| first.skin.way(node, (shift, second.skin.drift), self.dt));
+        let curvature = first.surface.edge_curvatures.get(index);
+        let is_measured = self.is_measured(clearances.as_deref(), index);
+        let motions = edge.map(|node| {
+            first
+                .surface
+                .relative_motion(node, (shift, second.surface.center_velocity), self.dt)
+        });
         let segment = Segment {
-            ends: ways.map(|way| way.start),
-            steps: ways.map(|way| way.step),
-            radius: self.radius_of(kept.as_deref(), SurfaceFeature::Edge(index)),
+            ends: motions.map(|motion| motion.start),
+            steps: motions.map(|motion| motion.displacement),
+            radius: self.contact_radius(clearances.as_deref(), SurfaceFeature::Edge(index)),
         };
-        let near_end = if self.is_of_one() {
+        let end_margin = if self.is_self_contact() {
             0.0
         } else {
-            NEAR_END * segment.radius
+            EDGE_END_MARGIN * segment.radius
         };
-        let far = self.reach_of_edges();
-        let way = Bounds::of(
-            ways.into_iter()
-                .flat_map(|way| [way.start(), (way.start + way.step).into()]),
+        let max_distance = self.edge_reach();
+        let motion = Aabb::of(
+            motions
+                .into_iter()
+                .flat_map(|motion| [motion.start(), (motion.start + motion.displacement).into()]),
         );
-        let near_it = self.worth_comparing(&segment, far);
-        let mut least = f32::INFINITY;
+        let comparison = self.comparison_bounds(&segment, max_distance);
+        let mut lower_bound = f32::INFINITY;
         let mut nearest = f32::INFINITY;
-        let mut touched: [Option<FeatureMet<[u32; 2]>>; EDGES] = [None; EDGES];
-        let mut see_edge = |number: u32| {
-            let Some((other, pierces, other_ridge)) = second.skin.edge(number) else {
+        let mut closest: [Option<FeatureContact<[u32; 2]>>; MAX_EDGES] = [None; MAX_EDGES];
+        let mut test_edge = |number: u32| {
+            let Some((other, is_crossing, other_curvature)) = second.surface.edge(number) else {
                 return f32::INFINITY;
             };
-            // Of what passes through tissue there is no telling which side it belongs to; it is near all the same.
-            let meets = !pierces && !ridge.is_flat_beside(&other_ridge, self.radius);
-            if !meets && !is_measured {
+            // The side of a crossing edge is unknown, so it cannot touch, but its distance counts.
+            let can_touch = !is_crossing && !curvature.is_flat_against(&other_curvature, self.radius);
+            if !can_touch && !is_measured {
                 return f32::INFINITY;
             }
-            if self.is_of_one()
+            if self.is_self_contact()
                 && (other <= edge
                     || other.iter().any(|node| edge.contains(node))
-                    || first.skin.are_of_wound(edge, &other))
+                    || first.surface.are_in_wound(edge, &other))
             {
                 return f32::INFINITY;
             }
-            let corners = second.skin.corners(&other);
-            let (from_start, start) = match self.separation(&corners, &segment, &near_it) {
+            let corners = second.surface.corners(&other);
+            let (start_separation, start_distance) = match self.separation(&corners, &segment, &comparison) {
                 Ok(found) => found,
-                Err(apart) => return apart,
+                Err(lower_bound) => return lower_bound,
             };
-            nearest = nearest.min(start);
-            if !meets || start > far || !self.may_find_edges(&edge, &other) {
-                return start;
+            nearest = nearest.min(start_distance);
+            if !can_touch || start_distance > max_distance || !self.edges_need_test(&edge, &other) {
+                return start_distance;
             }
-            // At an end of either it is a corner that meets.
+            // Near an end of either edge, the corner touches instead.
             let edges = [segment.ends[1] - segment.ends[0], corners.points[1] - corners.points[0]];
-            let is_across = |found: &Separation| found.is_across_beyond(near_end, edges);
-            let met = self.approach(second.skin, (edge, &segment), (&other, &corners), from_start, is_across);
-            if let Some((met, is_ahead)) = met
-                && !touched.iter().flatten().any(|(_, _, edge, _)| *edge == other)
+            let is_across = |found: &Separation| found.is_across_beyond(end_margin, edges);
+            let found = self.first_contact(
+                second.surface,
+                (edge, &segment),
+                (&other, &corners),
+                start_separation,
+                is_across,
+            );
+            if let Some((found, is_speculative)) = found
+                && !closest.iter().flatten().any(|(_, _, edge, _)| *edge == other)
             {
-                keep_closest(&mut touched, (is_ahead, start, other, met));
+                insert_closest(&mut closest, (is_speculative, start_distance, other, found));
             }
-            start
+            start_distance
         };
 
-        let reach = self.radius + self.ahead + second.skin.spread;
-        match &second.skin.images {
-            _ if let From::Known(others, of) = from => {
-                least = nearest_of(others, of.into(), see_edge);
+        let reach = self.radius + self.speculative_margin + second.surface.displacement_spread;
+        match &second.surface.images {
+            _ if let FeatureSource::Listed(others, accumulated) = source => {
+                lower_bound = visit_listed(others, accumulated.into(), test_edge);
             }
-            Some(images) if self.in_images => {
-                // The box about all of a long edge is mostly beside it.
+            Some(images) if self.uses_images => {
+                // The box of a long edge is mostly empty, so images are searched piece by piece.
                 let [from, to] = segment.ends;
-                let pieces = images.pieces((to - from).into());
+                let pieces = images.piece_count((to - from).into());
                 for piece in 0..pieces {
                     let shares = [piece, piece + 1].map(|end| end as f32 / pieces as f32);
-                    let places = shares
+                    let piece_ends = shares
                         .map(|share| segment.at(share).map(Vec3::from))
                         .into_iter()
                         .flatten();
-                    let (skin, around) = (second.skin, Bounds::of(places));
-                    images.near(skin, &around, reach, |triangle| {
-                        let edges = images.edges_near(skin, triangle, &around, reach);
-                        least = edges.into_iter().map(&mut see_edge).fold(least, f32::min);
+                    let (surface, around) = (second.surface, Aabb::of(piece_ends));
+                    images.visit_near(surface, &around, reach, |triangle| {
+                        let edges = images.edges_near(surface, triangle, &around, reach);
+                        lower_bound = edges.into_iter().map(&mut test_edge).fold(lower_bound, f32::min);
                     });
                 }
             }
             _ => {
-                let skin = second.skin;
-                skin.near(&way, reach, |triangle| {
-                    least = skin
-                        .owned(triangle)
+                let surface = second.surface;
+                surface.visit_near(&motion, reach, |triangle| {
+                    lower_bound = surface
+                        .owned_edges(triangle)
                         .into_iter()
-                        .map(&mut see_edge)
-                        .fold(least, f32::min);
+                        .map(&mut test_edge)
+                        .fold(lower_bound, f32::min);
                 });
             }
         }
-        self.measure(kept, SurfaceFeature::Edge(index), nearest);
-        for (is_ahead, _, other, (found, clearance)) in touched.into_iter().flatten() {
+        self.update_clearance(clearances, SurfaceFeature::Edge(index), nearest);
+        for (is_speculative, _, other, (found, clearance)) in closest.into_iter().flatten() {
             let sides = [
-                ContactSide::of_edge(first.place, edge, found.along),
+                ContactSide::of_edge(first.body_index, edge, found.along),
                 ContactSide {
-                    body: second.place,
+                    body: second.body_index,
                     nodes: [other[0], other[1], other[1]],
                     weights: found.weights,
                 },
             ];
-            self.show(sides, ((-found.offset).into(), is_ahead), (clearance, shift), see);
+            self.report_contact(
+                sides,
+                ((-found.offset).into(), is_speculative),
+                (clearance, shift),
+                visit,
+            );
         }
-        least
+        lower_bound
     }
 
-    /// How near the box about a part of a surface others are to be compared with it, m, and that box. Of other bodies how far they are is remembered for
-    /// the next substeps, so that it is worth knowing; of the same surface most moves too much for that, and only what its way leads near is compared.
-    fn worth_comparing(&self, segment: &Segment, far: f32) -> (f32, Extent) {
+    /// Returns the distance and bounds within which other features are compared with a segment, m. Distances to other
+    /// bodies are useful for later substeps. In self-contact most features move too much for that, so only swept bounds
+    /// count.
+    fn comparison_bounds(&self, segment: &Segment, max_distance: f32) -> (f32, Extent) {
         let Segment { ends, steps, .. } = segment;
-        if self.is_of_one() {
-            let way = [ends[0], ends[1], ends[0] + steps[0], ends[1] + steps[1]];
-            (self.radius + self.ahead, Extent::of(way.into_iter()))
+        if self.is_self_contact() {
+            let swept_points = [ends[0], ends[1], ends[0] + steps[0], ends[1] + steps[1]];
+            (
+                self.radius + self.speculative_margin,
+                Extent::of(swept_points.into_iter()),
+            )
         } else {
-            (far, Extent::of(ends.iter().copied()))
+            (max_distance, Extent::of(ends.iter().copied()))
         }
     }
 
-    /// Where a feature and a segment are closest as the substep begins, and how far apart, m; `Err`: how far at least, where their boxes are further apart
-    /// than is worth comparing.
+    /// Returns the closest points of a feature and a segment at the start of the substep, and their distance, m. If the
+    /// bounds are further apart than the comparison distance, the error is a lower bound of the distance.
     #[inline]
     fn separation(
         &self,
@@ -495,131 +568,141 @@ impl PairSearch<'_> {
         segment: &Segment,
         (within, around): &(f32, Extent),
     ) -> Result<(Separation, f32), f32> {
-        let others = if self.is_of_one() {
-            corners.way()
+        let other_bounds = if self.is_self_contact() {
+            corners.swept_bounds()
         } else {
             corners.bounds()
         };
-        let apart = around.distance_squared(&others);
-        if apart > within * within {
-            return Err(apart.sqrt());
+        let distance_squared = around.distance_squared(&other_bounds);
+        if distance_squared > within * within {
+            return Err(distance_squared.sqrt());
         }
         let start = corners.separation(segment, 0.0);
         Ok((start, start.offset.length()))
     }
 
-    /// Whether it counts how near others are to an edge that it does not meet.
-    fn is_measured(&self, kept: Option<&Clearances>, edge: usize) -> bool {
-        match self.measures {
-            Measure::Nothing => false,
-            Measure::Distances => kept.is_some_and(|kept| kept.allowed(SurfaceFeature::Edge(edge)) < f32::INFINITY),
-            Measure::Reductions => true,
+    /// Returns true if the distance of an edge is recorded even if it cannot touch.
+    fn is_measured(&self, clearances: Option<&Clearances>, edge: usize) -> bool {
+        match self.clearance_update {
+            ClearanceUpdate::Nothing => false,
+            ClearanceUpdate::Distances => clearances
+                .is_some_and(|clearances| clearances.allowed_distance(SurfaceFeature::Edge(edge)) < f32::INFINITY),
+            ClearanceUpdate::Reductions => true,
         }
     }
 
-    /// Where a node or an edge comes too close to a face or an edge, if it counts there: how far they keep apart, and whether it only comes near.
+    /// Returns the first contact of a node or edge with a face or edge that satisfies `is_counted`, its clearance, and
+    /// whether it is speculative.
     #[inline(always)]
-    fn approach(
+    fn first_contact(
         &self,
-        skin: &Skin,
+        surface: &CollisionSurface,
         (nodes, segment): ([u32; 2], &Segment),
         (others, corners): (&[u32], &Corners),
         start: Separation,
-        counts: impl Fn(&Separation) -> bool,
+        is_counted: impl Fn(&Separation) -> bool,
     ) -> Option<((Separation, Clearance), bool)> {
-        let (found, is_ahead) = corners.meet(start, segment, self.ahead)?;
-        let (whole, is_counted) = (Clearance::of(segment.radius), counts(&found));
-        // What a cut has parted may keep less apart, and so count.
-        if !is_counted && !skin.may_be_parted() {
+        let (found, is_speculative) = corners.first_contact(start, segment, self.speculative_margin)?;
+        let (full_clearance, counts_at_full) = (Clearance::of(segment.radius), is_counted(&found));
+        // A feature separated by a cut may keep a smaller distance, at which it counts.
+        if !counts_at_full && !surface.can_be_cut() {
             return None;
         }
-        let clearance = if self.is_of_one() {
-            skin.keeps(nodes, (others, found.weights), self.radius)?
+        let clearance = if self.is_self_contact() {
+            surface.clearance_between(nodes, (others, found.weights), self.radius)?
         } else {
-            whole
+            full_clearance
         };
-        // Without a thickness what a cut has parted keeps as far apart as all else does.
-        if clearance == whole {
-            return is_counted.then_some(((found, clearance), is_ahead));
+        // Without thickness, features separated by a cut keep the same distance as all others.
+        if clearance == full_clearance {
+            return counts_at_full.then_some(((found, clearance), is_speculative));
         }
-        // What was one place has no side yet.
+        // Features that still coincide have no side.
         let radius = clearance.radius;
-        if start.offset.length_squared() < (PARTED * radius) * (PARTED * radius) {
+        if start.offset.length_squared() < (COINCIDENT_DISTANCE * radius) * (COINCIDENT_DISTANCE * radius) {
             return None;
         }
         let segment = Segment { radius, ..*segment };
-        let (found, is_ahead) = corners.meet(start, &segment, self.ahead)?;
-        counts(&found).then_some(((found, clearance), is_ahead))
+        let (found, is_speculative) = corners.first_contact(start, &segment, self.speculative_margin)?;
+        is_counted(&found).then_some(((found, clearance), is_speculative))
     }
 
-    /// Shows what meets in this direction, or only comes near, of sides that keep so far apart, and in coordinates so far apart.
-    pub(super) fn show(
+    /// Calls `visit` with a contact in the direction of `offset`. `shift` leads between the coordinates of the sides.
+    pub(super) fn report_contact(
         &self,
         sides: [ContactSide; 2],
-        (offset, is_ahead): (Vec3, bool),
+        (offset, is_speculative): (Vec3, bool),
         (clearance, shift): (Clearance, Vec3),
-        see: &mut impl FnMut(PairTouch),
+        visit: &mut impl FnMut(FoundContact),
     ) {
         if let Some(normal) = offset.try_normalize() {
-            let apart = self.apart(&sides, shift);
-            see(PairTouch {
+            let offset = self.offset_between(&sides, shift);
+            visit(FoundContact {
                 sides,
                 normal,
-                gap: apart.dot(normal) - clearance.radius,
-                is_parted: clearance.is_parted,
-                is_ahead,
+                gap: offset.dot(normal) - clearance.radius,
+                is_cut_apart: clearance.is_cut_apart,
+                is_speculative,
             });
         }
     }
 
-    /// From the second side to the first when the step begins.
-    fn apart(&self, sides: &[ContactSide; 2], shift: Vec3) -> Vec3 {
+    /// Returns the vector from the second side to the first at the start of the step.
+    fn offset_between(&self, sides: &[ContactSide; 2], shift: Vec3) -> Vec3 {
         let [first, second] = [0, 1].map(|index| {
-            let party = if self.parties[0].place == sides[index].body {
-                self.parties[0]
+            let search_side = if self.search_sides[0].body_index == sides[index].body {
+                self.search_sides[0]
             } else {
-                self.parties[1]
+                self.search_sides[1]
             };
-            sides[index].weighted(|node| party.skin.start(node))
+            sides[index].weighted(|node| search_side.surface.start(node))
         });
         first + shift - second
     }
 }
 
-/// Shows those features that may be within `reach` after bodies have moved so far, m, and remembers how far they are: how far any is, at least.
-fn nearest_of(all: &mut [Near], (moved, reach): (f32, f32), mut see: impl FnMut(u32) -> f32) -> f32 {
-    let mut least = f32::INFINITY;
-    for near in all {
-        if near.apart - moved <= reach {
-            near.apart = moved + see(near.feature);
+/// Calls `visit` with the candidates that may be within `reach` after the accumulated motion, m, and stores their
+/// distances. Returns a lower bound of all distances.
+fn visit_listed(
+    all: &mut [CandidateFeature],
+    (accumulated_motion, reach): (f32, f32),
+    mut visit: impl FnMut(u32) -> f32,
+) -> f32 {
+    let mut lower_bound = f32::INFINITY;
+    for candidate in all {
+        if candidate.distance_bound - accumulated_motion <= reach {
+            candidate.distance_bound = accumulated_motion + visit(candidate.feature);
         }
-        least = least.min(near.apart - moved);
+        lower_bound = lower_bound.min(candidate.distance_bound - accumulated_motion);
     }
-    least
+    lower_bound
 }
 
-/// Has what is met be among the closest, if it is one of them: what comes near after what meets.
-fn keep_closest<Feature: Copy + PartialOrd>(closest: &mut [Option<FeatureMet<Feature>>], met: FeatureMet<Feature>) {
-    let order = |(is_ahead, distance, feature, _): FeatureMet<Feature>| (is_ahead, distance, feature);
-    let is_closer = |known: FeatureMet<Feature>| order(met) < order(known);
-    if let Some(place) = closest.iter().position(|known| known.is_none_or(is_closer)) {
-        closest[place..].rotate_right(1);
-        closest[place] = Some(met);
+/// Inserts a contact into the closest ones. Speculative contacts come last.
+fn insert_closest<Feature: Copy + PartialOrd>(
+    closest: &mut [Option<FeatureContact<Feature>>],
+    met: FeatureContact<Feature>,
+) {
+    let order = |(is_speculative, distance, feature, _): FeatureContact<Feature>| (is_speculative, distance, feature);
+    let is_closer = |other: FeatureContact<Feature>| order(met) < order(other);
+    if let Some(slot) = closest.iter().position(|other| other.is_none_or(is_closer)) {
+        closest[slot..].rotate_right(1);
+        closest[slot] = Some(met);
     }
 }
 
-/// How far above a face what is compared with it begins, m; below 0 on its inner side.
-fn height(face: &Corners, start: &Separation) -> f32 {
-    -start.offset.dot(outwards(face))
+/// Returns the height of a point above a face at the start of the substep, m; negative on its inner side.
+fn height_above(face: &Corners, start: &Separation) -> f32 {
+    -start.offset.dot(face_normal(face))
 }
 
-/// The normal of a face as the substep begins.
-fn outwards(face: &Corners) -> Vec3A {
+/// Returns the normal of a face at the start of the substep.
+fn face_normal(face: &Corners) -> Vec3A {
     let [a, b, c] = face.points;
     (b - a).cross(c - a).normalize_or_zero()
 }
 
-/// From the coordinates of one body to those of another.
-pub(super) fn shift(from: &Skin, to: &Skin) -> Vec3 {
+/// Returns the vector that leads from the coordinates of one body to those of another.
+pub(super) fn shift(from: &CollisionSurface, to: &CollisionSurface) -> Vec3 {
     (from.origin - to.origin).as_vec3()
 }

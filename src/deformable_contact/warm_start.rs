@@ -1,212 +1,236 @@
-//! Contacts begin a substep with the impulses of the one before, and a step with those that the last one ended with (warm starting, Catto 2005):
-//! what rests on something is pressed as it was, and few sweeps correct that.
+//! Warm start of contacts (Catto 2005). A substep begins with the impulses of the one before, and a step with those of
+//! the last step, so a resting body needs few sweeps.
 //!
-//! Impulses that no longer fit could add energy. So a substep takes as much of them as lowers the dual energy most, which is a quadratic of that
-//! share. It takes none where any would raise it, and kinetic energy never grows.
+//! Impulses that no longer fit could add energy. The dual energy is quadratic in the fraction of them that is applied,
+//! so a substep uses the fraction that minimizes it. It uses none if any would raise it, and kinetic energy never
+//! grows.
 
 use glam::Vec3;
 
-use super::link::{Key, Link};
-use super::skin::Skin;
+use super::collision_surface::CollisionSurface;
+use super::pair_contact::{ContactKey, PairContact};
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
 
-/// A substep takes so many times as much as the first of a step gave, at most: a step of VERLET begins with half a kick. Later ones take no more than
-/// the one before: where contacts push against each other, impulses would grow without end.
-const AFTER_FIRST: f32 = 2.0;
+/// Maximum fraction after the first substep of a step, which is half a kick with VERLET. In later substeps it is 1.
+/// Otherwise opposing contacts would let impulses grow without limit.
+const MAX_FRACTION_AFTER_HALF_KICK: f32 = 2.0;
 
-/// One of so many contacts that there is room for presses at most; what others gave is not recalled.
-pub(super) const PRESSING: usize = 3;
+/// Number of contacts per contact that presses, for the capacity. Impulses beyond the capacity are not kept.
+pub(super) const CONTACTS_PER_PRESSING: usize = 3;
 
-/// A contact takes up what one with a face beside its own gave if the cosine between their normals is more.
-const BESIDE: f32 = 0.99;
+/// Minimum cosine between the normals of a contact and a neighboring one whose impulse it takes over.
+const MIN_COSINE: f32 = 0.99;
 
-/// What a contact gave in the last substep, N s.
+/// Impulses of a contact in the last substep, N s.
 #[derive(Clone, Copy, Debug)]
 struct WarmStart {
-    key: Key,
+    key: ContactKey,
     impulse: f32,
     friction: Vec3,
-    /// From the second side to the first.
+    /// Unit vector from the second side to the first.
     normal: Vec3,
-    /// Whether a contact of the substep in progress has begun with it.
-    is_recalled: bool,
+    /// True if a contact of the substep in progress uses it.
+    is_restored: bool,
 }
 
-saved! { WarmStart { key, impulse, friction, normal, is_recalled } }
+saved! { WarmStart { key, impulse, friction, normal, is_restored } }
 
 impl WarmStart {
-    fn recall(&mut self, link: &mut Link) {
-        self.is_recalled = true;
-        link.recall(self.impulse, self.friction);
+    fn restore(&mut self, contact: &mut PairContact) {
+        self.is_restored = true;
+        contact.set_impulses(self.impulse, self.friction);
     }
 }
 
-/// The impulses of earlier substeps, in the order of their sides.
+/// Impulses of earlier substeps, sorted by the sides of contacts.
 #[derive(Debug, Default)]
-pub(crate) struct Pushes {
-    /// Those of the last substep of the island whose turn it is.
-    last: Vec<WarmStart>,
-    /// Those that the last step ended with.
-    settled: Vec<WarmStart>,
-    /// Those that the step in progress ends with, of islands that have taken it.
-    next: Vec<WarmStart>,
-    /// How many substeps of its step that island has taken, and whether it goes on with what the last step gave.
+pub(crate) struct WarmStartCache {
+    /// Impulses of the last substep of the current island.
+    previous: Vec<WarmStart>,
+    /// Impulses at the end of the last step.
+    committed: Vec<WarmStart>,
+    /// Impulses at the end of the step in progress, of islands that are done.
+    pending: Vec<WarmStart>,
+    /// Number of substeps that the current island has taken, and whether it continues with the impulses of the last
+    /// step.
     substeps: u32,
-    recalls: bool,
+    restores: bool,
 }
 
-saved! { Pushes { last, settled, next, substeps, recalls } }
+saved! { WarmStartCache { previous, committed, pending, substeps, restores } }
 
-impl Pushes {
-    /// Makes room for those of so many contacts, of which few press at once.
+impl WarmStartCache {
+    /// Reserves memory for this number of contacts, of which few press at once.
     pub(super) fn reserve(&mut self, contacts: usize) -> Result<()> {
-        let count = contacts / PRESSING;
-        let mut all = [&mut self.last, &mut self.settled, &mut self.next].into_iter();
-        all.try_for_each(|pushes| memory::reserve_in_steps(pushes, count))
+        let count = contacts / CONTACTS_PER_PRESSING;
+        let mut buffers = [&mut self.previous, &mut self.committed, &mut self.pending].into_iter();
+        buffers.try_for_each(|entries| memory::reserve_in_steps(entries, count))
     }
 
-    /// A step begins, or is begun again.
+    /// Begins or restarts a step.
     pub fn begin(&mut self) {
-        self.next.clear();
+        self.pending.clear();
     }
 
-    /// The bodies at these places begin a step, with what the last one ended with if that is to be recalled.
-    pub(super) fn begin_island(&mut self, members: &[u32], recalls: bool) {
-        self.last.clear();
-        (self.substeps, self.recalls) = (0, recalls);
-        if recalls {
-            let settled = settled(&self.settled, members);
-            self.last.extend(settled);
+    /// Begins the step of an island, with the impulses of the last step if `restores`.
+    pub(super) fn begin_island(&mut self, members: &[u32], restores: bool) {
+        self.previous.clear();
+        (self.substeps, self.restores) = (0, restores);
+        if restores {
+            let committed = committed(&self.committed, members);
+            self.previous.extend(committed);
         }
-        self.last.iter_mut().for_each(|push| push.is_recalled = false);
-        self.last.sort_unstable_by_key(|push| push.key);
+        self.previous.iter_mut().for_each(|entry| entry.is_restored = false);
+        self.previous.sort_unstable_by_key(|entry| entry.key);
     }
 
-    /// Takes up what contacts of a substep have given, as far as there is room.
-    pub(super) fn keep(&mut self, links: &[Link]) {
+    /// Stores the impulses of a substep. Those beyond the capacity are dropped.
+    pub(super) fn store(&mut self, pair_contacts: &[PairContact]) {
         self.substeps = self.substeps.saturating_add(1);
-        self.last.clear();
-        let room = self.last.capacity();
-        let pressing = links.iter().filter(|link| link.presses()).take(room);
-        self.last.extend(pressing.map(|link| {
-            let (impulse, friction) = link.impulses();
+        self.previous.clear();
+        let free_slots = self.previous.capacity();
+        let pressing = pair_contacts
+            .iter()
+            .filter(|contact| contact.is_pressing())
+            .take(free_slots);
+        self.previous.extend(pressing.map(|contact| {
+            let (impulse, friction) = contact.impulses();
             WarmStart {
-                key: link.key(),
+                key: contact.key(),
                 impulse,
                 friction,
-                normal: link.normal,
-                is_recalled: false,
+                normal: contact.normal,
+                is_restored: false,
             }
         }));
-        self.last.sort_unstable_by_key(|push| push.key);
+        self.previous.sort_unstable_by_key(|entry| entry.key);
     }
 
-    /// The island whose turn it is has ended its step.
+    /// Ends the step of the current island.
     pub(super) fn end_island(&mut self) {
-        let room = self.next.capacity() - self.next.len();
-        self.next.extend(self.last.iter().take(room));
+        let free_slots = self.pending.capacity() - self.pending.len();
+        self.pending.extend(self.previous.iter().take(free_slots));
     }
 
-    /// The step is taken.
+    /// Commits the step.
     pub fn commit(&mut self) {
-        std::mem::swap(&mut self.settled, &mut self.next);
-        self.settled.sort_unstable_by_key(|push| push.key);
-        self.next.clear();
+        std::mem::swap(&mut self.committed, &mut self.pending);
+        self.committed.sort_unstable_by_key(|entry| entry.key);
+        self.pending.clear();
     }
 
-    /// How many times as much as the last substep this one takes at most.
-    pub(super) fn most(&self) -> f32 {
-        if self.recalls && self.substeps == 1 {
-            AFTER_FIRST
+    /// Returns the maximum fraction of the previous impulses that this substep applies.
+    pub(super) fn max_fraction(&self) -> f32 {
+        if self.restores && self.substeps == 1 {
+            MAX_FRACTION_AFTER_HALF_KICK
         } else {
             1.0
         }
     }
 
-    /// A body is gone.
-    pub(super) fn leave(&mut self, place: usize) {
-        self.settled.retain(|push| push.key.iter().all(|side| side.0 != place));
+    /// Removes a body that was destroyed.
+    pub(super) fn remove_body(&mut self, body_index: usize) {
+        self.committed
+            .retain(|entry| entry.key.iter().all(|side| side.0 != body_index));
     }
 
-    /// The sides of contacts of these bodies that pressed as the last step ended, and what they gave along their normals, N s.
-    pub(super) fn settled<'a>(&'a self, members: &'a [u32]) -> impl Iterator<Item = (Key, f32)> + 'a {
-        settled(&self.settled, members).map(|push| (push.key, push.impulse))
+    /// Returns the sides of these bodies' contacts at the end of the last step, and their normal impulses, N s.
+    pub(super) fn committed<'a>(&'a self, members: &'a [u32]) -> impl Iterator<Item = (ContactKey, f32)> + 'a {
+        committed(&self.committed, members).map(|entry| (entry.key, entry.impulse))
     }
 
-    /// Has a new contact recall what it gave.
-    pub(super) fn recall(&mut self, link: &mut Link) {
-        let key = link.key();
-        if let Ok(place) = self.last.binary_search_by_key(&key, |push| push.key) {
-            self.last[place].recall(link);
+    /// Sets the impulses of a new contact to its previous ones.
+    pub(super) fn restore(&mut self, contact: &mut PairContact) {
+        let key = contact.key();
+        if let Ok(slot) = self.previous.binary_search_by_key(&key, |entry| entry.key) {
+            self.previous[slot].restore(contact);
         }
     }
 
-    /// Has new contacts of corners that recalled nothing take up what no other has: which of faces that hold a corner alike meets it may change.
-    pub(super) fn recall_beside(&mut self, links: &mut [Link]) {
-        for link in links.iter_mut().filter(|link| !link.presses()) {
-            let [(body, nodes), (other, others)] = link.key();
+    /// Sets the impulses of new corner contacts without previous ones to unused ones of a neighboring face. Which of
+    /// several similar faces a corner touches may change.
+    pub(super) fn restore_from_neighbors(&mut self, pair_contacts: &mut [PairContact]) {
+        for contact in pair_contacts.iter_mut().filter(|contact| !contact.is_pressing()) {
+            let [(body, nodes), (other, others)] = contact.key();
             if nodes[0] != nodes[2] {
                 continue;
             }
-            let first = self.last.partition_point(|push| push.key[0] < (body, nodes));
-            let of_corner = self.last[first..].iter_mut();
-            let mut of_corner = of_corner.take_while(|push| push.key[0] == (body, nodes));
-            let beside = of_corner.find(|push| {
-                let (pushed, corners) = push.key[1];
-                let shares = pushed == other && corners.iter().any(|node| others.contains(node));
-                shares && !push.is_recalled && push.normal.dot(link.normal) > BESIDE
+            let first = self.previous.partition_point(|entry| entry.key[0] < (body, nodes));
+            let entries_of_corner = self.previous[first..].iter_mut();
+            let mut entries_of_corner = entries_of_corner.take_while(|entry| entry.key[0] == (body, nodes));
+            let neighbor = entries_of_corner.find(|entry| {
+                let (other_body, corners) = entry.key[1];
+                let shares_corner = other_body == other && corners.iter().any(|node| others.contains(node));
+                shares_corner && !entry.is_restored && entry.normal.dot(contact.normal) > MIN_COSINE
             });
-            if let Some(push) = beside {
-                push.recall(link);
+            if let Some(entry) = neighbor {
+                entry.restore(contact);
             }
         }
     }
 
     pub fn hash(&self, hasher: &mut StateHasher) {
-        for push in &self.settled {
-            for (body, nodes) in push.key {
+        for entry in &self.committed {
+            for (body, nodes) in entry.key {
                 hasher.write_u64(body as u64);
                 nodes.into_iter().for_each(|node| hasher.write_u64(u64::from(node)));
             }
-            hasher.write_floats(&[push.impulse]);
-            hasher.write_vectors([push.friction, push.normal]);
+            hasher.write_floats(&[entry.impulse]);
+            hasher.write_vectors([entry.friction, entry.normal]);
         }
     }
 }
 
-/// What contacts gave whose first side is of one of these bodies, of what all did in order.
-fn settled<'a>(all: &'a [WarmStart], members: &'a [u32]) -> impl Iterator<Item = &'a WarmStart> {
-    members.iter().map(|&place| place as usize).flat_map(|place| {
-        let first = all.partition_point(|push| push.key[0].0 < place);
-        all[first..].iter().take_while(move |push| push.key[0].0 == place)
-    })
+/// Returns the impulses of contacts whose first side is on one of these bodies.
+fn committed<'a>(all: &'a [WarmStart], members: &'a [u32]) -> impl Iterator<Item = &'a WarmStart> {
+    members
+        .iter()
+        .map(|&body_index| body_index as usize)
+        .flat_map(|body_index| {
+            let first = all.partition_point(|entry| entry.key[0].0 < body_index);
+            all[first..]
+                .iter()
+                .take_while(move |entry| entry.key[0].0 == body_index)
+        })
 }
 
-/// Gives nodes what new contacts recall, or the best share of it up to `most`: the fastest that one makes its sides by that, m/s.
-pub(super) fn give_again(links: &mut [Link], most: f32, skins: &mut [Option<Skin>]) -> f32 {
-    let pressing = |links: &[Link]| links.iter().any(Link::presses);
-    if !pressing(links) {
+/// Applies the warm start of new contacts to nodes, or the best fraction up to `max_fraction`. Returns the largest
+/// change of velocity, m/s.
+pub(super) fn apply_warm_start(
+    pair_contacts: &mut [PairContact],
+    max_fraction: f32,
+    surfaces: &mut [Option<CollisionSurface>],
+) -> f32 {
+    let any_pressing = |pair_contacts: &[PairContact]| pair_contacts.iter().any(PairContact::is_pressing);
+    if !any_pressing(pair_contacts) {
         return 0.0;
     }
-    let works = |links: &[Link], skins: &[Option<Skin>]| {
-        let works = links.iter().filter(|link| link.presses()).map(|link| link.work(skins));
-        works.fold([0.0; 2], |[all, allowed], [work, free]| [all + work, allowed + free])
+    let total_works = |pair_contacts: &[PairContact], surfaces: &[Option<CollisionSurface>]| {
+        let total_works = pair_contacts
+            .iter()
+            .filter(|contact| contact.is_pressing())
+            .map(|contact| contact.work(surfaces));
+        total_works.fold([0.0; 2], |[total_work, allowed_work], [work, gap_work]| {
+            [total_work + work, allowed_work + gap_work]
+        })
     };
-    let [before, allowed] = works(links, skins);
-    links.iter().for_each(|link| link.give_share(1.0, skins));
-    let [after, _] = works(links, skins);
-    let (slope, curvature) = (before - allowed, after - before);
-    let share = if curvature > 0.0 {
-        (-slope / curvature).clamp(0.0, most)
+    let [work_before, allowed_work] = total_works(pair_contacts, surfaces);
+    pair_contacts
+        .iter()
+        .for_each(|contact| contact.apply_fraction(1.0, surfaces));
+    let [work_after, _] = total_works(pair_contacts, surfaces);
+    let (slope, curvature) = (work_before - allowed_work, work_after - work_before);
+    let fraction = if curvature > 0.0 {
+        (-slope / curvature).clamp(0.0, max_fraction)
     } else {
         0.0
     };
-    let mut fastest = 0.0_f32;
-    for link in links.iter_mut().filter(|link| link.presses()) {
-        link.give_share(share - 1.0, skins);
-        link.scale(share);
-        fastest = fastest.max(link.speed());
+    let mut max_change = 0.0_f32;
+    for contact in pair_contacts.iter_mut().filter(|contact| contact.is_pressing()) {
+        contact.apply_fraction(fraction - 1.0, surfaces);
+        contact.scale_warm_start(fraction);
+        max_change = max_change.max(contact.velocity_change());
     }
-    fastest
+    max_change
 }

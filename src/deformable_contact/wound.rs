@@ -1,71 +1,73 @@
-//! The two sides of a cut through a solid: faces that lie in one place when they are bared, and are to meet from then on without a thickness.
+//! Contact between the two sides of a cut through a solid. Their faces coincide after the cut and then collide without
+//! thickness.
 //!
-//! What lies in one place has no distance to tell the sides by. Their faces do: tissue is behind them. So a corner of one side is to stay
-//! before the faces of the other that look at it, at no distance at all: nothing is pushed apart when it is cut, and a wound that closes is as
-//! it was before it was cut.
+//! The distance of coincident faces does not identify their sides, but their normals do. A corner of one side must stay
+//! in front of the opposing faces of the other, at distance 0. A cut thus pushes nothing apart, and a closed wound
+//! behaves like uncut tissue.
 
 use glam::{Vec3, Vec3A};
 
-use super::link::ContactSide;
-use super::search::{PairSearch, PairTouch};
-use super::skin::{Clearance, NONE, NodeWay, Skin};
+use super::collision_surface::{Clearance, CollisionSurface, NONE, NodeMotion};
+use super::pair_contact::ContactSide;
+use super::search::{FoundContact, PairSearch};
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::contact::sweep::{Corners, Segment, Separation};
-use crate::geometry::Bounds;
+use crate::contact::time_of_impact::{Corners, Segment, Separation};
+use crate::geometry::Aabb;
 use crate::soa::Vectors;
 use crate::solver::System;
 
-/// Edges meet that both look across the gap by this much at least, as the cosine of an angle.
-const SQUARELY: f32 = 0.5;
+/// Minimum cosine of the angle between an edge's normal and the direction across the gap, for contact of edges.
+const MIN_FACING: f32 = 0.5;
 
-/// Then they do not look the same way: the cosine of the angle between where they look is no more than this.
-const ONE_WAY: f32 = 1.0 - 2.0 * SQUARELY * SQUARELY;
+/// Maximum cosine of the angle between the normals of two such edges.
+const MAX_ALIGNMENT: f32 = 1.0 - 2.0 * MIN_FACING * MIN_FACING;
 
-/// A corner is behind a face where it is no deeper than this part of a short edge, and no deeper than what is bared is large there: what many
-/// cuts have left in crumbs would else be compared with all others.
-const DEPTH: f32 = 1.0;
+/// Maximum depth of a corner behind a face, as a fraction of a short edge. The size of the exposed faces also limits
+/// it, because many cuts leave small pieces, which would be compared with all others.
+const MAX_DEPTH: f32 = 1.0;
 
-/// The border of a wound holds corners that are beside it and behind it by no more than this part of a short edge: at first they lie on it.
-const BORDER: f32 = 0.05;
+/// Width of the border, as a fraction of a short edge. Corners beside or behind a border by no more than this touch it,
+/// since they initially lie on it.
+const BORDER_WIDTH: f32 = 0.05;
 
-/// What was behind a face at first, within so many times that depth, belongs to it.
-const BELONGS: f32 = 4.0;
+/// Factor on that depth within which a corner that was initially behind a face belongs to the same tissue.
+const ORIGINAL_DEPTH: f32 = 4.0;
 
-/// Two that were further apart at first than this part of the least thickness were not parted by a cut: what lies between is tissue.
-const APART: f32 = 0.1;
+/// Minimum initial distance, as a fraction of the minimum thickness, of edges that no cut separated.
+const MIN_INITIAL_GAP: f32 = 0.1;
 
-/// How deep behind a face is nothing yet, as a part of the least thickness.
-const NOTHING: f32 = 0.01;
+/// Depth behind a face that counts as rounding, as a fraction of the minimum thickness.
+const MIN_DEPTH: f32 = 0.01;
 
-/// What cuts have bared of a solid's surface.
+/// Surface of a solid that cuts exposed.
 #[derive(Debug)]
 pub(super) struct Wound {
-    /// The bared triangles, and by their numbers whether they are.
+    /// Exposed triangles, and a flag for each triangle.
     faces: Vec<u32>,
-    is_bared: Vec<bool>,
-    /// Their corners, and by their numbers whether they are.
+    is_exposed: Vec<bool>,
+    /// Their corners, and a flag for each node.
     nodes: Vec<u32>,
     is_corner: Vec<bool>,
-    /// Which way is out at each, the sum of its bared triangles.
+    /// Sum of the exposed triangles' normals at each node.
     normals: Vectors,
-    /// How long the longest edge of these is, m.
+    /// Longest edge of the exposed triangles at each node, m.
     longest: Vec<f32>,
 }
 
-saved! { Wound { faces, is_bared, nodes, is_corner, normals, longest } }
+saved! { Wound { faces, is_exposed, nodes, is_corner, normals, longest } }
 
 impl Wound {
-    /// None yet, of a body with so many triangles.
+    /// Creates an empty wound for a body with this number of triangles.
     pub fn new(body: &System, triangles: usize) -> Result<Self> {
         let spare = body.spare_nodes();
-        let mut is_bared = memory::reserved(triangles + 2 * spare)?;
-        is_bared.resize(triangles, false);
+        let mut is_exposed = memory::reserved(triangles + 2 * spare)?;
+        is_exposed.resize(triangles, false);
         let mut is_corner = memory::reserved(body.node_count() + spare)?;
         is_corner.resize(body.node_count(), false);
         Ok(Self {
             faces: memory::reserved(2 * spare)?,
-            is_bared,
+            is_exposed,
             nodes: memory::reserved(spare)?,
             is_corner,
             normals: body.zeros()?,
@@ -73,21 +75,21 @@ impl Wound {
         })
     }
 
-    /// Makes room for so many triangles more, and so many that are bared.
-    pub fn reserve(&mut self, triangles: usize, bared: usize) -> Result<()> {
-        self.is_bared.try_reserve(triangles)?;
-        self.faces.try_reserve(bared)?;
-        Ok(self.nodes.try_reserve(3 * bared)?)
+    /// Reserves memory for this number of additional and of exposed triangles.
+    pub fn reserve(&mut self, triangles: usize, exposed: usize) -> Result<()> {
+        self.is_exposed.try_reserve(triangles)?;
+        self.faces.try_reserve(exposed)?;
+        Ok(self.nodes.try_reserve(3 * exposed)?)
     }
 
-    /// These triangles are bared, of those that there are now, with so many nodes.
-    pub fn bare(&mut self, bared: &[u32], triangles: &[[u32; 3]], node_count: usize) {
-        self.is_bared.resize(triangles.len(), false);
+    /// Adds exposed triangles.
+    pub fn expose(&mut self, exposed: &[u32], triangles: &[[u32; 3]], node_count: usize) {
+        self.is_exposed.resize(triangles.len(), false);
         self.is_corner.resize(node_count.max(self.is_corner.len()), false);
         self.normals.grow(node_count);
         self.longest.resize(node_count.max(self.longest.len()), 0.0);
-        for &triangle in bared {
-            if !std::mem::replace(&mut self.is_bared[triangle as usize], true) {
+        for &triangle in exposed {
+            if !std::mem::replace(&mut self.is_exposed[triangle as usize], true) {
                 self.faces.push(triangle);
             }
             for corner in triangles[triangle as usize] {
@@ -98,8 +100,8 @@ impl Wound {
         }
     }
 
-    /// Finds which way is out, with nodes where they start.
-    pub fn turn(&mut self, triangles: &[[u32; 3]], start: impl Fn(u32) -> Vec3) {
+    /// Computes normals from positions at the start of a substep.
+    pub fn update_normals(&mut self, triangles: &[[u32; 3]], start: impl Fn(u32) -> Vec3) {
         for &node in &self.nodes {
             self.normals.set(node as usize, Vec3::ZERO);
             self.longest[node as usize] = 0.0;
@@ -117,222 +119,232 @@ impl Wound {
         }
     }
 
-    /// Whether anything is bared.
+    /// Returns true if any triangle is exposed.
     pub fn is_open(&self) -> bool {
         !self.faces.is_empty()
     }
 
-    /// Whether a triangle is bared.
-    pub fn is_bared(&self, triangle: usize) -> bool {
-        self.is_bared[triangle]
+    /// Returns true if a triangle is exposed.
+    pub fn is_exposed(&self, triangle: usize) -> bool {
+        self.is_exposed[triangle]
     }
 
-    /// Whether all these are corners of what was bared.
-    pub fn has(&self, mut numbers: impl Iterator<Item = u32>) -> bool {
-        numbers.all(|number| self.is_corner[number as usize])
+    /// Returns true if all these nodes are corners of exposed triangles.
+    pub fn contains(&self, mut nodes: impl Iterator<Item = u32>) -> bool {
+        nodes.all(|node| self.is_corner[node as usize])
     }
 }
 
 impl PairSearch<'_> {
-    /// Shows the corners of a wound that come behind faces of its other side.
-    pub fn across_wounds(&self, see: &mut impl FnMut(PairTouch)) {
-        let party = self.parties[0];
-        let skin = party.skin;
-        let Some(wound) = skin.wound().filter(|_| self.is_of_one()) else {
+    /// Reports exposed corners behind faces of the other side.
+    pub fn report_wound_corners(&self, visit: &mut impl FnMut(FoundContact)) {
+        let search_side = self.search_sides[0];
+        let surface = search_side.surface;
+        let Some(wound) = surface.wound().filter(|_| self.is_self_contact()) else {
             return;
         };
         for &node in &wound.nodes {
-            let border = skin.wound_border();
-            let depth = (DEPTH * skin.short).min(wound.longest[node as usize]).max(border);
+            let border = surface.wound_border();
+            let depth = (MAX_DEPTH * surface.short_edge)
+                .min(wound.longest[node as usize])
+                .max(border);
             let outward = wound.normals.get(node as usize);
-            let NodeWay { start, step } = skin.own_way(node);
-            let [start, end] = [start, start + step].map(Vec3::from);
-            let around = Bounds::of([start, end].into_iter());
-            let mut nearest: Option<((bool, f32), Over, usize, Vec3)> = None;
-            // How far a face may be from what it is to have behind it or before it.
+            let NodeMotion { start, displacement } = surface.node_motion(node);
+            let [start, end] = [start, start + displacement].map(Vec3::from);
+            let around = Aabb::of([start, end].into_iter());
+            let mut nearest: Option<((bool, f32), FaceProjection, usize, Vec3)> = None;
+            // Maximum distance of a face to consider.
             let mut reach = depth;
-            skin.forest.nearest(&around, depth + skin.spread, |triangle| {
-                let nodes = skin.triangles[triangle];
-                let further = |reach: f32| reach + skin.least_thickness() + skin.spread;
-                if !wound.is_bared(triangle) || nodes.contains(&node) {
-                    return further(reach);
-                }
-                let places = skin.corners(&nodes).at(1.0).map(Vec3::from);
-                let across = normal(places);
-                let height = across.dot(end - places[0]);
-                let is_far = height * height > reach * reach * across.length_squared();
-                if is_far || !(across.dot(outward) < 0.0) {
-                    return further(reach);
-                }
-                let normal = across.normalize_or_zero();
-                let over = Over::new(end, places, normal);
-                let is_beside = over.beside > skin.least_thickness();
-                let within = if is_beside { border } else { depth };
-                // What lies on a face counts before what is beside one.
-                let key = (is_beside, over.height.abs());
-                if over.height.abs() < within
-                    && over.beside < border
-                    && nearest.is_none_or(|(least, ..)| key < least)
-                    && !skin.was_behind(node, nodes, BELONGS * depth)
-                {
-                    nearest = Some((key, over, triangle, normal));
-                    if !is_beside {
-                        reach = over.height.abs();
+            surface
+                .forest
+                .nearest(&around, depth + surface.displacement_spread, |triangle| {
+                    let nodes = surface.triangles[triangle];
+                    let search_distance = |reach: f32| reach + surface.min_thickness() + surface.displacement_spread;
+                    if !wound.is_exposed(triangle) || nodes.contains(&node) {
+                        return search_distance(reach);
                     }
-                }
-                further(reach)
-            });
-            if let Some((_, over, triangle, normal)) = nearest
-                && over.height < -NOTHING * skin.least_thickness()
+                    let positions = surface.corners(&nodes).at(1.0).map(Vec3::from);
+                    let face_normal = normal(positions);
+                    let height = face_normal.dot(end - positions[0]);
+                    let is_too_far = height * height > reach * reach * face_normal.length_squared();
+                    if is_too_far || !(face_normal.dot(outward) < 0.0) {
+                        return search_distance(reach);
+                    }
+                    let normal = face_normal.normalize_or_zero();
+                    let projection = FaceProjection::new(end, positions, normal);
+                    let is_lateral = projection.lateral > surface.min_thickness();
+                    let within = if is_lateral { border } else { depth };
+                    // Faces with the corner above or below come first.
+                    let key = (is_lateral, projection.height.abs());
+                    if projection.height.abs() < within
+                        && projection.lateral < border
+                        && nearest.is_none_or(|(best, ..)| key < best)
+                        && !surface.was_initially_behind(node, nodes, ORIGINAL_DEPTH * depth)
+                    {
+                        nearest = Some((key, projection, triangle, normal));
+                        if !is_lateral {
+                            reach = projection.height.abs();
+                        }
+                    }
+                    search_distance(reach)
+                });
+            if let Some((_, projection, triangle, normal)) = nearest
+                && projection.height < -MIN_DEPTH * surface.min_thickness()
             {
                 let sides = [
-                    ContactSide::of_node(party.place, node),
+                    ContactSide::of_node(search_side.body_index, node),
                     ContactSide {
-                        body: party.place,
-                        nodes: skin.triangles[triangle],
-                        weights: over.weights,
+                        body: search_side.body_index,
+                        nodes: surface.triangles[triangle],
+                        weights: projection.weights,
                     },
                 ];
-                self.show(sides, (normal, false), (Clearance::of(0.0), Vec3::ZERO), see);
+                self.report_contact(sides, (normal, false), (Clearance::of(0.0), Vec3::ZERO), visit);
             }
         }
     }
 }
 
 impl PairSearch<'_> {
-    /// Shows the edges of a wound that pass behind edges of its other side.
-    pub fn edges_across_wounds(&self, see: &mut impl FnMut(PairTouch)) {
-        let party = self.parties[0];
-        let skin = party.skin;
-        let Some(wound) = skin.wound().filter(|wound| !wound.faces.is_empty()) else {
+    /// Reports exposed edges that pass behind edges of the other side.
+    pub fn report_wound_edges(&self, visit: &mut impl FnMut(FoundContact)) {
+        let search_side = self.search_sides[0];
+        let surface = search_side.surface;
+        let Some(wound) = surface.wound().filter(|wound| !wound.faces.is_empty()) else {
             return;
         };
-        let border = skin.wound_border();
+        let border = surface.wound_border();
         let outward = |[a, b]: [u32; 2]| wound.normals.get(a as usize) + wound.normals.get(b as usize);
-        for &edge in &skin.edges {
-            if edge[0] == NONE || !wound.has(edge.into_iter()) {
+        for &edge in &surface.edges {
+            if edge[0] == NONE || !wound.contains(edge.into_iter()) {
                 continue;
             }
-            let ways = edge.map(|node| skin.own_way(node));
-            let segment = Segment::still(ways.map(|way| way.start + way.step));
-            let around = Bounds::of(segment.ends.into_iter().map(Vec3::from));
+            let motions = edge.map(|node| surface.node_motion(node));
+            let segment = Segment::still(motions.map(|motion| motion.start + motion.displacement));
+            let around = Aabb::of(segment.ends.into_iter().map(Vec3::from));
             let within = around.extended(border);
-            let away = outward(edge);
+            let edge_normal = outward(edge);
             let mut deepest: Option<(f32, [u32; 2], Separation, Vec3)> = None;
-            skin.near(&around, border + skin.spread, |triangle| {
-                for other in skin.owned(triangle).into_iter().filter(|&other| other != NONE) {
-                    let other = skin.edges[other as usize];
-                    let is_other = other > edge && !other.iter().any(|node| edge.contains(node));
-                    if !(is_other && wound.has(other.into_iter())) {
+            surface.visit_near(&around, border + surface.displacement_spread, |triangle| {
+                for other in surface.owned_edges(triangle).into_iter().filter(|&other| other != NONE) {
+                    let other = surface.edges[other as usize];
+                    let is_candidate = other > edge && !other.iter().any(|node| edge.contains(node));
+                    if !(is_candidate && wound.contains(other.into_iter())) {
                         continue;
                     }
-                    let mut corners = skin.corners(&other);
+                    let mut corners = surface.corners(&other);
                     corners.points = corners.at(1.0);
                     corners.steps = [Vec3A::ZERO; 3];
-                    // Most of what is near a long edge's box is not near the edge: what is easily told is told first.
-                    let out = outward(other);
-                    let along = out.dot(away);
-                    let of_both = out.length_squared() * away.length_squared();
-                    let look_one_way = along > 0.0 && along * along > ONE_WAY * ONE_WAY * of_both;
-                    if look_one_way
-                        || !Bounds::of(corners.points[..2].iter().map(|&point| point.into())).overlaps(&within)
+                    // Cheap tests come first, because most edges near a long edge's box are not near the edge.
+                    let other_normal = outward(other);
+                    let alignment = other_normal.dot(edge_normal);
+                    let squared_lengths = other_normal.length_squared() * edge_normal.length_squared();
+                    let face_same_side =
+                        alignment > 0.0 && alignment * alignment > MAX_ALIGNMENT * MAX_ALIGNMENT * squared_lengths;
+                    if face_same_side
+                        || !Aabb::of(corners.points[..2].iter().map(|&point| point.into())).overlaps(&within)
                     {
                         continue;
                     }
-                    let found = corners.separation(&segment, 0.0);
-                    let is_inside = found.inside && found.along > 0.0 && found.along < 1.0;
-                    let depth = found.offset.length();
-                    if !is_inside || depth > border || depth < NOTHING * skin.least_thickness() {
+                    let separation = corners.separation(&segment, 0.0);
+                    let is_inside = separation.inside && separation.along > 0.0 && separation.along < 1.0;
+                    let depth = separation.offset.length();
+                    if !is_inside || depth > border || depth < MIN_DEPTH * surface.min_thickness() {
                         continue;
                     }
-                    // From the first edge to the other is out of the other, where the first is behind it.
-                    let normal = Vec3::from(found.offset) / depth;
-                    let looks = |along: Vec3| normal.dot(along.normalize_or_zero());
-                    let is_behind = looks(out) > SQUARELY && looks(away) < -SQUARELY;
-                    let is_deeper = |most: f32, known: [u32; 2]| depth > most || depth == most && other < known;
+                    // The normal leads from the first edge to the other, which is outward from the other if the first
+                    // is behind it.
+                    let normal = Vec3::from(separation.offset) / depth;
+                    let facing = |along: Vec3| normal.dot(along.normalize_or_zero());
+                    let is_behind = facing(other_normal) > MIN_FACING && facing(edge_normal) < -MIN_FACING;
+                    let is_deeper = |max_depth: f32, known_edge: [u32; 2]| {
+                        depth > max_depth || depth == max_depth && other < known_edge
+                    };
                     if is_behind
-                        && deepest.is_none_or(|(most, known, ..)| is_deeper(most, known))
-                        && !skin.were_apart(edge, other, normal)
+                        && deepest.is_none_or(|(max_depth, known_edge, ..)| is_deeper(max_depth, known_edge))
+                        && !surface.were_initially_apart(edge, other, normal)
                     {
-                        deepest = Some((depth, other, found, normal));
+                        deepest = Some((depth, other, separation, normal));
                     }
                 }
             });
-            if let Some((_, other, found, normal)) = deepest {
+            if let Some((_, other, separation, normal)) = deepest {
                 let sides = [
-                    ContactSide::of_edge(party.place, edge, found.along),
+                    ContactSide::of_edge(search_side.body_index, edge, separation.along),
                     ContactSide {
-                        body: party.place,
+                        body: search_side.body_index,
                         nodes: [other[0], other[1], other[1]],
-                        weights: found.weights,
+                        weights: separation.weights,
                     },
                 ];
-                self.show(sides, (normal, false), (Clearance::of(0.0), Vec3::ZERO), see);
+                self.report_contact(sides, (normal, false), (Clearance::of(0.0), Vec3::ZERO), visit);
             }
         }
     }
 }
 
-impl Skin {
-    /// How far beside the border of a wound, or behind it, corners and edges are held by it, m.
+impl CollisionSurface {
+    /// Returns the width of a wound's border, m.
     pub fn wound_border(&self) -> f32 {
-        BORDER * self.short
+        BORDER_WIDTH * self.short_edge
     }
 
-    /// Whether two edges of the same body were apart at first along a direction from the one to the other: the tissue between them is their own, as
-    /// in a thin wedge between two cuts.
-    fn were_apart(&self, edge: [u32; 2], other: [u32; 2], along: Vec3) -> bool {
-        self.firsts.as_ref().is_some_and(|firsts| {
-            let at = |number: u32| Vec3A::from(firsts.get(number as usize));
+    /// Returns true if two edges of the body were initially apart along a direction. The tissue between them is then
+    /// their own, as in a thin wedge between two cuts.
+    fn were_initially_apart(&self, edge: [u32; 2], other: [u32; 2], along: Vec3) -> bool {
+        self.initial_positions.as_ref().is_some_and(|initial_positions| {
+            let at = |node: u32| Vec3A::from(initial_positions.get(node as usize));
             let separation = Corners::still(other.into_iter().map(at)).separation(&Segment::still(edge.map(at)), 0.0);
-            separation.offset.dot(along.into()) > APART * self.least_thickness()
+            separation.offset.dot(along.into()) > MIN_INITIAL_GAP * self.min_thickness()
         })
     }
 
-    /// Whether a number was behind a triangle of the same body at first, as near as this, m: the tissue behind it is its own.
-    fn was_behind(&self, number: u32, triangle: [u32; 3], near: f32) -> bool {
-        self.firsts.as_ref().is_some_and(|firsts| {
-            let at = |number: u32| firsts.get(number as usize);
-            let places = triangle.map(at);
-            let normal = normal(places).normalize_or_zero();
-            let from = at(number) - places[0];
-            let separation = separation(at(number), places);
-            from.dot(normal) < -APART * self.least_thickness() && separation.0.length_squared() < near * near
+    /// Returns true if a node was initially behind a triangle within `max_distance`, m. The tissue behind the triangle
+    /// is then its own.
+    fn was_initially_behind(&self, node: u32, triangle: [u32; 3], max_distance: f32) -> bool {
+        self.initial_positions.as_ref().is_some_and(|initial_positions| {
+            let at = |node: u32| initial_positions.get(node as usize);
+            let positions = triangle.map(at);
+            let normal = normal(positions).normalize_or_zero();
+            let from = at(node) - positions[0];
+            let separation = separation(at(node), positions);
+            from.dot(normal) < -MIN_INITIAL_GAP * self.min_thickness()
+                && separation.0.length_squared() < max_distance * max_distance
         })
     }
 }
 
-/// Where a point is, as a triangle sees it.
+/// Position of a point relative to a triangle.
 #[derive(Clone, Copy)]
-struct Over {
-    /// How far above it, m.
+struct FaceProjection {
+    /// Height above the triangle, m.
     height: f32,
-    /// How far beside it, m.
-    beside: f32,
-    /// The triangle's closest point.
+    /// Lateral distance from the triangle, m.
+    lateral: f32,
+    /// Weights of the closest point of the triangle.
     weights: [f32; 3],
 }
 
-impl Over {
+impl FaceProjection {
     fn new(point: Vec3, triangle: [Vec3; 3], normal: Vec3) -> Self {
         let (offset, weights) = separation(point, triangle);
         let height = offset.dot(normal);
         Self {
             height,
-            beside: (offset - normal * height).length(),
+            lateral: (offset - normal * height).length(),
             weights,
         }
     }
 }
 
-/// From the closest point of a triangle to a point, and the parts of its corners in it.
+/// Returns the vector from the closest point of a triangle to a point, and the weights of that closest point.
 fn separation(point: Vec3, triangle: [Vec3; 3]) -> (Vec3, [f32; 3]) {
     let corners = Corners::still(triangle.into_iter().map(Vec3A::from));
-    let found = corners.separation(&Segment::still([point.into(); 2]), 0.0);
-    ((-found.offset).into(), found.weights)
+    let separation = corners.separation(&Segment::still([point.into(); 2]), 0.0);
+    ((-separation.offset).into(), separation.weights)
 }
 
-/// As long as twice the area.
+/// Returns the normal with twice the area as its length.
 fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
     (b - a).cross(c - a)
 }

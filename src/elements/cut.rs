@@ -1,197 +1,201 @@
-//! Tetrahedra that a cut parts: pieces of them, which are as they were at rest, of other nodes and with parts of the volume.
+//! Element topology after a cut: pieces of tetrahedra with the source's rest shape, other nodes, and fractions of its
+//! volume.
 //!
-//! A piece that keeps its nodes stays where it is. Others go to parts that come later, which have room for so many nodes that none has to be
-//! moved when more come.
+//! A piece that keeps its nodes keeps its storage. Other pieces go to additional parts. These reserve nodes for all
+//! tetrahedra that they can hold, so that adding pieces moves no data.
 
 use glam::{DMat3, DVec3};
 
-use super::parts::{Copy, FemPart, in_group};
+use super::parts::{FemPart, NodeCopy, group_and_lane};
 use super::tetrahedra::{GROUP, Group, TetrahedronGroups};
-use super::{Deformed, Elements, Load, Rest, Sums};
+use super::{DeformedTet, Elements, RestTet, Sums, TetStress};
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::soa::{Masses, PerNode, Rates, TILE, Vectors, tile_count};
-use crate::springs::{Springs, rates_anywhere};
+use crate::soa::{FrequencyBound, NodalMasses, PerNode, TILE, Vectors, tile_count};
+use crate::springs::{Springs, spring_rates};
 
-/// The groups of a part that comes later.
-const GROUPS: usize = 32;
+/// The number of groups of a part that a cut adds.
+const CUT_PART_GROUPS: usize = 32;
 
-/// The tetrahedra of a part that comes later, and its nodes at most.
-const LATER: usize = GROUPS * GROUP;
-const NODES: usize = 4 * LATER;
+/// The capacity of a part that a cut adds, in tetrahedra and in nodes.
+const CUT_PART_SIZE: usize = CUT_PART_GROUPS * GROUP;
+const CUT_PART_NODES: usize = 4 * CUT_PART_SIZE;
 
-/// Where a tetrahedron is.
+/// The storage location of a tetrahedron.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct TetrahedronPlace {
+pub(super) struct TetrahedronIndex {
     pub part: u32,
     pub group: u16,
     pub lane: u16,
 }
 
-saved! { TetrahedronPlace { part, group, lane } }
+saved! { TetrahedronIndex { part, group, lane } }
 
-/// What bodies that may be cut know of their tetrahedra.
+/// The locations of the tetrahedra of a body that can be cut.
 #[derive(Debug)]
-pub(super) struct Cells {
-    /// Where each is, in the order in which they were given, and then that of cuts.
-    places: Vec<TetrahedronPlace>,
-    /// How many are in the last part that came later.
+pub(super) struct CellIndices {
+    /// The location of each tetrahedron: the original ones in the caller's order, then those of cuts.
+    indices: Vec<TetrahedronIndex>,
+    /// The number of tetrahedra in the last part that a cut has added.
     used: usize,
-    /// Parts that are to come.
+    /// Parts reserved for the next cuts.
     spare: Vec<FemPart>,
 }
 
-saved! { Cells { places, used, spare } }
+saved! { CellIndices { indices, used, spare } }
 
-/// A piece of a tetrahedron, in the body's own numbers of nodes.
+/// A piece of a tetrahedron, with nodes in the body's internal indices.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PieceOfElement {
-    /// The tetrahedron: its source, or a new one.
+pub(crate) struct ElementPiece {
+    /// The index of the piece: that of its source, or a new one.
     pub cell: u32,
     pub source: u32,
     pub nodes: [u32; 4],
-    /// Its part of the volume, above 0.
+    /// The fraction of the source's volume, above 0.
     pub part: f32,
 }
 
-impl TetrahedronPlace {
+impl TetrahedronIndex {
     pub const NONE: Self = Self {
         part: 0,
         group: 0,
         lane: 0,
     };
 
-    fn in_part(self) -> [usize; 2] {
+    fn group_and_lane_of(self) -> [usize; 2] {
         [self.group, self.lane].map(usize::from)
     }
 }
 
-impl PieceOfElement {
+impl ElementPiece {
     fn is_copy(&self) -> bool {
         self.cell != self.source
     }
 }
 
-/// A tetrahedron that goes elsewhere.
-struct Moved {
+/// A tetrahedron to be stored elsewhere.
+struct RelocatedTet {
     nodes: [u32; 4],
     inverse: [f32; 6],
     volume: f32,
-    from: TetrahedronPlace,
+    from: TetrahedronIndex,
 }
 
 impl Elements {
-    /// Remembers where tetrahedra are that were given in this order.
+    /// Enables cuts: records the locations of the tetrahedra, which are in the order of creation.
     pub fn follow_cells(&mut self, tetrahedra: &[[u32; 4]]) -> Result<()> {
-        let places = super::parts::places(tetrahedra)?;
-        self.cells = Some(memory::boxed(Cells {
-            places,
-            used: LATER,
+        let indices = super::parts::indices(tetrahedra)?;
+        self.cells = Some(memory::boxed(CellIndices {
+            indices,
+            used: CUT_PART_SIZE,
             spare: Vec::new(),
         })?);
         Ok(())
     }
 
-    /// Makes room for so many nodes in all.
+    /// Reserves memory for `count` nodes in all.
     pub fn reserve_nodes(&mut self, count: usize) -> Result<()> {
-        for values in [&mut self.stiffnesses, &mut self.carried] {
+        for values in [&mut self.stiffnesses, &mut self.node_rates] {
             memory::reserve(values, count)?;
         }
-        if let Some(rings) = &mut self.rings {
-            memory::reserve(&mut rings.volumes, count)?;
-            self.offsets.make_room(rings.volumes.len(), count)?;
+        if let Some(nodal_volumes) = &mut self.nodal_volumes {
+            memory::reserve(&mut nodal_volumes.volumes, count)?;
+            self.pressure_offsets.resize(nodal_volumes.volumes.len(), count)?;
             self.forces.pressures.reserve_nodes(count)?;
-            if let Some(memory) = &mut self.memory {
-                memory.reserve_rings(count)?;
+            if let Some(history) = &mut self.history {
+                history.reserve_nodal(count)?;
             }
         }
         Ok(())
     }
 
-    /// Makes room for these pieces, copies of sources in the order of their numbers, in a body of so many nodes then, and in sums beside these.
+    /// Reserves memory for these pieces, with copies in the order of their indices, for `node_count` nodes in all.
+    /// Also reserves memory in `other_sums`.
     pub fn reserve_pieces(
         &mut self,
-        pieces: &[PieceOfElement],
+        pieces: &[ElementPiece],
         node_count: usize,
-        beside: Option<&mut Sums>,
+        other_sums: Option<&mut Sums>,
     ) -> Result<()> {
         let Some(cells) = &mut self.cells else {
             return Ok(());
         };
         let copies = pieces.iter().filter(|piece| piece.is_copy()).count();
-        cells.places.try_reserve(copies)?;
-        // All of them may have to go elsewhere.
-        let more = pieces.len().saturating_sub(LATER - cells.used).div_ceil(LATER);
-        while cells.spare.len() < more {
+        cells.indices.try_reserve(copies)?;
+        // In the worst case every piece moves to another part.
+        let added_parts = pieces
+            .len()
+            .saturating_sub(CUT_PART_SIZE - cells.used)
+            .div_ceil(CUT_PART_SIZE);
+        while cells.spare.len() < added_parts {
             let part = FemPart {
-                groups: TetrahedronGroups::new(memory::filled(Group::EMPTY, GROUPS)?, NODES),
-                nodes: memory::reserved(NODES)?,
-                is_later: true,
+                groups: TetrahedronGroups::new(memory::filled(Group::EMPTY, CUT_PART_GROUPS)?, CUT_PART_NODES),
+                nodes: memory::reserved(CUT_PART_NODES)?,
+                is_from_cut: true,
             };
             memory::push(&mut cells.spare, part)?;
         }
-        self.parts.try_reserve(more)?;
-        self.starts.try_reserve(more)?;
-        let ring_count = if self.rings.is_some() { node_count } else { 0 };
-        for sums in std::iter::once(&mut self.forces).chain(beside) {
-            sums.reserve(more * NODES, more, ring_count)?;
+        self.parts.try_reserve(added_parts)?;
+        self.starts.try_reserve(added_parts)?;
+        let pressure_count = if self.nodal_volumes.is_some() { node_count } else { 0 };
+        for sums in std::iter::once(&mut self.forces).chain(other_sums) {
+            sums.reserve(added_parts * CUT_PART_NODES, added_parts, pressure_count)?;
         }
-        if let Some(memory) = &mut self.memory {
-            memory.reserve_parts(more, GROUPS)?;
+        if let Some(history) = &mut self.history {
+            history.reserve_parts(added_parts, CUT_PART_GROUPS)?;
         }
         self.reserve_nodes(node_count)?;
         let Some(cells) = &self.cells else {
             return Ok(());
         };
         self.copies.reserve(tile_count(node_count), pieces)?;
-        // The solvers make room for as many.
-        self.count = self.count.max(cells.places.len() + copies);
+        // The solvers reserve memory for this number.
+        self.count = self.count.max(cells.indices.len() + copies);
         Ok(())
     }
 
-    /// Parts tetrahedra into pieces, for which there is room.
-    pub fn rewire(&mut self, pieces: &[PieceOfElement], node_count: usize, mut beside: Option<&mut Sums>) {
+    /// Replaces tetrahedra by their pieces, within the reserved memory.
+    pub fn rewire(&mut self, pieces: &[ElementPiece], node_count: usize, mut other_sums: Option<&mut Sums>) {
         self.stiffnesses.resize(node_count, 0.0);
-        self.carried.resize(node_count, 0.0);
-        self.grow_rings(node_count, beside.as_deref_mut());
-        // Sources change once their copies are made.
+        self.node_rates.resize(node_count, 0.0);
+        self.grow_nodal_pressures(node_count, other_sums.as_deref_mut());
+        // A source changes after its copies are created.
         for piece in pieces.iter().filter(|piece| piece.is_copy()) {
-            let moved = self.moved(piece);
-            let place = self.put(moved, &mut beside);
+            let relocated = self.relocated(piece);
+            let index = self.append(relocated, &mut other_sums);
             if let Some(cells) = &mut self.cells {
-                cells.places.push(place);
+                cells.indices.push(index);
             }
         }
         for piece in pieces.iter().filter(|piece| !piece.is_copy()) {
-            let moved = self.moved(piece);
-            let [group, lane] = moved.from.in_part();
-            let of = &mut self.parts[moved.from.part as usize];
-            if of.nodes_of(group, lane) == piece.nodes {
-                of.groups.set_volume([group, lane], moved.volume);
+            let relocated = self.relocated(piece);
+            let [group, lane] = relocated.from.group_and_lane_of();
+            let part = &mut self.parts[relocated.from.part as usize];
+            if part.corner_nodes(group, lane) == piece.nodes {
+                part.groups.set_volume([group, lane], relocated.volume);
                 continue;
             }
-            of.groups.remove(group, lane);
-            let place = self.put(moved, &mut beside);
+            part.groups.remove(group, lane);
+            let index = self.append(relocated, &mut other_sums);
             if let Some(cells) = &mut self.cells {
-                cells.places[piece.cell as usize] = place;
+                cells.indices[piece.cell as usize] = index;
             }
         }
     }
 
-    /// The force of these tetrahedra on a node of them, N.
+    /// The force of these tetrahedra on one of their nodes, N.
     pub fn force_at(&self, node: u32, cells: impl Iterator<Item = u32>, positions: &Vectors) -> DVec3 {
         let law = self.stiffened();
         let mut force = DVec3::ZERO;
         for cell in cells {
-            let Some((corners, rest, place)) = self.cell(cell) else {
+            let Some((corners, rest, index)) = self.cell(cell) else {
                 continue;
             };
             let [a, b, c, d] = corners.map(|corner| positions.get(corner as usize).as_dvec3());
-            let load = self
-                .memory
-                .as_ref()
-                .map_or(Load::NONE, |memory| memory.load(place.part as usize, place.in_part()));
-            let deformed = Deformed::new(law, &rest, DMat3::from_cols(b - a, c - a, d - a)).loaded(load);
+            let extra = self.history.as_ref().map_or(TetStress::ZERO, |history| {
+                history.extra_stress(index.part as usize, index.group_and_lane_of())
+            });
+            let deformed = DeformedTet::new(law, &rest, DMat3::from_cols(b - a, c - a, d - a)).with_extra_stress(extra);
             for (corner, gradient) in corners.into_iter().zip(rest.gradients()) {
                 if corner == node {
                     force += deformed.force(gradient);
@@ -201,82 +205,94 @@ impl Elements {
         force
     }
 
-    /// What [`Self::find_rates`] finds, where it has been found, after a cut has changed the tetrahedra, springs or masses of these nodes, given
-    /// the cells at each.
+    /// Updates the bounds of [`Self::find_rates`] after a cut has changed the tetrahedra, springs or masses of these
+    /// nodes. `cells_at` returns the tetrahedra around a node.
     pub fn find_rates_at<Cells: Iterator<Item = u32>>(
         &mut self,
         nodes: &[u32],
         cells_at: impl Fn(u32) -> Cells,
         springs: &dyn Springs,
-        masses: &Masses,
+        masses: &NodalMasses,
     ) {
-        let whole = f64::from(self.law.whole());
+        let p_wave_modulus = f64::from(self.law.p_wave_modulus());
         for &node in nodes {
-            let (mut stiffness, mut carried) = (0.0, 0.0);
+            let (mut stiffness, mut corner_stiffness) = (0.0, 0.0);
             for (corners, rest, _) in cells_at(node).filter_map(|cell| self.cell(cell)) {
                 let free = corners.map(|corner| masses.inverse(corner as usize) > 0.0);
-                let carried_there = super::rates::carried(self.law, &rest, free);
-                for ((corner, gradient), more) in corners.into_iter().zip(rest.gradients()).zip(carried_there) {
+                let element_stiffnesses = super::rates::corner_stiffness(self.law, &rest, free);
+                for ((corner, gradient), element_stiffness) in
+                    corners.into_iter().zip(rest.gradients()).zip(element_stiffnesses)
+                {
                     if corner == node {
-                        stiffness += rest.volume * whole * gradient.length_squared();
-                        carried += more;
+                        stiffness += rest.volume * p_wave_modulus * gradient.length_squared();
+                        corner_stiffness += element_stiffness;
                     }
                 }
             }
             self.stiffnesses[node as usize] = stiffness as f32;
-            let of_springs = rates_anywhere(node as usize, springs, masses).unwrap_or(Rates::ZERO);
-            self.most_damped = self.most_damped.max(of_springs.most_damped);
-            self.carried[node as usize] = carried as f32 * masses.inverse(node as usize) + self.beyond_all(of_springs);
+            let spring_rates = spring_rates(node as usize, springs, masses).unwrap_or(FrequencyBound::ZERO);
+            self.damping_rate = self.damping_rate.max(spring_rates.damping_rate);
+            self.node_rates[node as usize] =
+                corner_stiffness as f32 * masses.inverse(node as usize) + self.rate_beyond_shared(spring_rates);
         }
         for &node in nodes {
             for cell in cells_at(node) {
-                if let Some((corners, _, place)) = self.cell(cell) {
-                    let rates = corners.map(|corner| self.carried[corner as usize]);
+                if let Some((corners, _, index)) = self.cell(cell) {
+                    let rates = corners.map(|corner| self.node_rates[corner as usize]);
                     let rate = rates.into_iter().fold(0.0, f32::max);
-                    self.parts[place.part as usize].groups.set_rate(place.in_part(), rate);
+                    self.parts[index.part as usize]
+                        .groups
+                        .set_rate(index.group_and_lane_of(), rate);
                 }
             }
         }
     }
 
-    /// What a node carries of a tetrahedron at rest, N/m, and the highest bound on the squares of frequencies of its corners, if that is known.
-    pub fn carried_by(&self, cell: u32, node: u32, inverse_masses: &[f32]) -> (f64, f64) {
+    /// The stiffness of a tetrahedron at a node at rest, N/m, and the highest bound on the squared frequencies of its
+    /// nodes, 0 if unknown.
+    pub fn stiffness_and_rate_of(&self, cell: u32, node: u32, inverse_masses: &[f32]) -> (f64, f64) {
         let Some((corners, rest, _)) = self.cell(cell) else {
             return (0.0, 0.0);
         };
         let free = corners.map(|corner| inverse_masses[corner as usize] > 0.0);
-        let carried = super::rates::carried(self.law, &rest, free);
-        let of_node = corners.iter().zip(carried).find(|(corner, _)| **corner == node);
+        let corner_stiffness = super::rates::corner_stiffness(self.law, &rest, free);
+        let node_stiffness = corners
+            .iter()
+            .zip(corner_stiffness)
+            .find(|(corner, _)| **corner == node);
         let highest = if self.rates_known {
-            self.of_springs
+            self.spring_rate
                 + corners
-                    .map(|corner| self.carried[corner as usize])
+                    .map(|corner| self.node_rates[corner as usize])
                     .into_iter()
                     .fold(0.0, f32::max)
         } else {
             0.0
         };
-        (of_node.map_or(0.0, |(_, carried)| carried), f64::from(highest))
+        (
+            node_stiffness.map_or(0.0, |(_, corner_stiffness)| corner_stiffness),
+            f64::from(highest),
+        )
     }
 
-    /// The nodes of a tetrahedron, what it is like at rest, and where it is; `None` where it is none any more.
-    pub(super) fn cell(&self, cell: u32) -> Option<([u32; 4], Rest, TetrahedronPlace)> {
-        let place = *self.cells.as_ref()?.places.get(cell as usize)?;
-        let part = &self.parts[place.part as usize];
-        let [group, lane] = place.in_part();
-        let rest = part.rest_of(group, lane);
-        (rest.volume > 0.0).then(|| (part.nodes_of(group, lane), rest, place))
+    /// The nodes of a tetrahedron, its rest shape and its location; `None` if it has been removed.
+    pub(super) fn cell(&self, cell: u32) -> Option<([u32; 4], RestTet, TetrahedronIndex)> {
+        let index = *self.cells.as_ref()?.indices.get(cell as usize)?;
+        let part = &self.parts[index.part as usize];
+        let [group, lane] = index.group_and_lane_of();
+        let rest = part.rest_shape(group, lane);
+        (rest.volume > 0.0).then(|| (part.corner_nodes(group, lane), rest, index))
     }
 
-    /// A piece as it will be.
-    fn moved(&self, piece: &PieceOfElement) -> Moved {
+    /// The tetrahedron that a piece becomes.
+    fn relocated(&self, piece: &ElementPiece) -> RelocatedTet {
         let from = self
             .cells
             .as_ref()
-            .map_or(TetrahedronPlace::NONE, |cells| cells.places[piece.source as usize]);
-        let [group, lane] = from.in_part();
+            .map_or(TetrahedronIndex::NONE, |cells| cells.indices[piece.source as usize]);
+        let [group, lane] = from.group_and_lane_of();
         let group = &self.parts[from.part as usize].groups.as_slice()[group];
-        Moved {
+        RelocatedTet {
             nodes: piece.nodes,
             inverse: group.inverse.map(|entry| entry[lane]),
             volume: group.volumes[lane] * piece.part,
@@ -284,52 +300,53 @@ impl Elements {
         }
     }
 
-    /// Puts a tetrahedron into the last part that came later, or the next: where it is then.
-    fn put(&mut self, moved: Moved, beside: &mut Option<&mut Sums>) -> TetrahedronPlace {
+    /// Appends a tetrahedron to the last part added by a cut, or to a new one. Returns its location.
+    fn append(&mut self, relocated: RelocatedTet, other_sums: &mut Option<&mut Sums>) -> TetrahedronIndex {
         let Some(cells) = &mut self.cells else {
-            return moved.from;
+            return relocated.from;
         };
-        if cells.used == LATER
+        if cells.used == CUT_PART_SIZE
             && let Some(part) = cells.spare.pop()
         {
             self.parts.push(part);
-            let count = self.forces.sums.len() + NODES;
-            self.starts.push(count - NODES);
+            let count = self.forces.sums.len() + CUT_PART_NODES;
+            self.starts.push(count - CUT_PART_NODES);
             self.forces.grow(count, self.parts.len());
-            if let Some(sums) = beside {
+            if let Some(sums) = other_sums {
                 sums.grow(count, self.parts.len());
             }
-            if let Some(memory) = &mut self.memory {
-                memory.add_part();
+            if let Some(history) = &mut self.history {
+                history.add_part();
             }
             cells.used = 0;
         }
         let last = self.parts.len() - 1;
-        let [group, lane] = in_group(cells.used, GROUPS);
+        let [group, lane] = group_and_lane(cells.used, CUT_PART_GROUPS);
         cells.used += 1;
         let part = &mut self.parts[last];
-        let corners = moved.nodes.map(|node| {
-            let known = part.nodes.iter().position(|&other| other == node);
-            let number = known.unwrap_or_else(|| {
+        let corners = relocated.nodes.map(|node| {
+            let existing = part.nodes.iter().position(|&other| other == node);
+            let local_index = existing.unwrap_or_else(|| {
                 part.nodes.push(node);
-                let copy = Copy {
-                    at: (self.starts[last] + part.nodes.len() - 1) as u32,
-                    place: (node as usize % TILE) as u16,
+                let copy = NodeCopy {
+                    index: (self.starts[last] + part.nodes.len() - 1) as u32,
+                    tile_slot: (node as usize % TILE) as u16,
                 };
                 self.copies.push(node as usize / TILE, copy);
                 part.nodes.len() - 1
             });
-            2 * number as u16
+            2 * local_index as u16
         });
-        part.groups.put([group, lane], corners, moved.inverse, moved.volume);
-        let place = TetrahedronPlace {
+        part.groups
+            .insert([group, lane], corners, relocated.inverse, relocated.volume);
+        let index = TetrahedronIndex {
             part: last as u32,
             group: group as u16,
             lane: lane as u16,
         };
-        if let Some(memory) = &mut self.memory {
-            memory.copy(moved.from, place);
+        if let Some(history) = &mut self.history {
+            history.copy(relocated.from, index);
         }
-        place
+        index
     }
 }

@@ -1,31 +1,31 @@
-//! Forces, their changes and energies of elements.
+//! Forces, force differentials and energies of elements.
 
 use glam::{DMat3, DVec3};
 
-use super::law::Deformed;
-use super::parts::Copies;
-use super::past::Memory;
+use super::history::ElementHistory;
+use super::law::DeformedTet;
+use super::parts::NodeCopies;
 use super::tetrahedra::Stresses;
 use super::{Elements, Sums};
 use crate::simd::{ChosenKernel, Record};
 use crate::soa::{TILE, TileForces};
 use crate::threads::{Items, Ragged, Team};
 
-/// What the nodes of a tile are given.
+/// The element forces on the nodes of a tile.
 #[derive(Clone, Copy)]
-pub(crate) struct Shares<'a> {
-    copies: &'a Copies,
+pub(crate) struct ElementForces<'a> {
+    copies: &'a NodeCopies,
     sums: &'a [Record],
 }
 
-impl Shares<'_> {
-    /// Adds what the elements give to the nodes of a tile.
+impl ElementForces<'_> {
+    /// Adds the sums over the copies of the tile's nodes to `forces`.
     pub fn add(&self, tile: usize, forces: &mut TileForces) {
         let mut sums = [Record::default(); TILE];
-        for copy in self.copies.of_tile(tile) {
-            let Record(sum) = &mut sums[usize::from(copy.place)];
-            for (sum, more) in sum.iter_mut().zip(self.sums[copy.at as usize].0) {
-                *sum += more;
+        for copy in self.copies.in_tile(tile) {
+            let Record(sum) = &mut sums[usize::from(copy.tile_slot)];
+            for (sum, value) in sum.iter_mut().zip(self.sums[copy.index as usize].0) {
+                *sum += value;
             }
         }
         for (axis, forces) in forces.axes_mut().into_iter().enumerate() {
@@ -37,69 +37,88 @@ impl Shares<'_> {
 }
 
 impl Elements {
-    /// Works out the forces of all elements with nodes at `positions`.
+    /// Computes the forces of all elements, and the rate bound, with nodes at `positions`.
     pub fn find_forces(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) {
-        if self.rings.is_some() {
+        if self.nodal_volumes.is_some() {
             self.find_pressures(kernel, positions, true, team);
         }
         let (law, parts, starts) = (self.stiffened(), &self.parts, &self.starts);
-        let (sums, memory) = (&mut self.forces, self.memory.as_deref());
+        let (sums, history) = (&mut self.forces, self.history.as_deref());
         let written = (
             Ragged::new(&mut sums.positions, starts),
             Ragged::new(&mut sums.sums, starts),
-            Items::new(&mut sums.of_parts),
+            Items::new(&mut sums.part_totals),
         );
-        let pressures = &sums.pressures.of_nodes;
-        team.pass(parts.len(), written, |part, (copies, sums, highest)| {
-            let of = &parts[part];
-            of.copy(positions, copies);
-            of.copy_pressures(pressures, copies);
+        let pressures = &sums.pressures.at_nodes;
+        team.pass(parts.len(), written, |part, (copies, sums, rate_bound)| {
+            let part_data = &parts[part];
+            part_data.copy(positions, copies);
+            part_data.copy_pressures(pressures, copies);
             sums.fill(Record::default());
-            *highest = f64::from(of.groups.forces(kernel, law, loads(memory, part), copies, sums));
+            *rate_bound = f64::from(
+                part_data
+                    .groups
+                    .forces(kernel, law, extra_stresses(history, part), copies, sums),
+            );
         });
-        self.highest = sums.of_parts.iter().fold(0.0, |highest: f64, &of| highest.max(of)) as f32;
+        self.rate_bound = sums
+            .part_totals
+            .iter()
+            .fold(0.0, |highest: f64, &bound| highest.max(bound)) as f32;
     }
 
-    /// Works out how their forces change, to first order, with nodes at `positions` that go these ways.
-    pub fn find_changes(&self, kernel: ChosenKernel, [positions, ways]: [&[Record]; 2], sums: &mut Sums, team: &Team) {
+    /// Computes the force differentials at `positions` for these displacements, to first order.
+    pub fn find_differentials(
+        &self,
+        kernel: ChosenKernel,
+        [positions, displacements]: [&[Record]; 2],
+        sums: &mut Sums,
+        team: &Team,
+    ) {
         let (law, parts, starts) = (self.stiffened(), &self.parts, &self.starts);
-        let memory = self.memory.as_deref();
-        if let Some(rings) = &self.rings {
+        let history = self.history.as_deref();
+        if let Some(nodal_volumes) = &self.nodal_volumes {
             let written = (
                 Ragged::new(&mut sums.positions, starts),
-                Ragged::new(&mut sums.ways, starts),
+                Ragged::new(&mut sums.displacements, starts),
                 Ragged::new(&mut sums.sums, starts),
             );
-            team.pass(parts.len(), written, |part, (copies, copied_ways, sums)| {
+            team.pass(parts.len(), written, |part, (copies, displacement_copies, sums)| {
                 let part = &parts[part];
                 part.copy(positions, copies);
-                part.copy(ways, copied_ways);
+                part.copy(displacements, displacement_copies);
                 sums.fill(Record::default());
-                part.groups.growths(kernel, copies, Some(copied_ways), sums);
+                part.groups
+                    .volume_changes(kernel, copies, Some(displacement_copies), sums);
             });
             sums.pressures
-                .find(rings, &self.copies, &sums.sums, law.kappa, [&[]; 2], team);
+                .update(nodal_volumes, &self.copies, &sums.sums, law.kappa, [&[]; 2], team);
         }
         let written = (
             Ragged::new(&mut sums.positions, starts),
-            Ragged::new(&mut sums.ways, starts),
+            Ragged::new(&mut sums.displacements, starts),
             Ragged::new(&mut sums.sums, starts),
         );
-        let pressures = &sums.pressures.of_nodes;
-        team.pass(parts.len(), written, |part, (copies, copied_ways, sums)| {
-            let of = &parts[part];
-            of.copy(positions, copies);
-            of.copy(ways, copied_ways);
-            of.copy_pressures(pressures, copied_ways);
+        let pressures = &sums.pressures.at_nodes;
+        team.pass(parts.len(), written, |part, (copies, displacement_copies, sums)| {
+            let part_data = &parts[part];
+            part_data.copy(positions, copies);
+            part_data.copy(displacements, displacement_copies);
+            part_data.copy_pressures(pressures, displacement_copies);
             sums.fill(Record::default());
-            of.groups
-                .changes(kernel, law, loads(memory, part), [copies, copied_ways], sums);
+            part_data.groups.force_differentials(
+                kernel,
+                law,
+                extra_stresses(history, part),
+                [copies, displacement_copies],
+                sums,
+            );
         });
     }
 
-    /// Their energy with nodes at `positions`, with that of the arms beside them, J.
+    /// The energy with nodes at `positions`, including that of Maxwell branches and plasticity, J.
     pub fn energy(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
-        let of_rings = if self.rings.is_some() {
+        let pressure_energy = if self.nodal_volumes.is_some() {
             self.find_pressures(kernel, positions, false, team)
         } else {
             0.0
@@ -107,28 +126,29 @@ impl Elements {
         let (law, parts, sums) = (self.law, &self.parts, &mut self.forces);
         let written = (
             Ragged::new(&mut sums.positions, &self.starts),
-            Items::new(&mut sums.of_parts),
+            Items::new(&mut sums.part_totals),
         );
         team.pass(parts.len(), written, |part, (copies, energy)| {
             let part = &parts[part];
             *energy = if law.is_hyperelastic() {
-                // The stress at rest is a difference, of which an f32 leaves nothing of a small energy.
+                // A small energy is a difference that loses all digits in `f32`.
                 part.exact_energy(law, positions)
             } else {
                 part.copy(positions, copies);
                 part.groups.energy(kernel, law, copies)
             };
         });
-        let elastic = of_rings + sums.of_parts.iter().sum::<f64>();
-        elastic + self.energy_of_arms(kernel, positions, team)
+        let elastic = pressure_energy + sums.part_totals.iter().sum::<f64>();
+        elastic + self.history_energy(kernel, positions, team)
     }
 
-    /// Works out the pressures of nodes at `positions`, with the loads on them or without: the elastic energy of all rings, J.
+    /// Computes the nodal pressures at `positions`, with or without their extra part. Returns the elastic energy of
+    /// the pressures, J.
     pub(super) fn find_pressures(
         &mut self,
         kernel: ChosenKernel,
         positions: &[Record],
-        loaded: bool,
+        with_extra: bool,
         team: &Team,
     ) -> f64 {
         let (parts, starts, sums) = (&self.parts, &self.starts, &mut self.forces);
@@ -140,108 +160,115 @@ impl Elements {
             let part = &parts[part];
             part.copy(positions, copies);
             sums.fill(Record::default());
-            part.groups.growths(kernel, copies, None, sums);
+            part.groups.volume_changes(kernel, copies, None, sums);
         });
-        let Some(rings) = &self.rings else {
+        let Some(nodal_volumes) = &self.nodal_volumes else {
             return 0.0;
         };
-        let memory = self.memory.as_deref().filter(|_| loaded);
-        let loads = memory.map_or(&[][..], |memory| &memory.rings.loads);
-        let law = memory.map_or(self.law, |memory| memory.stiffened(self.law));
-        sums.pressures.find(
-            rings,
+        let history = self.history.as_deref().filter(|_| with_extra);
+        let extra = history.map_or(&[][..], |history| &history.nodal.extra);
+        let law = history.map_or(self.law, |history| history.stiffened(self.law));
+        sums.pressures.update(
+            nodal_volumes,
             &self.copies,
             &sums.sums,
             law.kappa,
-            [self.offsets.get(), loads],
+            [self.pressure_offsets.values(), extra],
             team,
         )
     }
 
-    /// Where forces were worked out last is the current state.
-    pub fn settle(&mut self) {
-        self.settled = self.highest;
+    /// Makes the rate bound of the last computed forces that of the current state.
+    pub fn commit_rate_bound(&mut self) {
+        self.committed_rate_bound = self.rate_bound;
     }
 
-    /// What these sums give to nodes; `None`: the forces that were worked out last.
-    pub fn shares<'a>(&'a self, sums: Option<&'a Sums>) -> Shares<'a> {
-        Shares {
+    /// The node forces in `sums`, or the last computed forces for `None`.
+    pub fn node_forces<'a>(&'a self, sums: Option<&'a Sums>) -> ElementForces<'a> {
+        ElementForces {
             copies: &self.copies,
             sums: &sums.unwrap_or(&self.forces).sums,
         }
     }
 
-    /// The energy with nodes at `positions`, J, worked out in `f64`; `growths` are for its use.
-    pub fn exact_energy(&self, position: impl Fn(usize) -> DVec3, growths: &mut [f64]) -> f64 {
+    /// The energy with nodes at `positions`, J, in `f64`. `volume_changes` is a buffer with one number for each node.
+    pub fn exact_energy(&self, position: impl Fn(usize) -> DVec3, volume_changes: &mut [f64]) -> f64 {
         let (mut energy, law) = (0.0, self.law);
-        let (memory, kappa) = (self.memory.as_deref(), f64::from(law.kappa));
-        growths.fill(0.0);
+        let (history, kappa) = (self.history.as_deref(), f64::from(law.kappa));
+        volume_changes.fill(0.0);
         for (index, part) in self.parts.iter().enumerate() {
-            part.visit(&mut |corners, rest, place| {
+            part.visit(&mut |corners, rest, lane_index| {
                 let [a, b, c, d] = corners.map(|node| position(node as usize));
-                let deformed = Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a));
+                let deformed = DeformedTet::new(law, rest, DMat3::from_cols(b - a, c - a, d - a));
                 energy += deformed.energy();
-                if let Some(memory) = memory {
-                    energy += rest.volume * memory.energy_of(law, index, place, deformed.elastic());
+                if let Some(history) = history {
+                    energy += rest.volume * history.energy_density(law, index, lane_index, deformed.elastic());
                 }
-                if law.rings {
+                if law.nodal_pressure {
                     for node in corners {
-                        growths[node as usize] += 0.25 * deformed.swelling();
+                        volume_changes[node as usize] += 0.25 * deformed.volume_change();
                     }
                 }
             });
         }
-        let rings = self.rings.iter().flat_map(|rings| &rings.volumes).zip(&*growths);
-        for (node, (&volume, growth)) in rings.enumerate().filter(|(_, (volume, _))| **volume > 0.0) {
+        let nodal_volumes = self
+            .nodal_volumes
+            .iter()
+            .flat_map(|nodal_volumes| &nodal_volumes.volumes)
+            .zip(&*volume_changes);
+        for (node, (&volume, change)) in nodal_volumes.enumerate().filter(|(_, (volume, _))| **volume > 0.0) {
             let volume = f64::from(volume);
-            let growth = growth - self.offsets.of(node);
-            energy += 0.5 * kappa * growth * growth / volume;
-            if let Some(memory) = memory {
-                energy += memory.energy_of_ring(law, node, kappa * growth / volume, volume);
+            let change = change - self.pressure_offsets.at(node);
+            energy += 0.5 * kappa * change * change / volume;
+            if let Some(history) = history {
+                energy += history.nodal_energy(law, node, kappa * change / volume, volume);
             }
         }
         energy
     }
 
-    /// Works out the elastic stresses with nodes at `positions`, without the pressures of rings.
+    /// Computes the elastic stresses at `positions`, without nodal pressures.
     pub(super) fn find_stresses(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) {
         let (law, parts, sums) = (self.law, &self.parts, &mut self.forces);
-        if let Some(memory) = &mut self.memory {
+        if let Some(history) = &mut self.history {
             let written = (
                 Ragged::new(&mut sums.positions, &self.starts),
-                Items::new(&mut memory.parts),
+                Items::new(&mut history.parts),
             );
-            team.pass(parts.len(), written, |part, (copies, memory)| {
+            team.pass(parts.len(), written, |part, (copies, history)| {
                 let part = &parts[part];
                 part.copy(positions, copies);
-                part.groups.stresses(kernel, law, copies, &mut memory.newest);
+                part.groups.stresses(kernel, law, copies, &mut history.newest);
             });
         }
     }
 
-    /// The energy of the arms' springs with nodes at `positions`, J, where the pressures of rings have just been worked out.
-    fn energy_of_arms(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
-        if self.memory.as_ref().is_none_or(|memory| !memory.has_energy()) {
+    /// The energy of Maxwell branches and plasticity at `positions`, J. Nodal pressures must be up to date.
+    fn history_energy(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
+        if self.history.as_ref().is_none_or(|history| !history.has_energy()) {
             return 0.0;
         }
         self.find_stresses(kernel, positions, team);
         let (law, parts, sums) = (self.law, &self.parts, &mut self.forces);
-        let Some(memory) = self.memory.as_deref() else {
+        let Some(history) = self.history.as_deref() else {
             return 0.0;
         };
-        team.pass(parts.len(), Items::new(&mut sums.of_parts), |part, energy| {
-            *energy = memory.energy_of_part(law, part, parts[part].groups.as_slice());
+        team.pass(parts.len(), Items::new(&mut sums.part_totals), |part, energy| {
+            *energy = history.part_energy(law, part, parts[part].groups.as_slice());
         });
-        let rings = self.rings.iter().flat_map(|rings| &rings.volumes);
-        let rings = rings.zip(&sums.pressures.of_nodes).enumerate();
-        let of_rings = rings.map(|(node, (&volume, &pressure))| {
-            memory.energy_of_ring(law, node, f64::from(pressure), f64::from(volume))
+        let nodal_volumes = self
+            .nodal_volumes
+            .iter()
+            .flat_map(|nodal_volumes| &nodal_volumes.volumes);
+        let nodal_volumes = nodal_volumes.zip(&sums.pressures.at_nodes).enumerate();
+        let pressure_energy = nodal_volumes.map(|(node, (&volume, &pressure))| {
+            history.nodal_energy(law, node, f64::from(pressure), f64::from(volume))
         });
-        sums.of_parts.iter().sum::<f64>() + of_rings.sum::<f64>()
+        sums.part_totals.iter().sum::<f64>() + pressure_energy.sum::<f64>()
     }
 }
 
-/// The loads on the tetrahedra of a part; none where there is no memory.
-fn loads(memory: Option<&Memory>, part: usize) -> &[Stresses] {
-    memory.map_or(&[], |memory| memory.parts[part].loads())
+/// The extra stresses of the tetrahedra of a part; empty without history.
+fn extra_stresses(history: Option<&ElementHistory>, part: usize) -> &[Stresses] {
+    history.map_or(&[], |history| history.parts[part].extra_stresses())
 }

@@ -1,4 +1,5 @@
-//! The law of a tetrahedron, one at a time and in `f64`: what kernels work out for many, and second derivatives.
+//! The elastic law of one tetrahedron in `f64`: the energies and forces that kernels compute for several, and second
+//! derivatives.
 
 use super::rates::LEAST_SHEAR;
 use crate::base::{cross_matrix, outer, trace};
@@ -6,35 +7,39 @@ use crate::codec::saved;
 use crate::def::ElementLaw;
 use glam::{DMat3, DVec3};
 
-use super::laws::{Hyperelastic, MatrixColumns, Strained, product_of, with_hyperelastic};
+use super::laws::{Hyperelastic, MatrixColumns, StrainState, tensor_cross, with_hyperelastic};
 
-/// St Venant and Kirchhoff's law with a signed volume term, Pa: the energy of a tetrahedron is
-/// `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)`; or one of [`super::laws`] with mu, beside all of lambda as kappa.
+/// A St Venant-Kirchhoff law with a signed volume term, or a hyperelastic law of [`super::laws`], Pa.
 ///
-/// Without the last, a tetrahedron that is pressed flat turns inside out and stays so (Kikuuwe, Tabuchi, Yamamoto 2009 have the energy as
-/// one of squared lengths of edges). What the volume term takes is not in lambda, so that Young's modulus and Poisson's ratio at small
-/// strains stay what they are.
+/// The energy of a St Venant-Kirchhoff tetrahedron is `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)`. A
+/// hyperelastic law uses mu, with all of Lamé's first parameter as kappa.
+///
+/// Without the volume term, a flattened tetrahedron inverts and stays inverted. Kikuuwe, Tabuchi, Yamamoto 2009 write
+/// the energy in squared edge lengths. The volume term takes its kappa from lambda, so Young's modulus and Poisson's
+/// ratio at small strains stay the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Law {
+pub(crate) struct ElasticLaw {
     pub lambda: f32,
     pub mu: f32,
     pub kappa: f32,
-    /// Whether the volume term is one of all tetrahedra about a node together, `kappa/2 V (V'/V - 1)²` with V a quarter of their volumes
-    /// and V' what it becomes: linear tetrahedra that keep their volume each can hardly move (Irving, Schroeder, Fedkiw 2007; the
-    /// pressure of a tetrahedron is the mean of its nodes', Bonet, Burton 1998).
-    pub rings: bool,
+    /// True for average nodal pressure (Bonet, Burton 1998): the pressure of a tetrahedron is the mean of its nodes'
+    /// pressures. The volume term belongs to nodes, `kappa/2 V (V'/V - 1)²`, V and V' being a quarter of the rest and
+    /// current volumes around a node. Linear tetrahedra that each keep their volume lock (Irving, Schroeder, Fedkiw
+    /// 2007).
+    pub nodal_pressure: bool,
     pub form: ElementLaw,
 }
 
-saved! { Law { lambda, mu, kappa, rings, form } }
+saved! { ElasticLaw { lambda, mu, kappa, nodal_pressure, form } }
 
-/// Poisson's ratio from which volume is kept by rings.
-const RINGS_FROM: f32 = 0.4;
+/// Poisson's ratio from which average nodal pressure is used.
+const NODAL_PRESSURE_FROM: f32 = 0.4;
 
-impl Law {
-    /// That of Young's modulus, Pa, and Poisson's ratio.
+impl ElasticLaw {
+    /// Creates the law from Young's modulus, Pa, and Poisson's ratio.
     ///
-    /// Inversion ends where kappa is above some (lambda + 2 mu) / 8; twice that is used, and all of lambda where it is more.
+    /// A St Venant-Kirchhoff tetrahedron recovers from inversion if kappa is above about (lambda + 2 mu) / 8. Kappa is
+    /// twice that, or lambda if that is larger.
     pub fn new(young_modulus: f32, poisson_ratio: f32, form: ElementLaw) -> Self {
         let (e, nu) = (f64::from(young_modulus), f64::from(poisson_ratio));
         let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
@@ -47,29 +52,29 @@ impl Law {
             lambda: (lambda - kappa) as f32,
             mu: mu as f32,
             kappa: kappa as f32,
-            rings: poisson_ratio >= RINGS_FROM,
+            nodal_pressure: poisson_ratio >= NODAL_PRESSURE_FROM,
             form,
         }
     }
 
-    /// That of volume alone, Pa.
-    pub fn of_volume(kappa: f32) -> Self {
+    /// A law that resists volume change only, with kappa in Pa.
+    pub fn volume_only(kappa: f32) -> Self {
         Self {
             lambda: 0.0,
             mu: 0.0,
             kappa,
-            rings: false,
+            nodal_pressure: false,
             form: ElementLaw::StVenantKirchhoff,
         }
     }
 
-    /// Whether it is one of [`super::laws`], of which nothing is remembered.
+    /// True for a law of [`super::laws`], which has no history.
     pub fn is_hyperelastic(&self) -> bool {
         self.form != ElementLaw::StVenantKirchhoff
     }
 
-    /// So many times as stiff.
-    pub fn times(&self, factor: f32) -> Self {
+    /// The law with all stiffnesses multiplied by `factor`.
+    pub fn scaled(&self, factor: f32) -> Self {
         Self {
             lambda: self.lambda * factor,
             mu: self.mu * factor,
@@ -78,50 +83,51 @@ impl Law {
         }
     }
 
-    /// The energy per volume where these are the stresses, and strains small enough to be the same whichever law they follow, Pa.
-    pub fn energy_of(&self, Load { stress, pressure }: Load) -> f64 {
+    /// The energy density at these stresses, for strains so small that all laws agree, Pa.
+    pub fn energy_density(&self, TetStress { stress, pressure }: TetStress) -> f64 {
         let (lambda, mu, kappa) = (f64::from(self.lambda), f64::from(self.mu), f64::from(self.kappa));
         let mut energy = 0.0;
         if mu > 0.0 {
             let trace = trace(&stress);
-            energy += (product(&stress, &stress) - lambda / (3.0 * lambda + 2.0 * mu) * trace * trace) / (4.0 * mu);
+            energy +=
+                (inner_product(&stress, &stress) - lambda / (3.0 * lambda + 2.0 * mu) * trace * trace) / (4.0 * mu);
         }
-        if kappa > 0.0 && !self.rings {
+        if kappa > 0.0 && !self.nodal_pressure {
             energy += 0.5 * pressure * pressure / kappa;
         }
         energy
     }
 
-    /// What resists a small stretch with its sides held, Pa: lambda + 2 mu with all of lambda.
-    pub fn whole(&self) -> f32 {
+    /// The P-wave modulus lambda + 2 mu at small strains, with kappa as a part of lambda, Pa.
+    pub fn p_wave_modulus(&self) -> f32 {
         self.lambda + 2.0 * self.mu + self.kappa
     }
 
-    /// At most so stiff is a tetrahedron at rest, Pa, of which shear counts as this part.
-    pub fn stiffest(&self, part: f32) -> f32 {
-        self.lambda.max(0.0) + self.kappa + 2.0 * self.mu * part
+    /// An upper bound on the stiffness of a tetrahedron at rest, for this fraction of shear, Pa.
+    pub fn rest_stiffness_bound(&self, shear_fraction: f32) -> f32 {
+        self.lambda.max(0.0) + self.kappa + 2.0 * self.mu * shear_fraction
     }
 }
 
-/// What acts in a tetrahedron on top of its elastic stresses, Pa.
+/// The stress of a tetrahedron: elastic stress, or extra stress that is added to it, Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Load {
-    /// On top of S.
+pub(crate) struct TetStress {
+    /// The second Piola-Kirchhoff stress S.
     pub stress: DMat3,
-    /// On top of the pressure of the volume term.
+    /// The pressure of the volume term.
     pub pressure: f64,
 }
 
-saved! { Load { stress, pressure } }
+saved! { TetStress { stress, pressure } }
 
-impl Load {
-    pub const NONE: Self = Self {
+impl TetStress {
+    pub const ZERO: Self = Self {
         stress: DMat3::ZERO,
         pressure: 0.0,
     };
 
-    /// Of the entries 00, 01, 02, 11, 12, 22 and the pressure.
-    pub fn of([xx, xy, xz, yy, yz, zz, pressure]: [f64; 7]) -> Self {
+    /// Creates it from the entries 00, 01, 02, 11, 12, 22 and the pressure.
+    pub fn from_components([xx, xy, xz, yy, yz, zz, pressure]: [f64; 7]) -> Self {
         Self {
             stress: DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]),
             pressure,
@@ -129,39 +135,39 @@ impl Load {
     }
 }
 
-/// A tetrahedron at rest.
+/// The rest shape of a tetrahedron.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rest {
-    /// The inverse of the edges from its first corner, in a frame where it is upper triangular, 1/m.
+pub(crate) struct RestTet {
+    /// The inverse of the edge matrix, in a frame where it is upper triangular, 1/m. Edges start at the first corner.
     pub inverse: DMat3,
     /// m³
     pub volume: f64,
 }
 
-saved! { Rest { inverse, volume } }
+saved! { RestTet { inverse, volume } }
 
-impl Rest {
-    /// With these edges from its first corner to the others, m, in any order of hands. One without a volume has an inverse that is not
-    /// finite.
-    pub fn of(edges: DMat3) -> Self {
-        // Gram and Schmidt: the edges are a rotation times this.
+impl RestTet {
+    /// Creates the rest shape from the edges from the first corner to the others, of either orientation, m. The
+    /// inverse of a degenerate tetrahedron is not finite.
+    pub fn from_edges(edges: DMat3) -> Self {
+        // Gram-Schmidt: the edges are a rotation times this matrix.
         let [a, b, c] = [edges.x_axis, edges.y_axis, edges.z_axis];
         let x = a.normalize();
         let across = b - x * b.dot(x);
         let y = across.normalize();
         let z = x.cross(y);
-        let upright = DMat3::from_cols(
+        let triangular = DMat3::from_cols(
             DVec3::new(a.length(), 0.0, 0.0),
             DVec3::new(b.dot(x), across.length(), 0.0),
             DVec3::new(c.dot(x), c.dot(y), c.dot(z)),
         );
         Self {
-            inverse: upright.inverse(),
+            inverse: triangular.inverse(),
             volume: edges.determinant().abs() / 6.0,
         }
     }
 
-    /// How the deformation changes with each corner's place: the gradients of the corners' functions, 1/m.
+    /// The gradients of the corners' shape functions, 1/m.
     pub fn gradients(&self) -> [DVec3; 4] {
         let rows = self.inverse.transpose();
         let others = [rows.x_axis, rows.y_axis, rows.z_axis];
@@ -169,85 +175,86 @@ impl Rest {
     }
 }
 
-/// A tetrahedron as it is deformed.
+/// The deformation of a tetrahedron.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Deformed {
+pub(crate) struct DeformedTet {
     gradient: DMat3,
     cofactors: DMat3,
-    /// E.
+    /// The Green strain E.
     strain: DMat3,
-    /// J - 1.
-    growth: f64,
+    /// The volumetric strain J - 1.
+    volume_strain: f64,
     /// Pa
     pressure: f64,
-    load: Load,
+    extra: TetStress,
     volume: f64,
     lambda: f64,
     mu: f64,
-    /// 0 where volume is kept by rings.
+    /// 0 with average nodal pressure.
     kappa: f64,
-    law: Law,
-    /// Under a hyperelastic law, without its pressure.
-    strained: Option<Strained<f64>>,
+    law: ElasticLaw,
+    /// The state of a hyperelastic law without `pressure`; `None` for St Venant-Kirchhoff.
+    strain_state: Option<StrainState<f64>>,
 }
 
-impl Deformed {
-    /// With these edges from its first corner to the others, m.
-    pub fn new(law: Law, rest: &Rest, edges: DMat3) -> Self {
+impl DeformedTet {
+    /// Creates it from the deformed edges from the first corner to the others, m.
+    pub fn new(law: ElasticLaw, rest: &RestTet, edges: DMat3) -> Self {
         let gradient = edges * rest.inverse;
         let [a, b, c] = [gradient.x_axis, gradient.y_axis, gradient.z_axis];
-        let growth = gradient.determinant() - 1.0;
-        let kappa = if law.rings { 0.0 } else { f64::from(law.kappa) };
+        let volume_strain = gradient.determinant() - 1.0;
+        let kappa = if law.nodal_pressure { 0.0 } else { f64::from(law.kappa) };
         Self {
             gradient,
             cofactors: DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b)),
             strain: (gradient.transpose() * gradient - DMat3::IDENTITY) * 0.5,
-            growth,
-            pressure: kappa * growth,
-            load: Load::NONE,
+            volume_strain,
+            pressure: kappa * volume_strain,
+            extra: TetStress::ZERO,
             volume: rest.volume,
             lambda: f64::from(law.lambda),
             mu: f64::from(law.mu),
             kappa,
             law,
-            strained: with_hyperelastic!(law, |of| Some(Strained::new(of, columns(&gradient), kappa)), None),
+            strain_state: with_hyperelastic!(law, |of| Some(StrainState::new(of, columns(&gradient), kappa)), None),
         }
     }
 
-    /// Under a hyperelastic law, with all of its pressure.
-    fn strained(&self) -> Option<Strained<f64>> {
-        let more = self.pressure - self.kappa * self.growth;
-        self.strained.map(|strained| strained.pressed(more))
+    /// The state of a hyperelastic law with `pressure`.
+    fn strain_state(&self) -> Option<StrainState<f64>> {
+        let added_pressure = self.pressure - self.kappa * self.volume_strain;
+        self.strain_state
+            .map(|strain_state| strain_state.with_added_pressure(added_pressure))
     }
 
-    /// With these on top of its stresses.
-    pub fn loaded(self, load: Load) -> Self {
+    /// Adds an extra stress.
+    pub fn with_extra_stress(self, extra: TetStress) -> Self {
         Self {
-            pressure: self.pressure + load.pressure,
-            load,
+            pressure: self.pressure + extra.pressure,
+            extra,
             ..self
         }
     }
 
-    /// Its elastic stresses.
-    pub fn elastic(&self) -> Load {
-        Load {
+    /// The elastic stress, without the extra stress.
+    pub fn elastic(&self) -> TetStress {
+        TetStress {
             stress: self.elastic_stress(),
-            pressure: self.pressure - self.load.pressure,
+            pressure: self.pressure - self.extra.pressure,
         }
     }
 
-    /// With the pressure of its rings, Pa.
-    pub fn under(self, pressure: f64) -> Self {
+    /// Replaces the pressure by the mean pressure of the nodes, Pa.
+    pub fn with_pressure(self, pressure: f64) -> Self {
         Self { pressure, ..self }
     }
 
-    /// How much larger it is than at rest, m³.
-    pub fn swelling(&self) -> f64 {
-        self.volume * self.growth
+    /// The volume minus the rest volume, m³.
+    pub fn volume_change(&self) -> f64 {
+        self.volume * self.volume_strain
     }
 
-    /// How its volume grows with the place of a corner whose function has this gradient, m².
+    /// The derivative of the volume with respect to the position of a corner, by its shape function's gradient, m².
     pub fn area(&self, gradient: DVec3) -> DVec3 {
         self.cofactors * gradient * self.volume
     }
@@ -256,106 +263,109 @@ impl Deformed {
         trace(&self.strain)
     }
 
-    /// The stress S, Pa.
+    /// The second Piola-Kirchhoff stress S, Pa.
     fn stress(&self) -> DMat3 {
-        self.elastic_stress() + self.load.stress
+        self.elastic_stress() + self.extra.stress
     }
 
     fn elastic_stress(&self) -> DMat3 {
         self.strain * (2.0 * self.mu) + DMat3::from_diagonal(DVec3::splat(self.lambda * self.trace()))
     }
 
-    /// What is elastic, J.
+    /// The elastic energy, J.
     pub fn energy(&self) -> f64 {
-        let swollen = 0.5 * self.kappa * self.growth.powi(2);
+        let volume_energy = 0.5 * self.kappa * self.volume_strain.powi(2);
         let density = with_hyperelastic!(self.law, |of| of.energy(self.invariants()), {
-            let squares = product(&self.strain, &self.strain);
+            let squares = inner_product(&self.strain, &self.strain);
             0.5 * self.lambda * self.trace().powi(2) + self.mu * squares
         });
-        self.volume * (density + swollen)
+        self.volume * (density + volume_energy)
     }
 
-    /// I1, I2 and J - 1.
+    /// The invariants I1, I2 and J - 1.
     fn invariants(&self) -> [f64; 3] {
-        let squares = |matrix: &DMat3| product(matrix, matrix);
-        [squares(&self.gradient), squares(&self.cofactors), self.growth]
+        let squares = |matrix: &DMat3| inner_product(matrix, matrix);
+        [squares(&self.gradient), squares(&self.cofactors), self.volume_strain]
     }
 
-    /// How the energy of the strain and of the volume, and beside them that of the load, change where the edges become longer by this, J, and the
-    /// volume, m³, to the last digits of the changes.
-    pub fn change(&self, rest: &Rest, more: DMat3) -> [f64; 4] {
-        let more = more * rest.inverse;
-        let [a, b, c] = [more.x_axis, more.y_axis, more.z_axis];
-        let cofactors = DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b));
-        let half = self.gradient.transpose() * more;
-        let strain = (half + half.transpose() + more.transpose() * more) * 0.5;
+    /// The exact changes when the edges grow by `added`: of the energies of strain, of volume and of the extra stress,
+    /// J, and of the volume, m³. Computed without cancellation.
+    pub fn change(&self, rest: &RestTet, added: DMat3) -> [f64; 4] {
+        let added = added * rest.inverse;
+        let [a, b, c] = [added.x_axis, added.y_axis, added.z_axis];
+        let change_cofactors = DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b));
+        let half_change = self.gradient.transpose() * added;
+        let strain = (half_change + half_change.transpose() + added.transpose() * added) * 0.5;
         let trace = trace(&strain);
-        let growth = product(&self.cofactors, &more) + product(&self.gradient, &cofactors) + more.determinant();
-        let both = self.strain * 2.0 + strain;
-        let swollen = 0.5 * self.kappa * growth * (2.0 * self.growth + growth);
-        let [of_strain, of_volume] = with_hyperelastic!(
+        let volume_strain = inner_product(&self.cofactors, &added)
+            + inner_product(&self.gradient, &change_cofactors)
+            + added.determinant();
+        let strain_sum = self.strain * 2.0 + strain;
+        let volume_energy = 0.5 * self.kappa * volume_strain * (2.0 * self.volume_strain + volume_strain);
+        let [strain_term, volume_term] = with_hyperelastic!(
             self.law,
             |of| {
-                let areas = matrix(product_of(columns(&self.gradient), columns(&more))) + cofactors;
-                let more_i1 = 2.0 * product(&self.gradient, &more) + product(&more, &more);
-                let more_i2 = 2.0 * product(&self.cofactors, &areas) + product(&areas, &areas);
-                let [of_i1, of_i2, of_volume] = of.change(self.invariants(), [more_i1, more_i2, growth]);
-                [of_i1 + of_i2, of_volume + swollen]
+                let areas = matrix(tensor_cross(columns(&self.gradient), columns(&added))) + change_cofactors;
+                let di1 = 2.0 * inner_product(&self.gradient, &added) + inner_product(&added, &added);
+                let di2 = 2.0 * inner_product(&self.cofactors, &areas) + inner_product(&areas, &areas);
+                let [of_i1, of_i2, volume_term] = of.change(self.invariants(), [di1, di2, volume_strain]);
+                [of_i1 + of_i2, volume_term + volume_energy]
             },
             {
-                let elastic =
-                    0.5 * self.lambda * trace * (2.0 * self.trace() + trace) + self.mu * product(&both, &strain);
-                [elastic + swollen, 0.0]
+                let elastic = 0.5 * self.lambda * trace * (2.0 * self.trace() + trace)
+                    + self.mu * inner_product(&strain_sum, &strain);
+                [elastic + volume_energy, 0.0]
             }
         );
-        let of_load = product(&self.load.stress, &strain) + self.load.pressure * growth;
-        [of_strain, of_volume, of_load, growth].map(|change| self.volume * change)
+        let extra_change = inner_product(&self.extra.stress, &strain) + self.extra.pressure * volume_strain;
+        [strain_term, volume_term, extra_change, volume_strain].map(|change| self.volume * change)
     }
 
-    /// How many times as stiff as at rest it is at most, where its volume is kept by this pressure: what `TetrahedronGroups::forces` bounds frequencies
-    /// with, one at a time.
-    pub fn stiffening(&self, law: Law, pressure: f64) -> f64 {
+    /// An upper bound on the stiffness relative to the stiffness at rest, at this pressure.
+    /// `TetrahedronGroups::forces` computes the same bound for several tetrahedra.
+    pub fn stiffening(&self, law: ElasticLaw, pressure: f64) -> f64 {
         let [lambda, mu, kappa] = [law.lambda, law.mu, law.kappa].map(f64::from);
         let stretch = 1.0 + largest_row(&(self.strain * 2.0), |entry| entry).max(0.0);
-        let size = |matrix: &DMat3| largest_row(matrix, f64::abs);
-        let tension = (lambda * self.trace() + mu * (stretch - 1.0)).max(0.0) + size(&self.load.stress);
-        let root = [(0.5, 0.5), (1.5, 1.0 / 6.0), (4.5, 1.0 / 18.0)];
-        let root = root.map(|(start, slope)| start + slope * stretch);
-        let pressed = pressure.abs() * root.into_iter().fold(f64::INFINITY, f64::min);
-        let area = size(&(self.cofactors.transpose() * self.cofactors)).max(stretch);
-        let along = lambda.max(0.0) + 2.0 * mu * f64::from(LEAST_SHEAR);
-        (along * stretch + pressed + kappa * area) / f64::from(law.stiffest(LEAST_SHEAR))
-            + tension / f64::from(law.stiffest(1.0))
+        let abs_row_sum = |matrix: &DMat3| largest_row(matrix, f64::abs);
+        let tension = (lambda * self.trace() + mu * (stretch - 1.0)).max(0.0) + abs_row_sum(&self.extra.stress);
+        let root_tangents = [(0.5, 0.5), (1.5, 1.0 / 6.0), (4.5, 1.0 / 18.0)];
+        let root_tangents = root_tangents.map(|(start, slope)| start + slope * stretch);
+        let pressure_term = pressure.abs() * root_tangents.into_iter().fold(f64::INFINITY, f64::min);
+        let area = abs_row_sum(&(self.cofactors.transpose() * self.cofactors)).max(stretch);
+        let shear_modulus = lambda.max(0.0) + 2.0 * mu * f64::from(LEAST_SHEAR);
+        (shear_modulus * stretch + pressure_term + kappa * area) / f64::from(law.rest_stiffness_bound(LEAST_SHEAR))
+            + tension / f64::from(law.rest_stiffness_bound(1.0))
     }
 
-    /// The pressure that keeps its volume, Pa, without that of rings.
+    /// The pressure of the volume term, without nodal pressures, Pa.
     pub fn pressure(&self) -> f64 {
         self.pressure
     }
 
-    /// The force on a corner whose function has this gradient, N.
+    /// The force on a corner, by its shape function's gradient, N.
     pub fn force(&self, gradient: DVec3) -> DVec3 {
-        if let Some(strained) = self.strained() {
-            return -(matrix(strained.stress()) * gradient) * self.volume;
+        if let Some(strain_state) = self.strain_state() {
+            return -(matrix(strain_state.stress()) * gradient) * self.volume;
         }
         let stress = self.gradient * self.stress() + self.cofactors * self.pressure;
         -(stress * gradient) * self.volume
     }
 
-    /// How much the force on one corner lessens with the place of another, N/m, by the gradients of their functions.
+    /// The block of the stiffness matrix for two corners, by their shape functions' gradients, N/m.
     pub fn stiffness(&self, a: DVec3, b: DVec3) -> DMat3 {
-        if let Some(strained) = self.strained() {
-            return self.stiffness_of(&strained, 0.0, [a, b]);
+        if let Some(strain_state) = self.strain_state() {
+            return self.hyperelastic_stiffness(&strain_state, 0.0, [a, b]);
         }
         let turned = cross_matrix(-(self.gradient * a.cross(b)));
-        self.stiffness_under(self.stress(), a, b) + turned * (self.volume * self.pressure)
+        self.st_venant_stiffness(self.stress(), a, b) + turned * (self.volume * self.pressure)
     }
 
-    /// The same, positive semidefinite: pressure pushes nothing sideways.
+    /// The block of the stiffness matrix, made positive semidefinite by leaving out the destabilizing part of the
+    /// pressure.
     pub fn clamped_stiffness(&self, a: DVec3, b: DVec3) -> DMat3 {
-        if let Some(strained) = self.strained() {
-            let (strained, lift) = strained.positive();
-            return self.stiffness_of(&strained, lift, [a, b]);
+        if let Some(strain_state) = self.strain_state() {
+            let (strain_state, lift) = strain_state.clamped();
+            return self.hyperelastic_stiffness(&strain_state, lift, [a, b]);
         }
         let stress = self.stress();
         let [x, y, z] = [stress.x_axis, stress.y_axis, stress.z_axis].map(DVec3::abs);
@@ -366,19 +376,19 @@ impl Deformed {
             z.x + z.y - stress.z_axis.z,
         ];
         let lift = lift.into_iter().fold(0.0, f64::max);
-        self.stiffness_under(stress + DMat3::from_diagonal(DVec3::splat(lift)), a, b)
+        self.st_venant_stiffness(stress + DMat3::from_diagonal(DVec3::splat(lift)), a, b)
     }
 
-    /// That of a hyperelastic law with this lift.
-    fn stiffness_of(&self, strained: &Strained<f64>, lift: f64, [a, b]: [DVec3; 2]) -> DMat3 {
+    /// The block of a hyperelastic law, with this shift of the tangent.
+    fn hyperelastic_stiffness(&self, strain_state: &StrainState<f64>, lift: f64, [a, b]: [DVec3; 2]) -> DMat3 {
         let column = |axis: DVec3| {
             let change = columns(&outer(axis, b));
-            matrix(strained.stress_change(change, lift)) * a * self.volume
+            matrix(strain_state.stress_change(change, lift)) * a * self.volume
         };
         DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z))
     }
 
-    fn stiffness_under(&self, stress: DMat3, a: DVec3, b: DVec3) -> DMat3 {
+    fn st_venant_stiffness(&self, stress: DMat3, a: DVec3, b: DVec3) -> DMat3 {
         let [fa, fb] = [self.gradient * a, self.gradient * b];
         let [ca, cb] = [self.cofactors * a, self.cofactors * b];
         let squares = self.gradient * self.gradient.transpose();
@@ -391,18 +401,19 @@ impl Deformed {
     }
 }
 
-/// The sum of the products of entries.
-fn product(a: &DMat3, b: &DMat3) -> f64 {
+/// The Frobenius inner product.
+fn inner_product(a: &DMat3, b: &DMat3) -> f64 {
     a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis)
 }
 
-/// The largest sum of a row of a symmetric matrix: its diagonal entry by `on`, the others by their sizes (Gershgorin).
-fn largest_row(matrix: &DMat3, on: impl Fn(f64) -> f64) -> f64 {
+/// The largest Gershgorin row sum of a symmetric matrix: the diagonal entry mapped by `diagonal`, plus the absolute
+/// off-diagonal entries.
+fn largest_row(matrix: &DMat3, diagonal: impl Fn(f64) -> f64) -> f64 {
     let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
     let rows = [
-        on(x.x) + x.y.abs() + x.z.abs(),
-        on(y.y) + x.y.abs() + y.z.abs(),
-        on(z.z) + x.z.abs() + y.z.abs(),
+        diagonal(x.x) + x.y.abs() + x.z.abs(),
+        diagonal(y.y) + x.y.abs() + y.z.abs(),
+        diagonal(z.z) + x.z.abs() + y.z.abs(),
     ];
     rows.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
@@ -433,27 +444,30 @@ mod tests {
             ElementLaw::MooneyRivlin { ratio: 0.3 },
         ];
         for (nu, form) in [0.0, 0.3, 0.39].into_iter().flat_map(|nu| forms.map(|form| (nu, form))) {
-            let law = Law::new(5000.0, nu, form);
+            let law = ElasticLaw::new(5000.0, nu, form);
             for _ in 0..20 {
                 let rest = DMat3::from_cols(vector(&mut random), vector(&mut random), vector(&mut random));
                 if rest.determinant().abs() < 0.1 {
                     continue;
                 }
-                let rest = Rest::of(rest);
+                let rest = RestTet::from_edges(rest);
                 let corners = [0; 4].map(|_| vector(&mut random));
                 let at = |corners: [DVec3; 4]| {
                     let [a, b, c, d] = corners;
-                    Deformed::new(law, &rest, DMat3::from_cols(b - a, c - a, d - a))
+                    DeformedTet::new(law, &rest, DMat3::from_cols(b - a, c - a, d - a))
                 };
                 let gradients = rest.gradients();
                 let size = at(corners).energy();
                 let more = DMat3::from_cols(vector(&mut random), vector(&mut random), vector(&mut random));
                 let [a, b, c, d] = corners;
                 let then = [a, b + more.x_axis, c + more.y_axis, d + more.z_axis];
-                let [of_strain, of_volume, _, growth] = at(corners).change(&rest, more);
-                let change = of_strain + of_volume;
-                let grown = at(then).swelling() - at(corners).swelling();
-                assert!((growth - grown).abs() < 1e-12 * (1.0 + grown.abs()), "{growth} {grown}");
+                let [strain_term, volume_term, _, volume_strain] = at(corners).change(&rest, more);
+                let change = strain_term + volume_term;
+                let grown = at(then).volume_change() - at(corners).volume_change();
+                assert!(
+                    (volume_strain - grown).abs() < 1e-12 * (1.0 + grown.abs()),
+                    "{volume_strain} {grown}"
+                );
                 let expected = at(then).energy() - size;
                 assert!(
                     (change - expected).abs() < 1e-12 * (size + at(then).energy()),

@@ -1,20 +1,20 @@
-//! Tetrahedra as finite elements: forces that no spring can give, of any Young's modulus and Poisson's ratio.
+//! Tetrahedral finite elements, for any Young's modulus and Poisson's ratio.
 //!
-//! Tetrahedra lie in *parts*, some two thousand each, that any thread may work on: a part adds up forces on its own copies of its nodes,
-//! and the tiles of nodes then add up the copies, in the order of parts. So nothing is worked out twice, and results are the same for
-//! any number of threads.
+//! Tetrahedra are grouped into *parts* of up to [`parts::PART_SIZE`] elements; any thread may process a part. A part
+//! adds up forces on its own copies of its nodes. The tiles of nodes then add up the copies in the order of the parts.
+//! No force is computed twice, and results do not depend on the number of threads.
 
 mod cut;
 mod forces;
+mod history;
 mod law;
 mod laws;
-mod offsets;
+mod nodal_pressure;
 mod parts;
-mod past;
+mod plasticity;
+mod pressure_offset;
 mod rates;
-mod rings;
 mod scale;
-mod set;
 mod tetrahedra;
 
 use glam::{DMat3, DVec3};
@@ -25,117 +25,117 @@ use crate::def::{RelaxationStep, Viscosity, Yielding};
 use crate::simd::{ChosenKernel, Record};
 use crate::soa::{PerNode, Vectors};
 use crate::threads::{Items, Team};
-pub(crate) use cut::PieceOfElement;
-pub(crate) use forces::Shares;
-pub(crate) use law::{Deformed, Law, Load, Rest};
-use offsets::Offsets;
-use parts::{Copies, FemPart};
-use past::Memory;
+pub(crate) use cut::ElementPiece;
+pub(crate) use forces::ElementForces;
+use history::ElementHistory;
+pub(crate) use law::{DeformedTet, ElasticLaw, RestTet, TetStress};
+use nodal_pressure::{NodalPressures, NodalVolumes};
+use parts::{FemPart, NodeCopies};
+use pressure_offset::PressureOffsets;
 pub(crate) use rates::LEAST_SHEAR;
-use rings::{Pressures, Rings};
 
-/// The tetrahedra of a body that are elements.
+/// The finite elements of a body.
 #[derive(Debug)]
 pub(crate) struct Elements {
-    law: Law,
+    law: ElasticLaw,
     count: usize,
     parts: Vec<FemPart>,
-    /// Of bodies that may be cut.
-    cells: Option<Box<cut::Cells>>,
-    /// Where the copies of each part's nodes begin.
+    /// Where each tetrahedron is stored, for bodies that can be cut.
+    cells: Option<Box<cut::CellIndices>>,
+    /// The index of the first node copy of each part.
     starts: Vec<usize>,
-    copies: Copies,
+    copies: NodeCopies,
     forces: Sums,
-    /// Where volume is kept by rings.
-    rings: Option<Rings>,
-    /// Where they are viscous.
-    memory: Option<Box<Memory>>,
-    /// A bound on the squares of frequencies where the forces were last worked out, and at the current state, 1/s².
-    highest: f32,
-    settled: f32,
-    /// The highest rate of damping of the springs at their nodes, 1/s.
-    most_damped: f32,
-    /// What the bounds at rest leave out, because it does not grow with how elements are deformed, 1/s².
-    of_springs: f32,
-    /// About how stiff the elements at each node are together, N/m.
+    /// The nodal volumes, with average nodal pressure.
+    nodal_volumes: Option<NodalVolumes>,
+    /// The history variables, with viscosity or plasticity.
+    history: Option<Box<ElementHistory>>,
+    /// A bound on the squared angular frequency at the last computed forces, and at the current state, 1/s².
+    rate_bound: f32,
+    committed_rate_bound: f32,
+    /// The highest damping rate of the springs at the nodes of the elements, 1/s.
+    damping_rate: f32,
+    /// The share of the springs in the bound, which does not grow with the deformation of the elements, 1/s².
+    spring_rate: f32,
+    /// The approximate stiffness of the elements at each node, N/m.
     stiffnesses: Vec<f32>,
-    /// Room for a number per node.
-    carried: Vec<f32>,
-    /// Whether the bounds at rest are those of the masses and springs there are.
+    /// The bound at rest of each node, without `spring_rate`, 1/s².
+    node_rates: Vec<f32>,
+    /// True if the bounds at rest match the current masses and springs.
     rates_known: bool,
-    /// Of rings that a cut has parted.
-    offsets: Offsets,
+    /// The volume offsets of nodes that a cut has duplicated.
+    pressure_offsets: PressureOffsets,
 }
 
 saved! { Elements {
-    law, count, parts, cells, starts, copies, forces, rings, memory, highest, settled, most_damped, of_springs,
-    stiffnesses, carried, rates_known, offsets,
+    law, count, parts, cells, starts, copies, forces, nodal_volumes, history, rate_bound, committed_rate_bound,
+    damping_rate, spring_rate, stiffnesses, node_rates, rates_known, pressure_offsets,
 } }
 
-/// Sums of a kind on all copies of nodes.
+/// Per-node sums over the tetrahedra of each part, one entry for each node copy.
 #[derive(Debug)]
 pub(crate) struct Sums {
     positions: Vec<Record>,
-    /// Ways of nodes, where sums are made of them.
-    ways: Vec<Record>,
+    /// Displacements of the nodes, for force differentials only.
+    displacements: Vec<Record>,
     sums: Vec<Record>,
-    of_parts: Vec<f64>,
-    /// Of no nodes where each tetrahedron keeps its own volume.
-    pressures: Pressures,
+    part_totals: Vec<f64>,
+    /// Empty without average nodal pressure.
+    pressures: NodalPressures,
 }
 
-saved! { Sums { positions, ways, sums, of_parts, pressures } }
+saved! { Sums { positions, displacements, sums, part_totals, pressures } }
 
 impl Sums {
-    fn new(copies: usize, parts: usize, with_ways: bool, ring_count: usize) -> Result<Self> {
+    fn new(copies: usize, parts: usize, with_displacements: bool, pressure_count: usize) -> Result<Self> {
         let records = |count| memory::filled(Record::default(), count);
         Ok(Self {
             positions: records(copies)?,
-            ways: records(if with_ways { copies } else { 0 })?,
+            displacements: records(if with_displacements { copies } else { 0 })?,
             sums: records(copies)?,
-            of_parts: memory::filled(0.0, parts)?,
-            pressures: Pressures::new(ring_count)?,
+            part_totals: memory::filled(0.0, parts)?,
+            pressures: NodalPressures::new(pressure_count)?,
         })
     }
 
-    /// Makes room for more copies and parts, and for rings of so many nodes in all, or none.
-    fn reserve(&mut self, copies: usize, parts: usize, ring_count: usize) -> Result<()> {
-        self.pressures.reserve_nodes(ring_count)?;
-        if !self.ways.is_empty() {
-            self.ways.try_reserve(copies)?;
+    /// Reserves memory for additional copies and parts, and for nodal pressures of `pressure_count` nodes in all.
+    fn reserve(&mut self, copies: usize, parts: usize, pressure_count: usize) -> Result<()> {
+        self.pressures.reserve_nodes(pressure_count)?;
+        if !self.displacements.is_empty() {
+            self.displacements.try_reserve(copies)?;
         }
         for records in [&mut self.positions, &mut self.sums] {
             records.try_reserve(copies)?;
         }
-        Ok(self.of_parts.try_reserve(parts)?)
+        Ok(self.part_totals.try_reserve(parts)?)
     }
 
-    /// Makes room for the rings of so many nodes in all, where there are any.
-    pub fn reserve_rings(&mut self, node_count: usize) -> Result<()> {
-        if self.pressures.of_nodes.is_empty() {
+    /// Reserves memory for the pressures of `node_count` nodes in all, if there are nodal pressures.
+    pub fn reserve_pressures(&mut self, node_count: usize) -> Result<()> {
+        if self.pressures.at_nodes.is_empty() {
             return Ok(());
         }
         self.pressures.reserve_nodes(node_count)
     }
 
-    /// Becomes one of so many copies and parts, for which there is room.
+    /// Resizes to these numbers of copies and parts, within the reserved memory.
     fn grow(&mut self, copies: usize, parts: usize) {
-        if !self.ways.is_empty() {
-            self.ways.resize(copies, Record::default());
+        if !self.displacements.is_empty() {
+            self.displacements.resize(copies, Record::default());
         }
         self.positions.resize(copies, Record::default());
         self.sums.resize(copies, Record::default());
-        self.of_parts.resize(parts, 0.0);
+        self.part_totals.resize(parts, 0.0);
     }
 }
 
-/// What is shown the nodes of a tetrahedron, the gradients of their functions, and how it is deformed.
-pub(crate) type SeeDeformed<'a> = dyn FnMut([u32; 4], &[DVec3; 4], &Deformed) + 'a;
+/// A callback for the nodes of a tetrahedron, the gradients of its shape functions, and its deformation.
+pub(crate) type VisitDeformed<'a> = dyn FnMut([u32; 4], &[DVec3; 4], &DeformedTet) + 'a;
 
 impl Elements {
-    /// Tetrahedra of nodes that are here at rest, in the body's own numbers.
+    /// Creates the elements of tetrahedra with rest positions `rest`; nodes have the body's internal indices.
     pub fn new(
-        law: Law,
+        law: ElasticLaw,
         (viscosity, yielding): (Viscosity, Yielding),
         tetrahedra: &[[u32; 4]],
         rest: impl Fn(u32) -> DVec3,
@@ -148,45 +148,48 @@ impl Elements {
             starts.push(count);
             count += part.nodes.len();
         }
-        let ring_count = if law.rings { node_count } else { 0 };
+        let pressure_count = if law.nodal_pressure { node_count } else { 0 };
         let mut elements = Self {
             law,
             cells: None,
             count: tetrahedra.len(),
-            memory: Memory::new(law, viscosity, yielding, &parts, ring_count)?,
-            copies: Copies::new(&parts, node_count)?,
-            forces: Sums::new(count, parts.len(), false, ring_count)?,
-            rings: law.rings.then(|| rings::of(&parts, node_count)).transpose()?,
+            history: ElementHistory::new(law, viscosity, yielding, &parts, pressure_count)?,
+            copies: NodeCopies::new(&parts, node_count)?,
+            forces: Sums::new(count, parts.len(), false, pressure_count)?,
+            nodal_volumes: law
+                .nodal_pressure
+                .then(|| nodal_pressure::nodal_volumes(&parts, node_count))
+                .transpose()?,
             parts,
             starts,
             stiffnesses: memory::filled(0.0, node_count)?,
-            carried: memory::filled(0.0, node_count)?,
-            highest: f32::INFINITY,
-            settled: f32::INFINITY,
-            most_damped: 0.0,
-            of_springs: 0.0,
+            node_rates: memory::filled(0.0, node_count)?,
+            rate_bound: f32::INFINITY,
+            committed_rate_bound: f32::INFINITY,
+            damping_rate: 0.0,
+            spring_rate: 0.0,
             rates_known: false,
-            offsets: Offsets::default(),
+            pressure_offsets: PressureOffsets::default(),
         };
         elements.find_stiffnesses();
         Ok(elements)
     }
 
-    /// Room for sums that are made of ways.
-    pub fn room_for_changes(&self) -> Result<Sums> {
-        let ring_count = self.ring_count_of(self.stiffnesses.len());
-        Sums::new(self.forces.sums.len(), self.parts.len(), true, ring_count)
+    /// Allocates sums for force differentials.
+    pub fn new_differentials(&self) -> Result<Sums> {
+        let pressure_count = self.pressure_count_of(self.stiffnesses.len());
+        Sums::new(self.forces.sums.len(), self.parts.len(), true, pressure_count)
     }
 
-    /// Takes away the tetrahedra that have an edge between two nodes: how many.
+    /// Removes the tetrahedra that contain the edge between two nodes. Returns their number.
     pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
         let mut removed = 0;
         for part in &mut self.parts {
             removed += part.remove_edge(a, b, |node, share| {
-                if let Some(rings) = &mut self.rings {
-                    let volume = &mut rings.volumes[node as usize];
+                if let Some(nodal_volumes) = &mut self.nodal_volumes {
+                    let volume = &mut nodal_volumes.volumes[node as usize];
                     let left = (*volume - share).max(0.0);
-                    self.offsets.scale(node, left / *volume);
+                    self.pressure_offsets.scale(node, left / *volume);
                     *volume = left;
                 }
             });
@@ -195,163 +198,170 @@ impl Elements {
         removed
     }
 
-    /// Shows each tetrahedron's nodes and the way it is at rest.
-    pub fn visit(&self, see: &mut dyn FnMut([u32; 4], &Rest)) {
+    /// Calls `f` with each tetrahedron's nodes and rest shape.
+    pub fn visit(&self, f: &mut dyn FnMut([u32; 4], &RestTet)) {
         for part in &self.parts {
-            part.visit(&mut |corners, rest, _| see(corners, rest));
+            part.visit(&mut |corners, rest, _| f(corners, rest));
         }
     }
 
-    /// The same with the load on it.
-    pub fn visit_loaded(&self, see: &mut dyn FnMut([u32; 4], &Rest, Load)) {
-        let memory = self.memory.as_deref();
+    /// Calls `f` with each tetrahedron's nodes, rest shape and extra stress.
+    pub fn visit_with_extra_stress(&self, f: &mut dyn FnMut([u32; 4], &RestTet, TetStress)) {
+        let history = self.history.as_deref();
         for (index, part) in self.parts.iter().enumerate() {
-            part.visit(&mut |corners, rest, place| {
-                let load = memory.map_or(Load::NONE, |memory| memory.load(index, place));
-                see(corners, rest, load);
+            part.visit(&mut |corners, rest, lane_index| {
+                let extra = history.map_or(TetStress::ZERO, |history| history.extra_stress(index, lane_index));
+                f(corners, rest, extra);
             });
         }
     }
 
-    /// Shows each tetrahedron's nodes, the gradients of their functions and how it is deformed with nodes at `positions`; what rings do
-    /// is shown as if each tetrahedron kept this part of it by itself.
-    pub fn visit_deformed(&self, positions: &Vectors, part_of_rings: f32, see: &mut SeeDeformed) {
+    /// Calls `f` with each tetrahedron's nodes, shape function gradients and deformation, with nodes at `positions`.
+    /// With average nodal pressure, each tetrahedron instead resists its own volume change with the fraction
+    /// `kappa_factor` of kappa.
+    pub fn visit_deformed(&self, positions: &Vectors, kappa_factor: f32, f: &mut VisitDeformed) {
         let mut law = self.stiffened();
-        if law.rings {
-            law.rings = false;
-            law.kappa *= part_of_rings;
+        if law.nodal_pressure {
+            law.nodal_pressure = false;
+            law.kappa *= kappa_factor;
         }
-        self.visit_loaded(&mut |corners, rest, load| {
+        self.visit_with_extra_stress(&mut |corners, rest, extra| {
             let [a, b, c, d] = corners.map(|node| positions.get(node as usize).as_dvec3());
-            let deformed = Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a));
-            see(corners, &rest.gradients(), &deformed.loaded(load));
+            let deformed = DeformedTet::new(law, rest, DMat3::from_cols(b - a, c - a, d - a));
+            f(corners, &rest.gradients(), &deformed.with_extra_stress(extra));
         });
     }
 
-    /// How many numbers [`Self::exact_energy`] needs once there are so many nodes.
-    pub fn ring_count_of(&self, node_count: usize) -> usize {
-        if self.rings.is_some() { node_count } else { 0 }
+    /// The number of volume changes that [`Self::exact_energy`] needs for `node_count` nodes.
+    pub fn pressure_count_of(&self, node_count: usize) -> usize {
+        if self.nodal_volumes.is_some() { node_count } else { 0 }
     }
 
-    /// Whether rings may ever have loads.
-    pub fn may_load_rings(&self) -> bool {
-        self.remember() || self.cells.is_some()
+    /// True if nodal pressures can ever have an extra part, from history or pressure offsets.
+    pub fn may_have_extra_pressure(&self) -> bool {
+        self.has_history() || self.cells.is_some()
     }
 
-    /// About how stiff the elements at a node are together, as they were made, N/m.
+    /// The approximate stiffness of the elements at a node, from their creation, N/m.
     pub fn stiffness_of(&self, node: usize) -> f32 {
         self.stiffnesses[node]
     }
 
-    /// How many there are at most.
+    /// An upper bound on the number of tetrahedra.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// A quarter of the volume of the tetrahedra about a node at rest, m³, where volume is kept by rings.
-    pub fn ring_volume(&self, node: usize) -> Option<f64> {
-        let volume = self.rings.as_ref()?.volumes.get(node)?;
+    /// The nodal volume at rest, a quarter of the volume of the tetrahedra around the node, m³. `None` without average
+    /// nodal pressure.
+    pub fn nodal_volume(&self, node: usize) -> Option<f64> {
+        let volume = self.nodal_volumes.as_ref()?.volumes.get(node)?;
         Some(f64::from(*volume))
     }
 
-    /// The law of all of them in the equation that is being solved.
-    pub fn stiffened(&self) -> Law {
-        self.memory
+    /// The law of all elements in the equation that is being solved; viscosity scales it by 1 plus the gain.
+    pub fn stiffened(&self) -> ElasticLaw {
+        self.history
             .as_ref()
-            .map_or(self.law, |memory| memory.stiffened(self.law))
+            .map_or(self.law, |history| history.stiffened(self.law))
     }
 
-    /// The load on the ring of a node, Pa: what is remembered, and what its offset makes of the pressure.
-    pub fn load_of_ring(&self, node: usize) -> f64 {
-        let memory = self.memory.as_ref();
-        let remembered = memory.map_or(0.0, |memory| memory.load_of_ring(node));
-        match self.ring_volume(node) {
+    /// The extra pressure of a node, from its history and its volume offset, Pa.
+    pub fn extra_pressure(&self, node: usize) -> f64 {
+        let history = self.history.as_ref();
+        let history_pressure = history.map_or(0.0, |history| history.extra_pressure(node));
+        match self.nodal_volume(node) {
             Some(volume) if volume > 0.0 => {
-                remembered - f64::from(self.stiffened().kappa) * self.offsets.of(node) / volume
+                history_pressure - f64::from(self.stiffened().kappa) * self.pressure_offsets.at(node) / volume
             }
-            _ => remembered,
+            _ => history_pressure,
         }
     }
 
-    /// Whether they remember anything.
-    pub fn remember(&self) -> bool {
-        self.memory.is_some()
+    /// True if the elements have history variables.
+    pub fn has_history(&self) -> bool {
+        self.history.is_some()
     }
 
-    /// A step begins, from what is current.
-    pub fn recall(&mut self) {
-        self.offsets.recall();
-        if let Some(memory) = &mut self.memory {
-            memory.recall();
+    /// Resets the history to the current state, at the beginning of a step.
+    pub fn restore(&mut self) {
+        self.pressure_offsets.restore();
+        if let Some(history) = &mut self.history {
+            history.restore();
         }
     }
 
-    /// The step in progress is the current state.
-    pub fn keep(&mut self) {
-        self.offsets.keep();
-        if let Some(memory) = &mut self.memory {
-            memory.keep();
+    /// Makes the history of the step in progress current.
+    pub fn commit(&mut self) {
+        self.pressure_offsets.commit();
+        if let Some(history) = &mut self.history {
+            history.commit();
         }
     }
 
-    /// An equation is to be solved for the end of so many seconds.
-    pub fn foresee(&mut self, time: f64) {
-        if let Some(memory) = &mut self.memory {
-            memory.foresee(time);
+    /// Predicts the history at the end of `time` seconds, for the equation to be solved.
+    pub fn predict(&mut self, time: f64) {
+        if let Some(history) = &mut self.history {
+            history.predict(time);
         }
     }
 
-    /// Nodes have come to `positions` along the course that the viscosity leads to.
-    pub fn age(
+    /// Advances the history to nodes at `positions`, by the relaxation step that `relaxation` returns for the
+    /// viscosity.
+    pub fn advance(
         &mut self,
         kernel: ChosenKernel,
         positions: &[Record],
-        course: impl Fn(Viscosity) -> RelaxationStep,
+        relaxation: impl Fn(Viscosity) -> RelaxationStep,
         team: &Team,
     ) {
-        let Some(memory) = &self.memory else {
+        let Some(history) = &self.history else {
             return;
         };
-        let course = course(memory.viscosity);
-        if self.rings.is_some() {
+        let relaxation = relaxation(history.viscosity);
+        if self.nodal_volumes.is_some() {
             self.find_pressures(kernel, positions, false, team);
         }
         self.find_stresses(kernel, positions, team);
-        if let Some(memory) = &mut self.memory {
-            memory.gain = 0.0;
-            let bounds = memory.bounds.filter(|_| course.yields);
-            team.pass(memory.parts.len(), Items::new(&mut memory.parts), |_, part| {
-                part.age(kernel, course, bounds);
+        if let Some(history) = &mut self.history {
+            history.gain = 0.0;
+            let yield_limits = history.yield_limits.filter(|_| relaxation.yields);
+            team.pass(history.parts.len(), Items::new(&mut history.parts), |_, part| {
+                part.advance(kernel, relaxation, yield_limits);
             });
-            memory.rings.age(course, &self.forces.pressures.of_nodes);
+            history.nodal.advance(relaxation, &self.forces.pressures.at_nodes);
         }
     }
 
-    /// Whether any would yield with nodes at these positions.
+    /// True if any tetrahedron would yield with nodes at these positions.
     pub fn yield_at(&self, position: impl Fn(usize) -> DVec3) -> bool {
-        let Some((memory, bounds)) = self.memory.as_deref().and_then(|memory| Some((memory, memory.bounds?))) else {
+        let Some((history, yield_limits)) = self
+            .history
+            .as_deref()
+            .and_then(|history| Some((history, history.yield_limits?)))
+        else {
             return false;
         };
-        let mut any = false;
+        let mut yields = false;
         for (index, part) in self.parts.iter().enumerate() {
-            part.visit(&mut |corners, rest, place| {
+            part.visit(&mut |corners, rest, lane_index| {
                 let [a, b, c, d] = corners.map(|node| position(node as usize));
-                let deformed = Deformed::new(self.law, rest, DMat3::from_cols(b - a, c - a, d - a));
-                any |= memory.parts[index].yields(bounds, place, deformed.elastic());
+                let deformed = DeformedTet::new(self.law, rest, DMat3::from_cols(b - a, c - a, d - a));
+                yields |= history.parts[index].yields(yield_limits, lane_index, deformed.elastic());
             });
         }
-        any
+        yields
     }
 
-    /// What may change of them.
+    /// Hashes the state that can change.
     pub fn hash(&self, hasher: &mut StateHasher) {
         for group in self.parts.iter().flat_map(|part| part.groups.as_slice()) {
             hasher.write_floats(&group.volumes);
             hasher.write_floats(group.inverse.as_flattened());
         }
-        if let Some(memory) = &self.memory {
-            memory.hash(hasher);
+        if let Some(history) = &self.history {
+            history.hash(hasher);
         }
-        self.offsets.hash(hasher);
+        self.pressure_offsets.hash(hasher);
     }
 }

@@ -1,197 +1,207 @@
-//! What elements allow an explicit solver: a bound on the squares of frequencies, that goes with how they are deformed.
+//! The stable substep of elements under an explicit solver: a bound on squared angular frequencies that follows the
+//! deformation.
 //!
-//! With u_a the ways of an element's corners, g_a the gradients of their functions and H = sum u_a g_a^T, the energy at rest is a form of
-//! (tr H)² and of |sym H|², which is at most |H|². With parts p_a = |g_a| / sum |g_b| Cauchy's inequality gives
-//! `(tr H)² <= sum |g_a|² |u_a|² / p_a` and `|H|² <= gamma sum |g_a|² |u_a|² / p_a`, gamma the largest eigenvalue of `sum p_a n_a n_a^T`, n_a the
-//! direction of g_a: a third in an even tetrahedron, 1 in one that is flat. So a node carries `V c |g_a| sum |g_b|` of each element,
-//! `c = lambda + 2 mu gamma`. Where an element is deformed by R U, its form is that of the ways `U R^T u_a`, and with the cofactors of U for what
-//! keeps volume: `TetrahedronGroups::forces` has what c becomes of that, and of stress. What a node and its springs carry over its mass bounds the squares
-//! of frequencies. No pinned corner goes any way: it is left out.
+//! Let u_a be the displacements of an element's corners, g_a the gradients of their shape functions, and H = sum u_a
+//! g_a^T. The energy at rest is a quadratic form of (tr H)² and |sym H|², which is at most |H|². With p_a = |g_a| /
+//! sum |g_b|, Cauchy's inequality gives `(tr H)² <= sum |g_a|² |u_a|² / p_a` and `|H|² <= gamma sum |g_a|² |u_a|² /
+//! p_a`. Here gamma is the largest eigenvalue of `sum p_a n_a n_a^T`, and n_a is the direction of g_a; gamma is 1/3
+//! for a regular tetrahedron and 1 for a flat one. So each element adds the stiffness `V c |g_a| sum |g_b|` to a node,
+//! with `c = lambda + 2 mu gamma`.
 //!
-//! Springs grow no stiffer with that, so a part P of their bound is the same for all elements: with E of a node's elements and S of its springs,
-//! `S + s E` is at most `P + s max(E, E + S - P)` where the elements are s times as stiff, s at least 1. P is such that this is exact at rest.
+//! An element with the deformation R U has the form of the displacements `U R^T u_a`, and of the cofactors of U in the
+//! volume term. `TetrahedronGroups::forces` computes c for it, with the stress. The stiffness of a node's elements and
+//! springs over its mass bounds the squared frequencies. Pinned corners have no displacement and are left out.
+//!
+//! Springs do not stiffen with the elements, so all elements share a part P of the springs' bound. Let E be the bound
+//! of a node's elements and S that of its springs, with the elements s >= 1 times as stiff as at rest. Then `S + s E`
+//! is at most `P + s max(E, E + S - P)`. P is chosen such that this is exact at rest.
 
 use glam::{DMat3, DVec3};
 
-use super::{Deformed, Elements, Law, Rest};
-use crate::def::Carried;
-use crate::soa::{Masses, Rates, Vectors};
-use crate::springs::{Springs, rates_anywhere};
+use super::{DeformedTet, ElasticLaw, Elements, RestTet};
+use crate::def::NodalStiffness;
+use crate::soa::{FrequencyBound, NodalMasses, Vectors};
+use crate::springs::{Springs, spring_rates};
 
-/// The least that shear counts for: a third of the sum of three eigenvalues, which is 1.
+/// The lower bound on gamma: a third of the eigenvalues' sum, which is 1.
 pub(crate) const LEAST_SHEAR: f32 = 1.0 / 3.0;
 
-/// What each corner of a tetrahedron at rest carries, N/m, where those that are not free go no way.
-pub(super) fn carried(law: Law, rest: &Rest, free: [bool; 4]) -> [f64; 4] {
+/// The stiffness that a tetrahedron at rest adds to each corner, N/m. Corners that are not free have no displacement.
+pub(super) fn corner_stiffness(law: ElasticLaw, rest: &RestTet, free: [bool; 4]) -> [f64; 4] {
     let gradients = rest.gradients();
     let sizes = gradients.map(DVec3::length);
-    let all: f64 = sizes
+    let total: f64 = sizes
         .iter()
         .zip(free)
         .filter(|(_, free)| *free)
         .map(|(size, _)| size)
         .sum();
-    let (mut diagonal, mut across) = (DVec3::ZERO, DVec3::ZERO);
+    let (mut diagonal, mut off_diagonal) = (DVec3::ZERO, DVec3::ZERO);
     for ((gradient, size), free) in gradients.iter().zip(sizes).zip(free) {
         if free {
-            let part = *gradient / (size * all);
-            diagonal += part * *gradient;
-            across += part * DVec3::new(gradient.y, gradient.z, gradient.x);
+            let fraction = *gradient / (size * total);
+            diagonal += fraction * *gradient;
+            off_diagonal += fraction * DVec3::new(gradient.y, gradient.z, gradient.x);
         }
     }
-    // Eigenvalues are no further from their mean than twice this.
+    // Eigenvalues differ from their mean by at most twice this.
     let deviation = diagonal - f64::from(LEAST_SHEAR);
-    let spread = ((deviation.length_squared() + 2.0 * across.length_squared()) / 6.0).sqrt();
+    let spread = ((deviation.length_squared() + 2.0 * off_diagonal.length_squared()) / 6.0).sqrt();
     let shear = (f64::from(LEAST_SHEAR) + 2.0 * spread).min(1.0);
-    let stiffest = f64::from(law.stiffest(shear as f32));
-    sizes.map(|size| rest.volume * stiffest * size * all)
+    let stiffness = f64::from(law.rest_stiffness_bound(shear as f32));
+    sizes.map(|size| rest.volume * stiffness * size * total)
 }
 
 impl Elements {
-    /// Adds up how stiff the elements at each node are at rest.
+    /// Sums the stiffness of the elements at each node at rest.
     pub(super) fn find_stiffnesses(&mut self) {
         let mut stiffnesses = std::mem::take(&mut self.stiffnesses);
-        let whole = f64::from(self.law.whole());
+        let p_wave_modulus = f64::from(self.law.p_wave_modulus());
         self.visit(&mut |corners, rest| {
             for (node, gradient) in corners.into_iter().zip(rest.gradients()) {
-                stiffnesses[node as usize] += (rest.volume * whole * gradient.length_squared()) as f32;
+                stiffnesses[node as usize] += (rest.volume * p_wave_modulus * gradient.length_squared()) as f32;
             }
         });
         self.stiffnesses = stiffnesses;
     }
 
-    /// Makes the bounds at rest those of these masses and springs: whether they were before.
-    pub fn find_rates(&mut self, springs: &dyn Springs, masses: &Masses) -> bool {
+    /// Computes the bounds at rest for these masses and springs. Returns true if they were already known.
+    pub fn find_rates(&mut self, springs: &dyn Springs, masses: &NodalMasses) -> bool {
         if self.rates_known {
             return true;
         }
-        let mut carried = std::mem::take(&mut self.carried);
-        carried.fill(0.0);
-        self.add_carried(masses, |node, more| carried[node] += more as f32);
-        let of_springs = |node| rates_anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
-        let (mut of_elements, mut of_both, mut stiffest) = (0.0_f32, 0.0_f32, 0.0_f32);
-        self.most_damped = 0.0;
-        for (node, carried) in carried.iter_mut().enumerate() {
-            let of_springs = of_springs(node);
-            self.most_damped = self.most_damped.max(of_springs.most_damped);
-            stiffest = stiffest.max(of_springs.stiffest);
-            *carried *= masses.inverse(node);
-            of_elements = of_elements.max(*carried);
-            of_both = of_both.max(*carried + of_springs.stiffest);
+        let mut node_rates = std::mem::take(&mut self.node_rates);
+        node_rates.fill(0.0);
+        self.add_stiffnesses(masses, |node, stiffness| node_rates[node] += stiffness as f32);
+        let spring_rates = |node| spring_rates(node, springs, masses).unwrap_or(FrequencyBound::ZERO);
+        let (mut max_element_rate, mut max_rate, mut max_spring_rate) = (0.0_f32, 0.0_f32, 0.0_f32);
+        self.damping_rate = 0.0;
+        for (node, node_rate) in node_rates.iter_mut().enumerate() {
+            let spring_rates = spring_rates(node);
+            self.damping_rate = self.damping_rate.max(spring_rates.damping_rate);
+            max_spring_rate = max_spring_rate.max(spring_rates.omega_sq);
+            *node_rate *= masses.inverse(node);
+            max_element_rate = max_element_rate.max(*node_rate);
+            max_rate = max_rate.max(*node_rate + spring_rates.omega_sq);
         }
-        self.of_springs = of_both - of_elements;
-        if stiffest > self.of_springs {
-            for (node, carried) in carried.iter_mut().enumerate() {
-                *carried += self.beyond_all(of_springs(node));
+        self.spring_rate = max_rate - max_element_rate;
+        if max_spring_rate > self.spring_rate {
+            for (node, node_rate) in node_rates.iter_mut().enumerate() {
+                *node_rate += self.rate_beyond_shared(spring_rates(node));
             }
         }
-        self.parts.iter_mut().for_each(|part| part.set_rates(&carried));
-        self.carried = carried;
+        self.parts.iter_mut().for_each(|part| part.set_rates(&node_rates));
+        self.node_rates = node_rates;
         self.rates_known = true;
         false
     }
 
-    /// Adds what the nodes that are free carry at rest.
-    pub fn add_to(&self, masses: &Masses, all: &mut [Carried]) {
-        let viscosity = self.memory.as_ref().map(|memory| memory.viscosity);
-        self.add_carried(masses, |node, more| {
-            all[node].add(more as f32, viscosity.unwrap_or_default());
+    /// Adds the stiffness and damping of the elements at each free node at rest.
+    pub fn add_to(&self, masses: &NodalMasses, all: &mut [NodalStiffness]) {
+        let viscosity = self.history.as_ref().map(|history| history.viscosity);
+        self.add_stiffnesses(masses, |node, stiffness| {
+            all[node].add(stiffness as f32, viscosity.unwrap_or_default());
         });
     }
 
-    /// What a node carries at rest, with springs as far as they are stiffer than what all nodes are taken to have, given its inverse mass, where
-    /// bounds at rest are known.
-    pub fn carried_at_rest(&self, node: usize, inverse_mass: f32) -> Carried {
-        let mut carried = Carried::default();
+    /// The stiffness and damping at a node at rest, for its inverse mass. Includes springs as far as they are stiffer
+    /// than the shared part. The bounds at rest must be known.
+    pub fn nodal_stiffness_at_rest(&self, node: usize, inverse_mass: f32) -> NodalStiffness {
+        let mut carried = NodalStiffness::default();
         if inverse_mass > 0.0 {
-            let viscosity = self.memory.as_ref().map(|memory| memory.viscosity);
-            carried.add(self.carried[node] / inverse_mass, viscosity.unwrap_or_default());
+            let viscosity = self.history.as_ref().map(|history| history.viscosity);
+            carried.add(self.node_rates[node] / inverse_mass, viscosity.unwrap_or_default());
         }
         carried
     }
 
-    /// Shows the nodes of each tetrahedron, and how many times as stiff it is as at rest with nodes at `positions`, at most: with what
-    /// [`Self::carried_at_rest`] of a node, that gives the bound of [`Self::rates`].
-    pub fn stiffenings(&self, positions: &Vectors, see: &mut dyn FnMut([u32; 4], f64)) {
+    /// Calls `f` with the nodes of each tetrahedron and an upper bound on its stiffness relative to rest, with nodes
+    /// at `positions`. With [`Self::nodal_stiffness_at_rest`] this gives the bound of [`Self::rates`].
+    pub fn relative_stiffnesses(&self, positions: &Vectors, f: &mut dyn FnMut([u32; 4], f64)) {
         let law = self.stiffened();
-        let of_rings = &self.forces.pressures.of_nodes;
-        self.visit_loaded(&mut |corners, rest, load| {
+        let nodal_pressures = &self.forces.pressures.at_nodes;
+        self.visit_with_extra_stress(&mut |corners, rest, extra| {
             let [a, b, c, d] = corners.map(|node| positions.get(node as usize).as_dvec3());
-            let deformed = Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a)).loaded(load);
-            let pressure = if law.rings {
+            let deformed = DeformedTet::new(law, rest, DMat3::from_cols(b - a, c - a, d - a)).with_extra_stress(extra);
+            let pressure = if law.nodal_pressure {
                 0.25 * corners
-                    .map(|node| f64::from(of_rings[node as usize]))
+                    .map(|node| f64::from(nodal_pressures[node as usize]))
                     .iter()
                     .sum::<f64>()
             } else {
                 deformed.pressure()
             };
-            see(corners, deformed.stiffening(law, pressure));
+            f(corners, deformed.stiffening(law, pressure));
         });
     }
 
-    /// The tetrahedron that bounds substeps with nodes at `positions`, its node of the highest frequency first, and the bound, s, where
-    /// bounds at rest are known; `None`: there is none with a free node.
-    pub fn tightest(&self, masses: &Masses, positions: &Vectors) -> Option<([u32; 4], f32)> {
-        let mut tightest = None;
+    /// The tetrahedron that limits the substep at `positions`, with its limiting node first, and the limit, s. `None`
+    /// if no node is free. The bounds at rest must be known.
+    pub fn limiting_element(&self, masses: &NodalMasses, positions: &Vectors) -> Option<([u32; 4], f32)> {
+        let mut limiting_node = None;
         let mut shortest = f32::INFINITY;
-        self.stiffenings(positions, &mut |corners, stiffening| {
+        self.relative_stiffnesses(positions, &mut |corners, relative_stiffness| {
             for node in corners {
                 let inverse_mass = masses.inverse(node as usize);
-                let carried = self.carried_at_rest(node as usize, inverse_mass);
-                let limit = Rates {
-                    stiffest: self.of_springs + 2.0 * stiffening as f32 * carried.stiffness * inverse_mass,
-                    most_damped: 2.0 * carried.damping * inverse_mass,
+                let carried = self.nodal_stiffness_at_rest(node as usize, inverse_mass);
+                let limit = FrequencyBound {
+                    omega_sq: self.spring_rate + 2.0 * relative_stiffness as f32 * carried.stiffness * inverse_mass,
+                    damping_rate: 2.0 * carried.damping * inverse_mass,
                 }
                 .limit();
                 if limit < shortest {
-                    (tightest, shortest) = (Some(node), limit);
+                    (limiting_node, shortest) = (Some(node), limit);
                 }
             }
         });
-        let node = tightest?;
-        // Of those about the node the one that it carries most of.
-        let (mut found, mut most) = ([node; 4], -1.0);
+        let node = limiting_node?;
+        // The element at the node with the largest stiffness there.
+        let (mut element, mut largest) = ([node; 4], -1.0);
         self.visit(&mut |corners, rest| {
-            if let Some(place) = corners.iter().position(|&corner| corner == node) {
+            if let Some(corner_index) = corners.iter().position(|&corner| corner == node) {
                 let free = corners.map(|node| masses.inverse(node as usize) > 0.0);
-                let carried = carried(self.law, rest, free)[place];
-                if carried > most {
-                    (found, most) = (corners, carried);
-                    found.swap(0, place);
+                let stiffness = corner_stiffness(self.law, rest, free)[corner_index];
+                if stiffness > largest {
+                    (element, largest) = (corners, stiffness);
+                    element.swap(0, corner_index);
                 }
             }
         });
-        Some((found, shortest))
+        Some((element, shortest))
     }
 
-    fn add_carried(&self, masses: &Masses, mut add: impl FnMut(usize, f64)) {
+    fn add_stiffnesses(&self, masses: &NodalMasses, mut add: impl FnMut(usize, f64)) {
         self.visit(&mut |corners, rest| {
             let free = corners.map(|node| masses.inverse(node as usize) > 0.0);
-            for (node, more) in corners.into_iter().zip(carried(self.law, rest, free)) {
-                add(node as usize, more);
+            for (node, stiffness) in corners.into_iter().zip(corner_stiffness(self.law, rest, free)) {
+                add(node as usize, stiffness);
             }
         });
     }
 
-    /// Masses, pins or springs have changed.
+    /// Invalidates the bounds at rest, after a change of masses, pins or springs.
     pub fn forget_rates(&mut self) {
         self.rates_known = false;
     }
 
-    /// What springs of a node have beyond what all nodes are taken to have, 1/s².
-    pub(super) fn beyond_all(&self, of_springs: Rates) -> f32 {
-        (of_springs.stiffest - self.of_springs).max(0.0)
+    /// The bound of a node's springs above the shared part, 1/s².
+    pub(super) fn rate_beyond_shared(&self, spring_rates: FrequencyBound) -> f32 {
+        (spring_rates.omega_sq - self.spring_rate).max(0.0)
     }
 
-    /// What bounds frequencies with the nodes at the current state, where `is_settled`, or where forces were last worked out.
-    pub fn rates(&self, is_settled: bool) -> Rates {
-        let rates = Rates {
-            stiffest: self.of_springs + if is_settled { self.settled } else { self.highest },
-            most_damped: self.most_damped,
+    /// The rate bounds at the current state, if `is_settled`, or at the last computed forces.
+    pub fn rates(&self, is_settled: bool) -> FrequencyBound {
+        let rates = FrequencyBound {
+            omega_sq: self.spring_rate
+                + if is_settled {
+                    self.committed_rate_bound
+                } else {
+                    self.rate_bound
+                },
+            damping_rate: self.damping_rate,
         };
-        self.memory
+        self.history
             .as_ref()
-            .map_or(rates, |memory| memory.viscosity.rates(rates))
+            .map_or(rates, |history| history.viscosity.rates(rates))
     }
 }

@@ -1,9 +1,9 @@
-//! Tetrahedra of St Venant and Kirchhoff's law with a signed volume term, as many at a time as the processor has lanes.
+//! SIMD kernels for tetrahedra, with as many elements at once as the processor has lanes.
 //!
-//! With F the edges from a tetrahedron's first corner times the inverse of what they are at rest, E = (F^T F - I) / 2 and J = det F, the
-//! energy is `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)` and the forces are those of `P = F S + kappa (J - 1) cof F`,
-//! `S = lambda tr E + 2 mu E`. The law is the same in every direction, so each tetrahedron may have its own frame at rest: one in
-//! which that inverse is upper triangular, six numbers instead of nine.
+//! Let F be the current edges from a tetrahedron's first corner times the inverse of the rest edges, E = (F^T F - I) /
+//! 2 and J = det F. The St Venant-Kirchhoff energy is `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)`. Forces
+//! follow from `P = F S + kappa (J - 1) cof F` and `S = lambda tr E + 2 mu E`. The laws are isotropic, so each
+//! tetrahedron uses a rest frame in which the inverse is upper triangular and has six entries instead of nine.
 #![allow(unsafe_code)]
 
 mod hyperelastic;
@@ -11,27 +11,27 @@ mod st_venant_kirchhoff;
 
 use std::ops::Range;
 
-use self::st_venant_kirchhoff::{FindChanges, FindEnergy, FindForces, FindGrowths, FindStresses};
+use self::st_venant_kirchhoff::{FindDifferentials, FindEnergy, FindForces, FindStresses, FindVolumeChanges};
 use crate::codec::saved;
-use crate::elements::Law;
+use crate::elements::ElasticLaw;
 use crate::elements::laws::with_hyperelastic;
 use crate::simd::algebra::{Matrix3, Six, cross, difference, dot, sum, times_lower, times_upper};
 use crate::simd::{ChosenKernel, Lanes, Record};
 
-/// Tetrahedra side by side.
+/// The number of tetrahedra of a group.
 pub(crate) const GROUP: usize = 16;
 
-/// Sixteen tetrahedra side by side; what is missing to sixteen has no volume.
+/// Sixteen tetrahedra in structure-of-arrays layout. Unused lanes have no volume.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Group {
-    /// Twice the numbers of their nodes in the part, as a record is twice as long as what an address can be scaled by.
+    /// Twice the indices of the nodes in the part: a record has 16 bytes, and addresses are scaled by at most 8.
     pub corners: [[u16; GROUP]; 4],
-    /// The inverse at rest, 1/m: its entries 00, 01, 02, 11, 12, 22.
+    /// The inverse of the rest edges, 1/m: its entries 00, 01, 02, 11, 12, 22.
     pub inverse: [[f32; GROUP]; 6],
-    /// At rest, times how much stiffer it is than the law, m³.
+    /// The rest volume times the relative stiffness, m³.
     pub volumes: [f32; GROUP],
-    /// A bound on the squared frequency of its nodes at rest, 1/s².
+    /// A bound on the squared angular frequency of its nodes at rest, 1/s².
     pub rates: [f32; GROUP],
 }
 
@@ -46,7 +46,8 @@ impl Group {
     };
 }
 
-/// Stresses of sixteen tetrahedra, Pa: S with its entries 00, 01, 02, 11, 12, 22, and the pressure of the volume term.
+/// The stresses of sixteen tetrahedra, Pa: the entries 00, 01, 02, 11, 12, 22 of S, and the pressure of the volume
+/// term.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stresses(pub [[f32; GROUP]; 7]);
@@ -57,30 +58,30 @@ impl Stresses {
     pub const ZERO: Self = Self([[0.0; GROUP]; 7]);
 }
 
-/// Tetrahedra of nodes below a number.
+/// The groups of a part, with node indices below `node_count`.
 #[derive(Debug)]
 pub(crate) struct TetrahedronGroups {
     groups: Vec<Group>,
     node_count: usize,
 }
 
-saved! { TetrahedronGroups { groups, node_count } where Self::lead_to_nodes }
+saved! { TetrahedronGroups { groups, node_count } where Self::has_valid_corners }
 
 impl TetrahedronGroups {
     /// # Panics
-    /// Where a corner is not below `node_count`.
+    /// If a corner is not below `node_count`.
     pub fn new(groups: Vec<Group>, node_count: usize) -> Self {
         let groups = Self { groups, node_count };
-        assert!(groups.lead_to_nodes());
+        assert!(groups.has_valid_corners());
         groups
     }
 
-    fn lead_to_nodes(&self) -> bool {
+    fn has_valid_corners(&self) -> bool {
         let corners = self.groups.iter().flat_map(|group| group.corners.as_flattened());
-        corners.into_iter().all(|corner| self.is_node(corner))
+        corners.into_iter().all(|corner| self.is_valid_corner(corner))
     }
 
-    fn is_node(&self, corner: &u16) -> bool {
+    fn is_valid_corner(&self, corner: &u16) -> bool {
         usize::from(corner / 2) < self.node_count && corner.is_multiple_of(2)
     }
 
@@ -88,17 +89,18 @@ impl TetrahedronGroups {
         &self.groups
     }
 
-    /// Sets the bounds on frequencies to the highest of the corners'.
-    pub fn set_rates(&mut self, of_corner: impl Fn(u16) -> f32) {
+    /// Sets each tetrahedron's rate bound to the highest of its corners' bounds.
+    pub fn set_rates(&mut self, corner_rate: impl Fn(u16) -> f32) {
         for group in &mut self.groups {
             for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
-                let rates = group.corners.map(|corners| of_corner(corners[lane] / 2));
+                let rates = group.corners.map(|corners| corner_rate(corners[lane] / 2));
                 group.rates[lane] = rates.into_iter().fold(0.0, f32::max);
             }
         }
     }
 
-    /// Gives tetrahedra that there are another volume and inverse, those for which `shape` has one; without a volume they are taken away.
+    /// Replaces volume and inverse of the tetrahedra for which `shape` returns new ones. A volume of 0 removes the
+    /// tetrahedron.
     pub fn reshape(&mut self, mut shape: impl FnMut(&Group, usize) -> Option<(f32, [f32; 6])>) {
         for index in 0..self.groups.len() {
             for lane in 0..GROUP {
@@ -121,12 +123,12 @@ impl TetrahedronGroups {
         }
     }
 
-    /// Puts a tetrahedron of these corners, twice the numbers of nodes, into a lane of a group where there is none.
+    /// Stores a tetrahedron in a free lane of a group. Corners are twice the indices of nodes.
     ///
     /// # Panics
-    /// Where a corner is not below the number of nodes.
-    pub fn put(&mut self, [group, lane]: [usize; 2], corners: [u16; 4], inverse: [f32; 6], volume: f32) {
-        assert!(corners.iter().all(|corner| self.is_node(corner)));
+    /// If a corner is not below the number of nodes.
+    pub fn insert(&mut self, [group, lane]: [usize; 2], corners: [u16; 4], inverse: [f32; 6], volume: f32) {
+        assert!(corners.iter().all(|corner| self.is_valid_corner(corner)));
         let group = &mut self.groups[group];
         for (to, corner) in group.corners.iter_mut().zip(corners) {
             to[lane] = corner;
@@ -137,17 +139,17 @@ impl TetrahedronGroups {
         group.volumes[lane] = volume;
     }
 
-    /// Sets the bound on frequencies of a tetrahedron.
+    /// Sets the rate bound of a tetrahedron.
     pub fn set_rate(&mut self, [group, lane]: [usize; 2], rate: f32) {
         self.groups[group].rates[lane] = rate;
     }
 
-    /// Gives a tetrahedron another volume.
+    /// Sets the volume of a tetrahedron.
     pub fn set_volume(&mut self, [group, lane]: [usize; 2], volume: f32) {
         self.groups[group].volumes[lane] = volume;
     }
 
-    /// Takes away a tetrahedron: what is left of it has no volume.
+    /// Removes a tetrahedron: its lane has no volume afterwards.
     pub fn remove(&mut self, group: usize, lane: usize) {
         let group = &mut self.groups[group];
         group.volumes[lane] = 0.0;
@@ -155,88 +157,132 @@ impl TetrahedronGroups {
         group.inverse.iter_mut().for_each(|entry| entry[lane] = 0.0);
     }
 
-    /// Adds the forces of the tetrahedra, N, with nodes at `positions`, and with `loads` on top of their stresses, which may be none: a
-    /// bound on the squares of frequencies, 1/s².
+    /// Adds the forces of the tetrahedra to `sums`, N. `extra` are extra stresses; the slice may be empty. Returns a
+    /// bound on the squared angular frequency, 1/s².
     pub fn forces(
         &self,
         kernel: ChosenKernel,
-        law: Law,
-        loads: &[Stresses],
+        law: ElasticLaw,
+        extra: &[Stresses],
         positions: &[Record],
         sums: &mut [Record],
     ) -> f32 {
-        assert!(loads.is_empty() || loads.len() == self.groups.len());
-        let of = self.checked(positions, sums);
+        assert!(extra.is_empty() || extra.len() == self.groups.len());
+        let tetrahedra = self.checked(positions, sums);
         with_hyperelastic!(
             law,
-            |form| if law.rings {
-                kernel.run_with_lanes(hyperelastic::HyperelasticForces::<_, true> { law, form, of })
+            |hyperelastic_law| if law.nodal_pressure {
+                kernel.run_with_lanes(hyperelastic::HyperelasticForces::<_, true> {
+                    law,
+                    hyperelastic_law,
+                    tetrahedra,
+                })
             } else {
-                kernel.run_with_lanes(hyperelastic::HyperelasticForces::<_, false> { law, form, of })
+                kernel.run_with_lanes(hyperelastic::HyperelasticForces::<_, false> {
+                    law,
+                    hyperelastic_law,
+                    tetrahedra,
+                })
             },
-            match (law.rings, loads) {
-                (true, []) => kernel.run_with_lanes(FindForces::<true, false> { law, loads, of }),
-                (false, []) => kernel.run_with_lanes(FindForces::<false, false> { law, loads, of }),
-                (true, _) => kernel.run_with_lanes(FindForces::<true, true> { law, loads, of }),
-                (false, _) => kernel.run_with_lanes(FindForces::<false, true> { law, loads, of }),
+            match (law.nodal_pressure, extra) {
+                (true, []) => kernel.run_with_lanes(FindForces::<true, false> { law, extra, tetrahedra }),
+                (false, []) => kernel.run_with_lanes(FindForces::<false, false> { law, extra, tetrahedra }),
+                (true, _) => kernel.run_with_lanes(FindForces::<true, true> { law, extra, tetrahedra }),
+                (false, _) => kernel.run_with_lanes(FindForces::<false, true> { law, extra, tetrahedra }),
             }
         )
     }
 
-    /// Adds how these forces change where nodes go these ways, to first order, N.
-    pub fn changes(
+    /// Adds the force differentials for these displacements to `sums`, N.
+    pub fn force_differentials(
         &self,
         kernel: ChosenKernel,
-        law: Law,
-        loads: &[Stresses],
-        [positions, ways]: [&[Record]; 2],
+        law: ElasticLaw,
+        extra: &[Stresses],
+        [positions, displacements]: [&[Record]; 2],
         sums: &mut [Record],
     ) {
-        assert_eq!(ways.len(), self.node_count);
-        assert!(loads.is_empty() || loads.len() == self.groups.len());
-        let ways = ways.as_ptr();
-        let of = self.checked(positions, sums);
+        assert_eq!(displacements.len(), self.node_count);
+        assert!(extra.is_empty() || extra.len() == self.groups.len());
+        let displacements = displacements.as_ptr();
+        let tetrahedra = self.checked(positions, sums);
         with_hyperelastic!(
             law,
-            |form| if law.rings {
-                kernel.run_with_lanes(hyperelastic::HyperelasticChanges::<_, true> { law, form, ways, of });
+            |hyperelastic_law| if law.nodal_pressure {
+                kernel.run_with_lanes(hyperelastic::HyperelasticDifferentials::<_, true> {
+                    law,
+                    hyperelastic_law,
+                    displacements,
+                    tetrahedra,
+                });
             } else {
-                kernel.run_with_lanes(hyperelastic::HyperelasticChanges::<_, false> { law, form, ways, of });
+                kernel.run_with_lanes(hyperelastic::HyperelasticDifferentials::<_, false> {
+                    law,
+                    hyperelastic_law,
+                    displacements,
+                    tetrahedra,
+                });
             },
-            match (law.rings, loads) {
-                (true, []) => kernel.run_with_lanes(FindChanges::<true, false> { law, loads, ways, of }),
-                (false, []) => kernel.run_with_lanes(FindChanges::<false, false> { law, loads, ways, of }),
-                (true, _) => kernel.run_with_lanes(FindChanges::<true, true> { law, loads, ways, of }),
-                (false, _) => kernel.run_with_lanes(FindChanges::<false, true> { law, loads, ways, of }),
+            match (law.nodal_pressure, extra) {
+                (true, []) => kernel.run_with_lanes(FindDifferentials::<true, false> {
+                    law,
+                    extra,
+                    displacements,
+                    tetrahedra
+                }),
+                (false, []) => kernel.run_with_lanes(FindDifferentials::<false, false> {
+                    law,
+                    extra,
+                    displacements,
+                    tetrahedra
+                }),
+                (true, _) => kernel.run_with_lanes(FindDifferentials::<true, true> {
+                    law,
+                    extra,
+                    displacements,
+                    tetrahedra
+                }),
+                (false, _) => kernel.run_with_lanes(FindDifferentials::<false, true> {
+                    law,
+                    extra,
+                    displacements,
+                    tetrahedra
+                }),
             }
         );
     }
 
-    /// Writes the stresses of the tetrahedra, without pressures where those are of rings.
-    pub fn stresses(&self, kernel: ChosenKernel, law: Law, positions: &[Record], stresses: &mut [Stresses]) {
+    /// Computes the stresses of the tetrahedra, without nodal pressures.
+    pub fn stresses(&self, kernel: ChosenKernel, law: ElasticLaw, positions: &[Record], stresses: &mut [Stresses]) {
         assert_eq!(stresses.len(), self.groups.len());
         kernel.run_with_lanes(FindStresses {
             law,
             stresses,
-            of: self.checked(positions, &mut []),
+            tetrahedra: self.checked(positions, &mut []),
         });
     }
 
-    /// Adds to the first number of each node a quarter of what its tetrahedra are larger than at rest, m³, or with ways to first
-    /// order how much larger they become.
-    pub fn growths(&self, kernel: ChosenKernel, positions: &[Record], ways: Option<&[Record]>, sums: &mut [Record]) {
-        assert!(ways.is_none_or(|ways| ways.len() == self.node_count));
-        kernel.run_with_lanes(FindGrowths {
-            ways: ways.map(<[Record]>::as_ptr),
-            of: self.checked(positions, sums),
+    /// Adds a quarter of each tetrahedron's volume change to the first component of its nodes' sums, m³. With
+    /// displacements, adds the differential of the volume instead.
+    pub fn volume_changes(
+        &self,
+        kernel: ChosenKernel,
+        positions: &[Record],
+        displacements: Option<&[Record]>,
+        sums: &mut [Record],
+    ) {
+        assert!(displacements.is_none_or(|displacements| displacements.len() == self.node_count));
+        kernel.run_with_lanes(FindVolumeChanges {
+            displacements: displacements.map(<[Record]>::as_ptr),
+            tetrahedra: self.checked(positions, sums),
         });
     }
 
-    /// The energy of the tetrahedra, without that of rings, J.
-    pub fn energy(&self, kernel: ChosenKernel, law: Law, positions: &[Record]) -> f64 {
+    /// The energy of the tetrahedra, without that of nodal pressures, J.
+    pub fn energy(&self, kernel: ChosenKernel, law: ElasticLaw, positions: &[Record]) -> f64 {
         kernel.run_with_lanes(FindEnergy {
             law,
-            of: self.checked(positions, &mut []),
+            tetrahedra: self.checked(positions, &mut []),
         })
     }
 
@@ -250,16 +296,17 @@ impl TetrahedronGroups {
     }
 }
 
-/// Tetrahedra whose corners lead to readable positions and, but for their energy, writable sums.
+/// Groups with validated pointers: corners index readable positions and, except for energies and stresses, writable
+/// sums.
 struct Tetrahedra<'a> {
     groups: &'a [Group],
     positions: *const Record,
     sums: *mut Record,
 }
 
-/// A tetrahedron as it is deformed.
+/// The deformation of the tetrahedra of a lane batch.
 struct DeformedLanes<L> {
-    /// F.
+    /// The deformation gradient F.
     gradient: Matrix3<L>,
     /// The cofactors of F.
     cofactors: Matrix3<L>,
@@ -267,40 +314,40 @@ struct DeformedLanes<L> {
     twice_strain: Six<L>,
     /// 2 tr E.
     twice_trace: L,
-    /// J - 1.
-    growth: L,
-    /// The mean of its nodes' pressures, where they have any, Pa.
+    /// The volumetric strain J - 1.
+    volume_strain: L,
+    /// The mean of the fourth components of its nodes' records, which are their pressures if there are any, Pa.
     pressure: L,
 }
 
 impl<'a> Tetrahedra<'a> {
-    /// The edges from the first corner to the others, and the mean of what the corners have beside their places.
+    /// The edges from the first corner to the others, and the mean of the fourth components of the corners' records.
     ///
     /// # Safety
-    /// As for the kernel; `first` is a turn's first lane.
+    /// As for the kernel; `first` is the first lane of a batch.
     #[inline(always)]
     unsafe fn edges<L: Lanes>(from: *const Record, group: &Group, first: usize) -> (Matrix3<L>, L) {
-        // SAFETY: corners lead to records.
+        // SAFETY: corners are indices of records.
         unsafe {
             let [a, b, c, d] = &group.corners;
-            let [ax, ay, az, pa] = L::records_twice(from, a.as_ptr().add(first));
-            let [bx, by, bz, pb] = L::records_twice(from, b.as_ptr().add(first));
-            let [cx, cy, cz, pc] = L::records_twice(from, c.as_ptr().add(first));
-            let [dx, dy, dz, pd] = L::records_twice(from, d.as_ptr().add(first));
-            let place = [ax, ay, az];
+            let [ax, ay, az, pa] = L::gather_records_scaled(from, a.as_ptr().add(first));
+            let [bx, by, bz, pb] = L::gather_records_scaled(from, b.as_ptr().add(first));
+            let [cx, cy, cz, pc] = L::gather_records_scaled(from, c.as_ptr().add(first));
+            let [dx, dy, dz, pd] = L::gather_records_scaled(from, d.as_ptr().add(first));
+            let origin = [ax, ay, az];
             let edges = [
-                difference([bx, by, bz], place),
-                difference([cx, cy, cz], place),
-                difference([dx, dy, dz], place),
+                difference([bx, by, bz], origin),
+                difference([cx, cy, cz], origin),
+                difference([dx, dy, dz], origin),
             ];
-            (edges, pa.add(pb).add(pc.add(pd)).multiply(L::splat(0.25)))
+            (edges, pa.add(pb).add(pc.add(pd)).mul(L::splat(0.25)))
         }
     }
 
     #[inline(always)]
     unsafe fn inverse<L: Lanes>(group: &Group, first: usize) -> Six<L> {
         // SAFETY: the lanes are of a group.
-        unsafe { six(&group.inverse, first) }
+        unsafe { load_six(&group.inverse, first) }
     }
 
     #[inline(always)]
@@ -318,12 +365,12 @@ impl<'a> Tetrahedra<'a> {
             let [a, b, c] = gradient;
             let one = L::splat(1.0);
             let twice_strain = [
-                dot(a, a).subtract(one),
+                dot(a, a).sub(one),
                 dot(a, b),
                 dot(a, c),
-                dot(b, b).subtract(one),
+                dot(b, b).sub(one),
                 dot(b, c),
-                dot(c, c).subtract(one),
+                dot(c, c).sub(one),
             ];
             let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
             DeformedLanes {
@@ -331,35 +378,36 @@ impl<'a> Tetrahedra<'a> {
                 cofactors,
                 twice_strain,
                 twice_trace: twice_strain[0].add(twice_strain[3]).add(twice_strain[5]),
-                growth: dot(a, cofactors[0]).subtract(one),
+                volume_strain: dot(a, cofactors[0]).sub(one),
                 pressure,
             }
         }
     }
 
-    /// Adds the forces of stresses times minus the volume at rest.
+    /// Subtracts the volume times the stress, applied to the gradients of the shape functions, from the forces of the
+    /// corners.
     #[inline(always)]
-    unsafe fn spread<L: Lanes>(&self, group: &Group, first: usize, stress: Matrix3<L>, inverse: Six<L>) {
+    unsafe fn scatter_forces<L: Lanes>(&self, group: &Group, first: usize, stress: Matrix3<L>, inverse: Six<L>) {
         // SAFETY: the same contract.
         unsafe {
             let [b, c, d] = times_lower(stress, inverse);
             let corners = &group.corners;
-            L::add_to_records(self.sums, corners[1].as_ptr().add(first), b);
-            L::add_to_records(self.sums, corners[2].as_ptr().add(first), c);
-            L::add_to_records(self.sums, corners[3].as_ptr().add(first), d);
+            L::scatter_add_records(self.sums, corners[1].as_ptr().add(first), b);
+            L::scatter_add_records(self.sums, corners[2].as_ptr().add(first), c);
+            L::scatter_add_records(self.sums, corners[3].as_ptr().add(first), d);
             let zero = [L::splat(0.0); 3];
             let a = difference(zero, sum(sum(b, c), d));
-            L::add_to_records(self.sums, corners[0].as_ptr().add(first), a);
+            L::scatter_add_records(self.sums, corners[0].as_ptr().add(first), a);
         }
     }
 }
 
-/// The first six numbers of a turn's lanes.
+/// Loads the first six rows of numbers for a lane batch.
 ///
 /// # Safety
-/// As for the kernel; there are six at least, and `first` is a turn's first lane.
+/// As for the kernel; there are at least six rows, and `first` is the first lane of a batch.
 #[inline(always)]
-unsafe fn six<L: Lanes>(numbers: &[[f32; GROUP]], first: usize) -> Six<L> {
+unsafe fn load_six<L: Lanes>(numbers: &[[f32; GROUP]], first: usize) -> Six<L> {
     // SAFETY: the lanes are of a group.
     unsafe {
         [
@@ -373,22 +421,22 @@ unsafe fn six<L: Lanes>(numbers: &[[f32; GROUP]], first: usize) -> Six<L> {
     }
 }
 
-/// Where each turn's lanes begin.
-fn turns<L: Lanes>() -> impl Iterator<Item = usize> {
+/// The first lane of each batch.
+fn batches<L: Lanes>() -> impl Iterator<Item = usize> {
     Range { start: 0, end: GROUP }.step_by(L::COUNT)
 }
 
 impl Stresses {
     /// # Safety
-    /// As for the kernel; `first` is a turn's first lane.
+    /// As for the kernel; `first` is the first lane of a batch.
     #[inline(always)]
     unsafe fn entries<L: Lanes>(&self, first: usize) -> Six<L> {
         // SAFETY: the lanes are of a group.
-        unsafe { six(&self.0, first) }
+        unsafe { load_six(&self.0, first) }
     }
 
     /// # Safety
-    /// As above.
+    /// As for [`Self::entries`].
     #[inline(always)]
     unsafe fn pressures<L: Lanes>(&self, first: usize) -> L {
         // SAFETY: the lanes are of a group.

@@ -1,14 +1,14 @@
-//! To what of a body each vertex of a fine surface belongs.
+//! Binds the vertices of a fine surface to the tetrahedra or triangles of a body.
 
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::base::{Result, ensure, memory};
 use crate::cutting::{CutSolid, CutSurface};
-use crate::geometry::Bounds;
+use crate::geometry::Aabb;
+use crate::geometry::bvh::Bvh;
 use crate::geometry::nearest::{nearest_on_triangle, weighted};
-use crate::geometry::tree::Tree;
 
-/// A vertex in a tetrahedron, or beside one.
+/// A vertex bound to a tetrahedron, inside or outside it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InTetrahedron {
     pub nodes: [u32; 4],
@@ -16,17 +16,17 @@ pub(super) struct InTetrahedron {
     pub weights: [f32; 3],
 }
 
-/// A vertex over a triangle.
+/// A vertex bound to a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OverTriangle {
     pub nodes: [u32; 3],
     /// The barycentric weights of all but the first.
     pub weights: [f32; 2],
-    /// Along the normal, m.
+    /// The distance along the normal, m.
     pub offset: f32,
 }
 
-/// What each vertex goes with, in the order of the vertices.
+/// What each vertex is bound to, in the order of the vertices.
 #[derive(Debug)]
 pub(super) enum Binding {
     Tetrahedra(Vec<InTetrahedron>),
@@ -36,30 +36,31 @@ pub(super) enum Binding {
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 
 impl Binding {
-    /// Each vertex to the tetrahedron that it is in, the one that is nearest, or among several the one that it is deepest in; and which that is.
+    /// Binds each vertex to the tetrahedron that contains it, or else the nearest one; among several to the one in which it is deepest. Returns these
+    /// tetrahedra too.
     pub fn to_tetrahedra(vertices: &[Vec3], positions: &[Vec3], tetrahedra: &[[u32; 4]]) -> Result<(Self, Vec<u32>)> {
-        let corners = |place: u32| tetrahedra[place as usize].map(|node| positions[node as usize]);
+        let corners = |index: u32| tetrahedra[index as usize].map(|node| positions[node as usize]);
         let solids: Vec<PlacedTetrahedron> = memory::collected(
             (0..tetrahedra.len() as u32)
-                .map(|place| PlacedTetrahedron::of(corners(place).map(|corner| corner.as_dvec3()))),
+                .map(|index| PlacedTetrahedron::of(corners(index).map(|corner| corner.as_dvec3()))),
         )?;
         ensure!(
             solids.iter().any(PlacedTetrahedron::has_volume),
             "tetrahedra: none of them has a volume"
         );
-        // The box of these three corners is that of the tetrahedron.
-        let tree = Tree::new(tetrahedra.len(), |place| {
-            let bounds = Bounds::of(corners(place).into_iter());
+        // The bounding box of these three points is that of the tetrahedron.
+        let tree = Bvh::new(tetrahedra.len(), |index| {
+            let bounds = Aabb::of(corners(index).into_iter());
             [bounds.min, bounds.max, bounds.min]
         })?;
         let mut bound = memory::reserved(vertices.len())?;
-        let mut homes = memory::reserved(vertices.len())?;
+        let mut cells = memory::reserved(vertices.len())?;
         for &vertex in vertices {
             let point = vertex.as_dvec3();
-            // Squared distance, depth and number of the best so far.
+            // The squared distance, depth and index of the best tetrahedron so far.
             let mut best = (f64::INFINITY, f64::NEG_INFINITY, 0);
-            tree.near(&Bounds::of(std::iter::once(vertex)), f32::INFINITY, |place| {
-                let number = tree.triangle(place);
+            tree.near(&Aabb::of(std::iter::once(vertex)), f32::INFINITY, |index| {
+                let number = tree.triangle(index);
                 let solid = &solids[number as usize];
                 if solid.has_volume() {
                     let depth = solid.depth(point);
@@ -76,75 +77,75 @@ impl Binding {
                 }
                 best.0 as f32
             });
-            homes.push(best.2);
+            cells.push(best.2);
             let number = best.2 as usize;
             bound.push(InTetrahedron {
                 nodes: tetrahedra[number],
                 weights: solids[number].weights(point).as_vec3().to_array(),
             });
         }
-        Ok((Self::Tetrahedra(bound), homes))
+        Ok((Self::Tetrahedra(bound), cells))
     }
 
-    /// The same with the cells of a solid that has been cut: the one whose material is there or nearest.
+    /// Binds each vertex to the cell of a cut solid whose material contains it or is nearest.
     pub fn to_solid(vertices: &[Vec3], positions: &[Vec3], solid: &CutSolid) -> Result<(Self, Vec<u32>)> {
         let count = solid.vertices().len() as u32;
         let places: Vec<Vec3> = memory::collected((0..count).map(|vertex| solid.place(vertex, positions)))?;
         let pieces: Vec<[u32; 4]> =
             memory::collected(solid.tetrahedra().iter().map(|tetrahedron| tetrahedron.corners))?;
-        let (_, mut homes) = Self::to_tetrahedra(vertices, &places, &pieces)?;
-        let bound = memory::collected(vertices.iter().zip(&mut homes).map(|(vertex, home)| {
-            *home = solid.tetrahedra()[*home as usize].cell;
-            let nodes = solid.cells()[*home as usize].nodes;
-            let cell = PlacedTetrahedron::of(nodes.map(|node| positions[node as usize].as_dvec3()));
+        let (_, mut cells) = Self::to_tetrahedra(vertices, &places, &pieces)?;
+        let bound = memory::collected(vertices.iter().zip(&mut cells).map(|(vertex, cell)| {
+            *cell = solid.tetrahedra()[*cell as usize].cell;
+            let nodes = solid.cells()[*cell as usize].nodes;
+            let placed = PlacedTetrahedron::of(nodes.map(|node| positions[node as usize].as_dvec3()));
             InTetrahedron {
                 nodes,
-                weights: cell.weights(vertex.as_dvec3()).as_vec3().to_array(),
+                weights: placed.weights(vertex.as_dvec3()).as_vec3().to_array(),
             }
         }))?;
-        Ok((Self::Tetrahedra(bound), homes))
+        Ok((Self::Tetrahedra(bound), cells))
     }
 
-    /// Each vertex to the cell of a surface that may be cut whose material is nearest, and which that is.
+    /// Binds each vertex to the cell of a cuttable surface whose material is nearest. Returns these cells too.
     pub fn to_surface(vertices: &[Vec3], positions: &[Vec3], surface: &CutSurface) -> Result<(Self, Vec<u32>)> {
         let count = surface.vertices().len() as u32;
         let places: Vec<Vec3> = memory::collected((0..count).map(|vertex| surface.place(vertex, positions)))?;
         let pieces: Vec<[u32; 3]> = memory::collected(surface.triangles().iter().map(|triangle| triangle.corners))?;
-        let mut homes = nearest_triangles(vertices, &places, &pieces)?;
-        let bound = memory::collected(vertices.iter().zip(&mut homes).map(|(vertex, home)| {
-            *home = surface.triangles()[*home as usize].cell;
-            let nodes = surface.cells()[*home as usize].nodes;
-            over(vertex.as_dvec3(), nodes, nodes.map(|node| positions[node as usize]))
+        let mut cells = nearest_triangles(vertices, &places, &pieces)?;
+        let bound = memory::collected(vertices.iter().zip(&mut cells).map(|(vertex, cell)| {
+            *cell = surface.triangles()[*cell as usize].cell;
+            let nodes = surface.cells()[*cell as usize].nodes;
+            bind_to_triangle(vertex.as_dvec3(), nodes, nodes.map(|node| positions[node as usize]))
         }))?;
-        Ok((Self::Triangles(bound), homes))
+        Ok((Self::Triangles(bound), cells))
     }
 
-    /// Each vertex to the nearest triangle.
+    /// Binds each vertex to the nearest triangle.
     pub fn to_triangles(vertices: &[Vec3], positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
         ensure!(
             !triangles.is_empty(),
             "tetrahedra are 0, and nothing is drawn of the body: there is nothing to bind to"
         );
-        let homes = nearest_triangles(vertices, positions, triangles)?;
-        let bound = memory::collected(vertices.iter().zip(homes).map(|(vertex, home)| {
-            let nodes = triangles[home as usize];
-            over(vertex.as_dvec3(), nodes, nodes.map(|node| positions[node as usize]))
+        let cells = nearest_triangles(vertices, positions, triangles)?;
+        let bound = memory::collected(vertices.iter().zip(cells).map(|(vertex, triangle)| {
+            let nodes = triangles[triangle as usize];
+            bind_to_triangle(vertex.as_dvec3(), nodes, nodes.map(|node| positions[node as usize]))
         }))?;
         Ok(Self::Triangles(bound))
     }
 }
 
-/// The triangle that is nearest to each vertex, the first among several.
+/// The triangle nearest to each vertex, the first among equals.
 fn nearest_triangles(vertices: &[Vec3], positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Vec<u32>> {
     let corners = |triangle: u32| triangles[triangle as usize].map(|node| positions[node as usize]);
-    let tree = Tree::new(triangles.len(), corners)?;
+    let tree = Bvh::new(triangles.len(), corners)?;
     let mut nearest = memory::reserved(vertices.len())?;
     for &vertex in vertices {
         let point = vertex.as_dvec3();
         let mut best = (f64::INFINITY, 0);
-        tree.near(&Bounds::of(std::iter::once(vertex)), f32::INFINITY, |place| {
-            let number = tree.triangle(place);
-            let exact = tree.placed(place).exact();
+        tree.near(&Aabb::of(std::iter::once(vertex)), f32::INFINITY, |index| {
+            let number = tree.triangle(index);
+            let exact = tree.placed(index).exact();
             let distance = point.distance_squared(weighted(exact, nearest_on_triangle(point, exact).0));
             if distance < best.0 || distance == best.0 && number < best.1 {
                 best = (distance, number);
@@ -156,9 +157,9 @@ fn nearest_triangles(vertices: &[Vec3], positions: &[Vec3], triangles: &[[u32; 3
     Ok(nearest)
 }
 
-/// A vertex over a triangle: its foot in the plane, which may lie beside the triangle, and its height; over one that lies along a line at the
-/// nearest point, with none.
-fn over(point: DVec3, nodes: [u32; 3], corners: [Vec3; 3]) -> OverTriangle {
+/// Binds a vertex to a triangle: its projection onto the plane, which can lie outside the triangle, and its height. A triangle without area
+/// binds it to the nearest point, without height.
+fn bind_to_triangle(point: DVec3, nodes: [u32; 3], corners: [Vec3; 3]) -> OverTriangle {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     let normal = (b - a).cross(c - a).normalize_or_zero();
     let inverse = DMat3::from_cols(b - a, c - a, normal).inverse();
@@ -178,10 +179,10 @@ fn over(point: DVec3, nodes: [u32; 3], corners: [Vec3; 3]) -> OverTriangle {
     }
 }
 
-/// A tetrahedron where it is.
+/// A tetrahedron with the positions of its corners.
 pub(super) struct PlacedTetrahedron {
     corners: [DVec3; 4],
-    /// From the way from the first corner to the weights of the others.
+    /// Maps the vector from the first corner to the weights of the other three.
     inverse: DMat3,
 }
 
@@ -202,7 +203,7 @@ impl PlacedTetrahedron {
         self.inverse * (point - self.corners[0])
     }
 
-    /// The least barycentric weight: below 0 outside.
+    /// The least barycentric weight; below 0 outside.
     pub fn depth(&self, point: DVec3) -> f64 {
         let weights = self.weights(point);
         weights.min_element().min(1.0 - weights.element_sum())

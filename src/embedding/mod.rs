@@ -1,4 +1,4 @@
-//! What is drawn of a body need not be what is solved: a fine surface that goes with a coarse body.
+//! Embedding: a fine render surface bound to a coarse body.
 
 mod bind;
 mod follow;
@@ -11,13 +11,13 @@ use crate::body::Body;
 use crate::cutting::CutMaterial;
 use crate::def::{BodyDefinition, Values};
 use crate::geometry::vertex_normals;
-use crate::mesh::{FURTHEST, Mesh};
+use crate::mesh::{MAX_COORDINATE, Mesh};
 use crate::world::World;
 
 use bind::Binding;
 use follow::Follower;
 
-/// A surface that is drawn, and what of a body it goes with. Plain data, used only during [`World::create_embedding`].
+/// The definition of an embedding. Plain data, used only during [`World::create_embedding`].
 ///
 /// ```
 /// # use glam::Vec3;
@@ -31,21 +31,21 @@ use follow::Follower;
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EmbeddingDefinition<'a> {
-    /// Where each vertex is while the body is where it is, m, within 1e9 m of the origin.
+    /// The positions of the vertices for the current positions of the body, m, within 1e9 m of the origin.
     pub vertices: &'a [Vec3],
-    /// Three vertices each, outward by the right-hand rule: what normals come from. Empty: there are none.
+    /// The triangles, outward by the right-hand rule. Without them there are no normals.
     pub triangles: &'a [[u32; 3]],
-    /// The tetrahedra of the body, as it was created with: each vertex goes with the one that it is in, or nearest to. Where the body has been cut or
-    /// torn, those that it has now are taken instead. Empty: each goes with the nearest triangle that is drawn of the body, and keeps its
-    /// distance from that.
+    /// The tetrahedra that the body was created with. Each vertex is bound to the one that contains it, or the nearest. After a cut or tear the
+    /// body's current tetrahedra are used instead. If the list is empty, each vertex is bound to the nearest triangle of the body's render surface, and keeps
+    /// its distance from it.
     pub tetrahedra: &'a [[u32; 4]],
 }
 
-/// A fine surface bound to a coarse body, and where its vertices are. It belongs to the caller; the body knows nothing of it and pays nothing.
+/// A fine surface bound to a coarse body. The caller owns it; it costs the body nothing.
 ///
-/// In a tetrahedron a vertex keeps its barycentric weights, so that an affine motion of the body is one of the surface; over a triangle it keeps
-/// its place in it and its distance along the normal. It follows cuts and tears: each vertex goes on with its own side, and triangles that would reach
-/// across are left out.
+/// In a tetrahedron a vertex keeps its barycentric weights, so the surface follows affine motions of the body exactly. On a triangle a vertex keeps
+/// its barycentric weights and its distance along the normal. After cuts and tears each vertex follows its own side, and triangles that would span
+/// the cut are removed.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -63,24 +63,24 @@ pub struct EmbeddingDefinition<'a> {
 #[derive(Debug)]
 pub struct Embedding {
     body: BodyId,
-    /// How many nodes the body has, and which version its topology.
+    /// The number of nodes of the body, and its topology version.
     node_count: usize,
     topology: u64,
-    /// For bodies that may be cut.
+    /// The data to follow cuts, for cuttable bodies.
     follower: Option<Box<Follower>>,
     binding: Binding,
     triangles: Vec<[u32; 3]>,
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
-    /// Whether the normals are those of the positions.
+    /// True if the normals match the positions.
     are_normals_new: bool,
-    /// 1 over the mean edge, 1/m: normals neither vanish nor overflow where triangles are small or large.
+    /// The inverse of the mean edge, 1/m. It keeps normals of very small and very large triangles in the range of `f32`.
     scale: f32,
 }
 
 impl Embedding {
-    /// Of a body with its nodes at `positions`, of which these triangles are drawn; with the cells of its material that vertices go with. The material
-    /// is asked for where it is that of a surface, or has been cut.
+    /// An embedding for node positions and a render surface, and the cells of the material that the vertices are bound to. `material` is given for
+    /// surfaces, and for bodies that have been cut.
     fn new(
         definition: &EmbeddingDefinition,
         positions: &[Vec3],
@@ -93,7 +93,7 @@ impl Embedding {
             tetrahedra,
         } = *definition;
         check(definition, positions.len())?;
-        let (binding, homes) = match (tetrahedra, material) {
+        let (binding, cells) = match (tetrahedra, material) {
             ([], Some(CutMaterial::Surface(surface))) => Binding::to_surface(vertices, positions, surface)?,
             ([], _) => (Binding::to_triangles(vertices, positions, drawn)?, Vec::new()),
             (_, Some(CutMaterial::Solid(solid))) => Binding::to_solid(vertices, positions, solid)?,
@@ -112,33 +112,33 @@ impl Embedding {
             scale: scale(vertices, triangles),
         };
         embedding.update_from(positions)?;
-        Ok((embedding, homes))
+        Ok((embedding, cells))
     }
 
-    /// Has it go with this body.
-    fn join(&mut self, id: BodyId, body: &Body, definition: &EmbeddingDefinition, homes: Vec<u32>) -> Result<()> {
+    /// Attaches the embedding to a body.
+    fn join(&mut self, id: BodyId, body: &Body, definition: &EmbeddingDefinition, cells: Vec<u32>) -> Result<()> {
         self.body = id;
         self.topology = body.topology_version();
         if let Some(material) = body.material()
-            && !homes.is_empty()
+            && !cells.is_empty()
             && is_made_of(material, definition.tetrahedra, self.topology > 0)
         {
-            self.follower = Follower::new(material, homes, definition.triangles)?;
+            self.follower = Follower::new(material, cells, definition.triangles)?;
         }
         Ok(())
     }
 
-    /// The body it goes with.
+    /// The body that the surface is bound to.
     pub fn body(&self) -> BodyId {
         self.body
     }
 
-    /// Puts the vertices where the body is now. Nothing is allocated, but when the body has been cut or torn since: then the vertices are bound anew.
+    /// Moves the vertices with the body. It allocates only after a cut or tear, when it binds the vertices again.
     ///
     /// # Errors
-    /// [`Error::StaleId`]: the body is gone. [`Error::Unsupported`]: it has been cut or torn since, and the vertices are bound to the triangles of a body of
-    /// tetrahedra, or not to all of the tetrahedra of which it was made. [`Error::InvalidArgument`]: it has not the nodes that the vertices are bound to, as in a world that was
-    /// saved before it was cut. [`Error::OutOfMemory`]. The vertices stay where they were.
+    /// [`Error::StaleId`]: the body was destroyed. [`Error::Unsupported`]: the body was cut or torn, and the vertices are bound to the surface of a
+    /// tetrahedral body, or to other tetrahedra than it was created with. [`Error::InvalidArgument`]: the body lacks nodes that the vertices are bound
+    /// to, as in a snapshot from before a cut. [`Error::OutOfMemory`]. After an error the vertices keep their positions.
     pub fn update(&mut self, world: &World) -> Result<()> {
         let body = world.body(self.body)?;
         if body.topology_version() != self.topology {
@@ -162,10 +162,10 @@ impl Embedding {
         self.update_from(body.positions())
     }
 
-    /// The same with the body's nodes at `positions`, m, such as [`Frame::positions`](crate::Frame::positions): on any thread, whatever the world does.
+    /// Moves the vertices to node positions, m, such as [`Frame::positions`](crate::Frame::positions). It can be called on any thread while the world steps.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there are not as many positions as the body had nodes at the last [`update`](Self::update), which follows its cuts.
+    /// [`Error::InvalidArgument`]: the number of positions differs from the number of nodes at the last [`update`](Self::update), which follows cuts.
     pub fn update_from(&mut self, positions: &[Vec3]) -> Result<()> {
         ensure!(
             positions.len() == self.node_count,
@@ -178,18 +178,18 @@ impl Embedding {
         Ok(())
     }
 
-    /// Where each vertex is, m, in the order given. The list stays in its place.
+    /// The positions of the vertices, m, in the order given. The address of the list does not change.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions
     }
 
-    /// The triangles, in the order given, less those that reach across a cut: they change with updates after cuts alone.
+    /// The triangles in the order given, without those that span a cut. They change only in the first update after a cut.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// The normal of each vertex, outward, of unit length: the mean of its triangles' by area; 0 where that is 0, and no list without triangles.
-    /// The first call after an update works them out; the list stays in its place.
+    /// The outward unit normals of the vertices: area-weighted means over the triangles, 0 if the mean is 0. The list is empty without triangles.
+    /// The first call after an update computes them; the address of the list does not change.
     pub fn normals(&mut self) -> &[Vec3] {
         if !self.are_normals_new && !self.normals.is_empty() {
             vertex_normals(&self.positions, &self.triangles, self.scale, &mut self.normals);
@@ -200,34 +200,34 @@ impl Embedding {
 }
 
 impl World {
-    /// Binds a fine surface to a body, where both are now.
+    /// Binds a fine surface to a body in their current positions.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there are no vertices; one is not finite or further than 1e9 m from the origin; an index is
-    /// that of no vertex or node; no tetrahedron has a volume; there are none, and nothing is drawn of the body. [`Error::OutOfMemory`].
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there are no vertices; a vertex is not finite or further than 1e9 m from the origin; an index is
+    /// out of range; no tetrahedron has a volume; there are neither tetrahedra nor a render surface of the body. [`Error::OutOfMemory`].
     pub fn create_embedding(&self, body: BodyId, definition: &EmbeddingDefinition) -> Result<Embedding> {
         let host = self.body(body)?;
-        // A solid that was not cut is what the caller says it is.
+        // For an uncut solid the caller's tetrahedra are used.
         let is_asked = |material: &&CutMaterial| material.surface().is_some() || host.topology_version() > 0;
         let material = host.material().filter(is_asked);
-        let (mut embedding, homes) = Embedding::new(definition, host.positions(), host.surface(), material)?;
-        embedding.join(body, host, definition, homes)?;
+        let (mut embedding, cells) = Embedding::new(definition, host.positions(), host.surface(), material)?;
+        embedding.join(body, host, definition, cells)?;
         Ok(embedding)
     }
 
-    /// Makes a body of a closed surface, which [`Mesh::filled`] fills with tetrahedra of edges `spacing` metres long in the mean, and binds the
-    /// surface to it: tissue from what is drawn. The surface is `positions` and `triangles` of the definition; all else in it is as for
-    /// [`create_body`](World::create_body), with one value for all nodes and springs.
+    /// Creates a tetrahedral body from a closed render surface, and binds the surface to it. [`Mesh::filled`] makes the tetrahedra, with a mean edge of
+    /// `spacing` meters. The surface is `positions` and `triangles` of the definition; the other fields are as for
+    /// [`create_body`](World::create_body), with uniform values for nodes and springs.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: as [`Mesh::filled`] and [`create_body`](World::create_body) answer; the definition has tetrahedra, cells, springs, rest
-    /// positions or rest lengths, or lists of values: the nodes and springs are to come. [`Error::OutOfMemory`].
+    /// [`Error::InvalidArgument`]: as for [`Mesh::filled`] and [`create_body`](World::create_body), or the definition has tetrahedra, cells, springs, rest
+    /// positions, rest lengths, or values for each node or spring, which do not exist yet. [`Error::OutOfMemory`].
     pub fn create_body_from_surface(
         &mut self,
         definition: &BodyDefinition,
         spacing: f32,
     ) -> Result<(BodyId, Embedding)> {
-        check_is_to_come(definition)?;
+        refuse_node_values(definition)?;
         let drawn = Mesh {
             positions: memory::copied(definition.positions)?,
             triangles: memory::copied(definition.triangles)?,
@@ -239,7 +239,7 @@ impl World {
             triangles: &drawn.triangles,
             tetrahedra: &mesh.tetrahedra,
         };
-        let (mut embedding, homes) = Embedding::new(&surface, &mesh.positions, &[], None)?;
+        let (mut embedding, cells) = Embedding::new(&surface, &mesh.positions, &[], None)?;
         let body = self.create_body(&BodyDefinition {
             positions: &mesh.positions,
             triangles: &[],
@@ -248,7 +248,7 @@ impl World {
         })?;
         let joined = self
             .body(body)
-            .and_then(|host| embedding.join(body, host, &surface, homes));
+            .and_then(|host| embedding.join(body, host, &surface, cells));
         if let Err(error) = joined {
             self.destroy_body(body)?;
             return Err(error);
@@ -257,7 +257,7 @@ impl World {
     }
 }
 
-/// Whether vertices bound to these tetrahedra, where there are some, are bound to cells of the material: once it was changed, its own were taken.
+/// True if vertices bound to these tetrahedra are bound to cells of the material. After a topology change they always are.
 fn is_made_of(material: &CutMaterial, tetrahedra: &[[u32; 4]], was_changed: bool) -> bool {
     match material {
         CutMaterial::Springs(_) => false,
@@ -269,8 +269,8 @@ fn is_made_of(material: &CutMaterial, tetrahedra: &[[u32; 4]], was_changed: bool
     }
 }
 
-/// Refuses what names nodes or springs of a body whose nodes are not made yet.
-fn check_is_to_come(definition: &BodyDefinition) -> Result<()> {
+/// Refuses values for nodes and springs that do not exist yet.
+fn refuse_node_values(definition: &BodyDefinition) -> Result<()> {
     let is_list = |values: Values| matches!(values, Values::Each(_));
     let given = [
         ("tetrahedra", !definition.tetrahedra.is_empty()),
@@ -307,30 +307,30 @@ fn check(definition: &EmbeddingDefinition, node_count: usize) -> Result<()> {
         "{} vertices: too many to count",
         vertices.len()
     );
-    for (vertex, place) in vertices.iter().enumerate() {
+    for (vertex, position) in vertices.iter().enumerate() {
         ensure!(
-            place.is_finite() && place.abs().max_element() <= FURTHEST,
-            "vertices[{vertex}] is {place}: must be finite and within {FURTHEST:e} m of the origin"
+            position.is_finite() && position.abs().max_element() <= MAX_COORDINATE,
+            "vertices[{vertex}] is {position}: must be finite and within {MAX_COORDINATE:e} m of the origin"
         );
     }
-    let within = |name: &str, place: usize, indices: &[u32], count: usize, what: &str| {
+    let within = |name: &str, number: usize, indices: &[u32], count: usize, what: &str| {
         let wrong = indices.iter().find(|&&index| index as usize >= count);
         wrong.map_or(Ok(()), |index| {
             Err(Error::invalid(format!(
-                "{name}[{place}] names {what} {index}; there are {count}"
+                "{name}[{number}] names {what} {index}; there are {count}"
             )))
         })
     };
-    for (place, triangle) in triangles.iter().enumerate() {
-        within("triangles", place, triangle, vertices.len(), "vertex")?;
+    for (number, triangle) in triangles.iter().enumerate() {
+        within("triangles", number, triangle, vertices.len(), "vertex")?;
     }
-    for (place, tetrahedron) in tetrahedra.iter().enumerate() {
-        within("tetrahedra", place, tetrahedron, node_count, "node")?;
+    for (number, tetrahedron) in tetrahedra.iter().enumerate() {
+        within("tetrahedra", number, tetrahedron, node_count, "node")?;
     }
     Ok(())
 }
 
-/// 1 over the mean edge; 1 where that is nothing.
+/// The inverse of the mean edge; 1 if that is not a normal number.
 fn scale(vertices: &[Vec3], triangles: &[[u32; 3]]) -> f32 {
     let edges = triangles.iter().map(|&[a, b, _]| {
         let [a, b] = [a, b].map(|vertex| vertices[vertex as usize].as_dvec3());

@@ -1,11 +1,11 @@
-//! Where the vertices of a fine surface are.
+//! Positions of the vertices of a fine surface.
 
 use glam::{Vec3, Vec3A};
 
 use super::bind::{Binding, InTetrahedron, OverTriangle};
 
 impl Binding {
-    /// Writes where each vertex is with the nodes at `positions`; there are as many as at the binding.
+    /// Writes the positions of the vertices for these node positions, as many as at the binding.
     pub fn read(&self, positions: &[Vec3], vertices: &mut [Vec3]) {
         let at = |node: u32| Vec3A::from(positions[node as usize]);
         match self {
@@ -20,7 +20,7 @@ impl Binding {
                     let OverTriangle { nodes, weights, offset } = over;
                     let [a, b, c] = nodes.map(at);
                     let (ab, ac) = (b - a, c - a);
-                    // Of unit length whatever the triangle's size.
+                    // Normalized edges keep the product in range for triangles of any size.
                     let normal = ab.normalize_or_zero().cross(ac.normalize_or_zero()).normalize_or_zero();
                     *vertex = (a + ab * weights[0] + ac * weights[1] + normal * *offset).into();
                 }

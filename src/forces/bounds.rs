@@ -1,84 +1,90 @@
-//! What bounds the frequencies of a body beside its springs, and what each node carries of that.
+//! Frequency bounds of the forces besides springs, and the nodal stiffness behind them.
 
 use super::Forces;
 use crate::base::{LimitKind, Result, memory};
-use crate::def::Carried;
-use crate::soa::{Masses, Rates, Vectors};
+use crate::def::NodalStiffness;
+use crate::soa::{FrequencyBound, NodalMasses, Vectors};
 use crate::threads::Team;
 
 impl Forces {
-    /// What each node carries of elements, terms and cavities; of no nodes where there are none.
-    pub fn carried_beside_springs(&self, positions: &Vectors, masses: &Masses) -> Result<Vec<Carried>> {
-        if !self.are_more_than_springs() {
+    /// The nodal stiffness of elements, terms and cavities. Empty if there are none.
+    pub fn non_spring_nodal_stiffness(&self, positions: &Vectors, masses: &NodalMasses) -> Result<Vec<NodalStiffness>> {
+        if !self.has_non_spring_forces() {
             return Ok(Vec::new());
         }
-        let mut carried = memory::filled(Carried::default(), positions.len())?;
+        let mut nodal_stiffness = memory::filled(NodalStiffness::default(), positions.len())?;
         self.elements
             .iter()
-            .for_each(|elements| elements.add_to(masses, &mut carried));
-        let terms = self.beside.terms.iter();
-        terms.for_each(|terms| terms.add_to(masses, &mut carried));
-        if let Some(cavities) = &self.beside.cavities {
-            cavities.add_to(positions, masses, &mut carried)?;
+            .for_each(|elements| elements.add_to(masses, &mut nodal_stiffness));
+        let terms = self.auxiliary.terms.iter();
+        terms.for_each(|terms| terms.add_to(masses, &mut nodal_stiffness));
+        if let Some(cavities) = &self.auxiliary.cavities {
+            cavities.add_to(positions, masses, &mut nodal_stiffness)?;
         }
-        Ok(carried)
+        Ok(nodal_stiffness)
     }
 
-    /// The longest substep that all but springs allow at the current state, with nodes at `positions`, s; infinity where there is
-    /// nothing else. `is_found`: forces are those of these positions.
-    pub fn limit_beside_springs(&mut self, positions: &Vectors, masses: &Masses, is_found: bool, team: &Team) -> f32 {
-        let known = self
+    /// The longest stable substep of all forces but springs at the current state, with nodes at `positions`, s. It is
+    /// infinite if there are none. `are_forces_current`: the last forces are those at these positions.
+    pub fn non_spring_dt_limit(
+        &mut self,
+        positions: &Vectors,
+        masses: &NodalMasses,
+        are_forces_current: bool,
+        team: &Team,
+    ) -> f32 {
+        let are_rates_valid = self
             .elements
             .as_mut()
-            .is_none_or(|elements| elements.find_rates(&*self.springs, masses) && is_found);
-        if !known {
+            .is_none_or(|elements| elements.find_rates(&*self.springs, masses) && are_forces_current);
+        if !are_rates_valid {
             self.write_records(positions, team);
         }
-        if let (Some(elements), Some(records), false) = (&mut self.elements, &self.records, known) {
+        if let (Some(elements), Some(records), false) = (&mut self.elements, &self.records, are_rates_valid) {
             elements.find_forces(self.kernel, records.as_slice(), team);
-            elements.settle();
+            elements.commit_rate_bound();
         }
-        if let Some(terms) = &mut self.beside.terms {
+        if let Some(terms) = &mut self.auxiliary.terms {
             terms.find_rates(&*self.springs, masses);
-            if !is_found {
-                terms.settle_at(positions);
+            if !are_forces_current {
+                terms.commit_stiffening_at(positions);
             }
         }
-        if let Some(cavities) = &mut self.beside.cavities {
-            let springs = (self.elements.is_none() && self.beside.terms.is_none()).then_some(&*self.springs);
-            if !(cavities.find_rates(springs, masses) && is_found) {
+        if let Some(cavities) = &mut self.auxiliary.cavities {
+            let springs = (self.elements.is_none() && self.auxiliary.terms.is_none()).then_some(&*self.springs);
+            if !(cavities.find_rates(springs, masses) && are_forces_current) {
                 cavities.find_forces(positions, team);
-                cavities.settle();
+                cavities.commit_rate_bound();
             }
         }
         self.rates(true).limit()
     }
 
-    /// The same with the nodes where forces were last worked out.
-    pub fn newest_limit_beside_springs(&self) -> f32 {
+    /// The longest stable substep of all forces but springs where forces were last evaluated, s.
+    pub fn latest_non_spring_dt_limit(&self) -> f32 {
         self.rates(false).limit()
     }
 
-    /// What bounds frequencies beside springs, with the nodes at the current state or where forces were last worked out.
-    fn rates(&self, is_settled: bool) -> Rates {
-        let (terms, cavities) = (self.beside.terms.as_ref(), self.beside.cavities.as_ref());
-        let of_elements = self
+    /// The frequency bound of all forces but springs, at the current state or where forces were last evaluated.
+    fn rates(&self, at_committed: bool) -> FrequencyBound {
+        let (terms, cavities) = (self.auxiliary.terms.as_ref(), self.auxiliary.cavities.as_ref());
+        let element_rates = self
             .elements()
-            .map_or(Rates::ZERO, |elements| elements.rates(is_settled));
-        let of_terms = terms.map_or(Rates::ZERO, |terms| terms.rates(is_settled));
-        let of_cavities = cavities.map_or(Rates::ZERO, |cavities| cavities.rates(is_settled));
-        of_elements.and(of_terms).and(of_cavities)
+            .map_or(FrequencyBound::ZERO, |elements| elements.rates(at_committed));
+        let term_rates = terms.map_or(FrequencyBound::ZERO, |terms| terms.rates(at_committed));
+        let cavity_rates = cavities.map_or(FrequencyBound::ZERO, |cavities| cavities.rates(at_committed));
+        element_rates.and(term_rates).and(cavity_rates)
     }
 
-    /// What allows the shortest substep where forces were last worked out, with nodes at `positions`: its kind, its nodes, and how many
-    /// these are. `spring` is what does so of the springs, with its substep, s.
+    /// The cause of the shortest stable substep where forces were last evaluated, with nodes at `positions`: its kind,
+    /// its nodes, and their number. `spring` is the stiffest spring with its substep, s.
     pub fn tightest(
         &self,
-        masses: &Masses,
+        masses: &NodalMasses,
         positions: &Vectors,
         spring: Option<([usize; 2], f32)>,
     ) -> (LimitKind, [u32; 4], usize) {
-        let cavities = self.beside.cavities.as_ref();
+        let cavities = self.auxiliary.cavities.as_ref();
         let mut shortest = cavities.map_or(f32::INFINITY, |cavities| cavities.rates(false).limit());
         let mut tightest = (LimitKind::Cavity, [0; 4], 0);
         if let Some(([a, b], substep)) = spring
@@ -89,19 +95,19 @@ impl Forces {
         }
         if let Some((nodes, substep)) = self
             .elements()
-            .and_then(|elements| elements.tightest(masses, positions))
+            .and_then(|elements| elements.limiting_element(masses, positions))
             && substep <= shortest
         {
             shortest = substep;
             tightest = (LimitKind::Element, nodes, 4);
         }
-        if let Some(terms) = &self.beside.terms
+        if let Some(terms) = &self.auxiliary.terms
             && terms.rates(false).limit() < shortest
         {
             let mut most = -1.0;
             tightest = (LimitKind::Term, [0; 4], 0);
             terms.laws().for_each(|law| {
-                law.show_carried(masses, &mut |node, stiffness| {
+                law.visit_nodal_stiffness(masses, &mut |node, stiffness| {
                     let rate = stiffness * masses.inverse(node);
                     if rate > most {
                         most = rate;
@@ -113,33 +119,41 @@ impl Forces {
         tightest
     }
 
-    /// Shows the corners of each element, and how many times as stiff it is as at rest with nodes at `positions`, at most.
-    pub fn show_stiffenings(&self, positions: &Vectors, see: &mut dyn FnMut([u32; 4], f64)) {
+    /// Calls `f` with the corners of each element and the upper bound of its stiffness at `positions` relative to rest.
+    pub fn visit_stiffenings(&self, positions: &Vectors, f: &mut dyn FnMut([u32; 4], f64)) {
         self.elements
             .iter()
-            .for_each(|elements| elements.stiffenings(positions, see));
+            .for_each(|elements| elements.relative_stiffnesses(positions, f));
     }
 
-    /// What a node of this inverse mass carries of elements at rest, where bounds at rest are known.
-    pub fn carried_at_rest(&self, node: usize, inverse_mass: f32) -> Carried {
+    /// The nodal stiffness of elements at rest for a node of this inverse mass, if the bounds at rest are known.
+    pub fn nodal_stiffness_at_rest(&self, node: usize, inverse_mass: f32) -> NodalStiffness {
         let elements = self.elements();
-        elements.map_or(Carried::default(), |elements| {
-            elements.carried_at_rest(node, inverse_mass)
+        elements.map_or(NodalStiffness::default(), |elements| {
+            elements.nodal_stiffness_at_rest(node, inverse_mass)
         })
     }
 
-    /// Where forces were worked out last is the current state.
-    pub fn settle(&mut self) {
-        self.elements.iter_mut().for_each(|elements| elements.settle());
-        self.beside.terms.iter_mut().for_each(|terms| terms.settle());
-        self.beside.cavities.iter_mut().for_each(|cavities| cavities.settle());
+    /// Makes the state of the last force evaluation the current one for all bounds.
+    pub fn commit_bounds(&mut self) {
+        self.elements
+            .iter_mut()
+            .for_each(|elements| elements.commit_rate_bound());
+        self.auxiliary
+            .terms
+            .iter_mut()
+            .for_each(|terms| terms.commit_stiffening());
+        self.auxiliary
+            .cavities
+            .iter_mut()
+            .for_each(|cavities| cavities.commit_rate_bound());
     }
 
-    /// Masses, pins or springs have changed.
+    /// Invalidates the bounds after masses, pins or springs have changed.
     pub fn forget_rates(&mut self) {
         self.elements.iter_mut().for_each(|elements| elements.forget_rates());
-        self.beside.terms.iter_mut().for_each(|terms| terms.forget_rates());
-        self.beside
+        self.auxiliary.terms.iter_mut().for_each(|terms| terms.forget_rates());
+        self.auxiliary
             .cavities
             .iter_mut()
             .for_each(|cavities| cavities.forget_rates());

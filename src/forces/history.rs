@@ -1,4 +1,4 @@
-//! What a body remembers of how it was deformed: elements and terms that are viscous, or set.
+//! Internal variables of viscous and plastic elements and terms.
 
 use glam::DVec3;
 
@@ -6,37 +6,44 @@ use super::Forces;
 use crate::def::{RelaxationStep, Viscosity};
 use crate::elements::Elements;
 use crate::soa::Vectors;
-use crate::terms::Event;
+use crate::terms::HistoryEvent;
 use crate::threads::Team;
 
 impl Forces {
-    /// Whether anything is remembered.
-    pub fn remember(&self) -> bool {
-        self.elements().is_some_and(Elements::remember) || self.beside.laws().any(|law| law.remembers())
+    /// True if there are internal variables.
+    pub fn has_history(&self) -> bool {
+        self.elements().is_some_and(Elements::has_history) || self.auxiliary.laws().any(|law| law.has_history())
     }
 
-    /// A step begins, from what is current.
-    pub fn recall(&mut self) {
-        self.elements.iter_mut().for_each(|elements| elements.recall());
-        self.beside.laws_mut().for_each(|law| law.pass(Event::Recall));
+    /// Restores the committed state at the start of a step.
+    pub fn restore(&mut self) {
+        self.elements.iter_mut().for_each(|elements| elements.restore());
+        self.auxiliary
+            .laws_mut()
+            .for_each(|law| law.apply_event(HistoryEvent::Restore));
     }
 
-    /// The step in progress is the current state.
-    pub fn keep(&mut self) {
-        self.elements.iter_mut().for_each(|elements| elements.keep());
-        self.beside.laws_mut().for_each(|law| law.pass(Event::Keep));
+    /// Commits the state of the step in progress.
+    pub fn commit(&mut self) {
+        self.elements.iter_mut().for_each(|elements| elements.commit());
+        self.auxiliary
+            .laws_mut()
+            .for_each(|law| law.apply_event(HistoryEvent::Commit));
     }
 
-    /// An equation is to be solved for the end of so many seconds.
-    pub fn foresee(&mut self, time: f64) {
-        self.elements.iter_mut().for_each(|elements| elements.foresee(time));
-        self.beside.laws_mut().for_each(|law| law.pass(Event::Foresee(time)));
+    /// Prepares an implicit equation for the end of a step of this length, s.
+    pub fn predict(&mut self, time: f64) {
+        self.elements.iter_mut().for_each(|elements| elements.predict(time));
+        self.auxiliary
+            .laws_mut()
+            .for_each(|law| law.apply_event(HistoryEvent::Predict(time)));
     }
 
-    /// What cuts left of how rings were deformed fades, over so many seconds, with nodes at `positions`: whether there was any.
-    pub fn fade(&mut self, time: f32, positions: &Vectors, team: &Team) -> bool {
+    /// Advances by `time` seconds the decay of pressure offsets that cuts left, with nodes at `positions`. Returns true
+    /// if there were any.
+    pub fn decay_offsets(&mut self, time: f32, positions: &Vectors, team: &Team) -> bool {
         let elements = self.elements.as_mut();
-        if !elements.is_some_and(|elements| elements.wait(f64::from(time))) {
+        if !elements.is_some_and(|elements| elements.add_fade_time(f64::from(time))) {
             return false;
         }
         self.write_records(positions, team);
@@ -46,49 +53,51 @@ impl Forces {
         true
     }
 
-    /// The substep in progress, of so many seconds, has put nodes at `positions`.
-    pub fn age(&mut self, time: f64, positions: &Vectors, team: &Team) {
-        self.follow(positions, |viscosity| viscosity.over(time), team);
+    /// Advances the internal variables by a substep of `time` seconds that ends at `positions`.
+    pub fn advance(&mut self, time: f64, positions: &Vectors, team: &Team) {
+        self.advance_by(positions, |viscosity| viscosity.over(time), team);
     }
 
-    /// What is elastic has changed where nodes are, at `positions`: arms hold what they held.
-    pub fn measure_anew(&mut self, positions: &Vectors) {
-        if self.remember() {
-            self.follow(positions, |_| RelaxationStep::NOTHING, &Team::alone());
-            self.keep();
+    /// Recomputes the elastic state at `positions` after parameters have changed. Maxwell branches keep their stress.
+    pub fn recompute_elastic_state(&mut self, positions: &Vectors) {
+        if self.has_history() {
+            self.advance_by(positions, |_| RelaxationStep::IDENTITY, &Team::alone());
+            self.commit();
         }
     }
 
-    /// Nothing that is viscous holds anything with nodes at `positions`.
-    pub fn relax(&mut self, positions: &Vectors) {
-        self.release(positions);
-        self.keep();
+    /// Commits a fully relaxed viscous state at `positions`.
+    pub fn commit_relaxed(&mut self, positions: &Vectors) {
+        self.set_relaxed(positions);
+        self.commit();
     }
 
-    /// The same until [`Self::recall`].
-    pub fn release(&mut self, positions: &Vectors) {
-        self.elements.iter_mut().for_each(|elements| elements.release_rings());
-        self.follow(positions, |_| RelaxationStep::FOREVER, &Team::alone());
+    /// Sets a fully relaxed viscous state at `positions` until [`Self::restore`].
+    pub fn set_relaxed(&mut self, positions: &Vectors) {
+        self.elements
+            .iter_mut()
+            .for_each(|elements| elements.disable_pressure_offsets());
+        self.advance_by(positions, |_| RelaxationStep::RELAXED, &Team::alone());
     }
 
-    /// Whether any element would yield with nodes at these places.
-    pub fn yield_at(&self, at: impl Fn(usize) -> DVec3) -> bool {
+    /// True if any element would yield at these positions.
+    pub fn would_yield(&self, at: impl Fn(usize) -> DVec3) -> bool {
         self.elements().is_some_and(|elements| elements.yield_at(at))
     }
 
-    /// What remembers follows nodes to `positions`, along this course.
-    fn follow(&mut self, positions: &Vectors, course: impl Fn(Viscosity) -> RelaxationStep, team: &Team) {
-        if !self.remember() {
+    /// Advances the internal variables to `positions` by this relaxation.
+    fn advance_by(&mut self, positions: &Vectors, relaxation: impl Fn(Viscosity) -> RelaxationStep, team: &Team) {
+        if !self.has_history() {
             return;
         }
-        if self.elements().is_some_and(Elements::remember) {
+        if self.elements().is_some_and(Elements::has_history) {
             self.write_records(positions, team);
         }
         if let (Some(elements), Some(records)) = (&mut self.elements, &self.records) {
-            elements.age(self.kernel, records.as_slice(), &course, team);
+            elements.advance(self.kernel, records.as_slice(), &relaxation, team);
         }
-        if let Some(terms) = &mut self.beside.terms {
-            terms.age(positions, course, team);
+        if let Some(terms) = &mut self.auxiliary.terms {
+            terms.advance(positions, relaxation, team);
         }
     }
 }

@@ -1,37 +1,37 @@
-//! Axis-aligned boxes.
+//! Axis-aligned bounding boxes.
 
 use glam::{DVec3, Vec3};
 
 use crate::codec::saved;
 use crate::simd::Range;
 
-/// The corners of an axis-aligned box.
+/// An axis-aligned bounding box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Bounds {
+pub(crate) struct Aabb {
     pub min: Vec3,
     pub max: Vec3,
 }
 
-saved! { Bounds { min, max } }
+saved! { Aabb { min, max } }
 
-impl Default for Bounds {
+impl Default for Aabb {
     fn default() -> Self {
         Self::EMPTY
     }
 }
 
-impl Bounds {
+impl Aabb {
     pub const EMPTY: Self = Self {
         min: Vec3::INFINITY,
         max: Vec3::NEG_INFINITY,
     };
 
-    /// The box about `points`; a NaN among them is not seen.
+    /// The bounding box of `points`. NaN coordinates are ignored.
     pub fn of(points: impl Iterator<Item = Vec3>) -> Self {
         points.fold(Self::EMPTY, Self::with)
     }
 
-    /// The largest magnitude of a coordinate along each axis.
+    /// The largest absolute coordinate along each axis.
     pub fn magnitudes(&self) -> Vec3 {
         self.min.abs().max(self.max.abs())
     }
@@ -43,7 +43,7 @@ impl Bounds {
         }
     }
 
-    /// The box about both.
+    /// The union of two boxes.
     pub fn and(self, other: &Self) -> Self {
         Self {
             min: self.min.min(other.min),
@@ -72,7 +72,7 @@ impl Bounds {
     }
 }
 
-impl From<[Range; 3]> for Bounds {
+impl From<[Range; 3]> for Aabb {
     fn from(ranges: [Range; 3]) -> Self {
         Self {
             min: ranges.map(|range| range.least).into(),

@@ -1,118 +1,122 @@
-//! Trees over the triangles of a surface that may be cut: that of the surface as it was made, and trees of those that cuts have added.
+//! Bounding volume hierarchies of a surface that can be cut: one of the original surface, and others of triangles that
+//! cuts have added.
 
-use super::Bounds;
-use super::tree::{PlacedTriangle, Tree};
+use super::Aabb;
+use super::bvh::{Bvh, BvhTriangle};
 use crate::base::Result;
 use crate::codec::saved;
 use glam::Vec3;
 
-/// Trees, each over the triangles that follow those of the one before. Of the later ones each has twice as many as the next or more (Bentley,
-/// Saxe 1980): there are few of them, and what a cut costs is a matter of what it adds, but for a factor of the logarithm of what all have added.
+/// Trees over consecutive ranges of triangles. Each tree of added triangles has at least twice as many as the next one
+/// (Bentley, Saxe 1980). So there are few trees, and the cost of a cut is proportional to what it adds, times a
+/// logarithm of all added triangles.
 #[derive(Debug)]
 pub(crate) struct Forest {
-    first: Tree,
-    later: Vec<Later>,
+    first: Bvh,
+    added: Vec<AddedTree>,
 }
 
-saved! { Forest { first, later } }
+saved! { Forest { first, added } }
 
-/// A tree of triangles that came later.
+/// A tree of added triangles.
 #[derive(Debug)]
-pub(crate) struct Later {
-    /// The number of its first triangle.
-    from: usize,
-    tree: Tree,
+pub(crate) struct AddedTree {
+    /// The index of its first triangle.
+    start: usize,
+    tree: Bvh,
 }
 
-saved! { Later { from, tree } }
+saved! { AddedTree { start, tree } }
 
 impl Forest {
-    /// Over so many triangles.
+    /// Builds a tree over `count` triangles.
     pub fn new(count: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<Self> {
         Ok(Self {
-            first: Tree::new(count, corners)?,
-            later: Vec::new(),
+            first: Bvh::new(count, corners)?,
+            added: Vec::new(),
         })
     }
 
     pub fn triangle_count(&self) -> usize {
-        let last = self.later.last();
+        let last = self.added.last();
         last.map_or(self.first.triangle_count(), |last| {
-            last.from + last.tree.triangle_count()
+            last.start + last.tree.triangle_count()
         })
     }
 
-    /// The tree that is to be [added](Self::add) where so many triangles follow the last, all with these corners, for which there is room then.
-    pub fn with_more(&mut self, more: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<Option<Later>> {
-        if more == 0 {
+    /// Builds the tree to be [added](Self::add) when `count` triangles follow the last. `corners` returns the corners
+    /// of any triangle. Reserves memory for the tree.
+    pub fn build_added(&mut self, count: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<Option<AddedTree>> {
+        if count == 0 {
             return Ok(None);
         }
-        let end = self.triangle_count() + more;
-        let mut from = self.triangle_count();
-        for later in self.later.iter().rev() {
-            if later.tree.triangle_count() >= 2 * (end - from) {
+        let end = self.triangle_count() + count;
+        let mut start = self.triangle_count();
+        for added in self.added.iter().rev() {
+            if added.tree.triangle_count() >= 2 * (end - start) {
                 break;
             }
-            from = later.from;
+            start = added.start;
         }
-        self.later.try_reserve(1)?;
-        let tree = Tree::new(end - from, |triangle| corners(from as u32 + triangle))?;
-        Ok(Some(Later { from, tree }))
+        self.added.try_reserve(1)?;
+        let tree = Bvh::new(end - start, |triangle| corners(start as u32 + triangle))?;
+        Ok(Some(AddedTree { start, tree }))
     }
 
-    /// Adds a tree, instead of those whose triangles it has.
-    pub fn add(&mut self, tree: Later) {
-        self.later.retain(|later| later.from < tree.from);
-        self.later.push(tree);
+    /// Adds a tree and removes those whose triangles it contains.
+    pub fn add(&mut self, tree: AddedTree) {
+        self.added.retain(|added| added.start < tree.start);
+        self.added.push(tree);
     }
 
-    /// Takes the triangles where they are now.
+    /// Moves the triangles to their current positions.
     pub fn refit(&mut self, corners: impl Fn(u32) -> [Vec3; 3]) {
         self.first.refit(&corners);
-        for later in &mut self.later {
-            let from = later.from as u32;
-            later.tree.refit(|triangle| corners(from + triangle));
+        for added in &mut self.added {
+            let start = added.start as u32;
+            added.tree.refit(|triangle| corners(start + triangle));
         }
     }
 
-    /// The box about everything.
-    pub fn bounds(&self) -> Bounds {
-        let later = self.later.iter().map(|later| later.tree.bounds());
-        later.fold(self.first.bounds(), |all, bounds| all.and(&bounds))
+    /// The bounding box of all triangles.
+    pub fn bounds(&self) -> Aabb {
+        let added = self.added.iter().map(|added| added.tree.bounds());
+        added.fold(self.first.bounds(), |all, bounds| all.and(&bounds))
     }
 
-    /// The triangles where they are, in some order.
-    pub fn placed(&self) -> impl Iterator<Item = &PlacedTriangle> {
-        let later = self.later.iter().map(|later| &later.tree);
-        let trees = std::iter::once(&self.first).chain(later);
-        trees.flat_map(|tree| (0..tree.triangle_count()).map(|place| tree.placed(place)))
+    /// All triangles with their current positions, in an unspecified order.
+    pub fn placed(&self) -> impl Iterator<Item = &BvhTriangle> {
+        let added = self.added.iter().map(|added| &added.tree);
+        let trees = std::iter::once(&self.first).chain(added);
+        trees.flat_map(|tree| (0..tree.triangle_count()).map(|slot| tree.placed(slot)))
     }
 
-    /// Shows the triangles whose boxes come within `reach` of this one, and some more.
-    pub fn near(&self, bounds: &Bounds, reach: f32, mut see: impl FnMut(usize)) {
+    /// Calls `f` with the triangles whose boxes are within `reach` of `bounds`, and possibly others.
+    pub fn near(&self, bounds: &Aabb, reach: f32, mut f: impl FnMut(usize)) {
         self.nearest(bounds, reach, |triangle| {
-            see(triangle);
+            f(triangle);
             reach
         });
     }
 
-    /// The same, where `see` tells after each triangle how far the next ones may be.
-    pub fn nearest(&self, bounds: &Bounds, mut reach: f32, mut see: impl FnMut(usize) -> f32) {
-        let later = self.later.iter().map(|later| (later.from, &later.tree));
-        for (from, tree) in std::iter::once((0, &self.first)).chain(later) {
-            tree.near(bounds, reach * reach, |place| {
-                reach = see(from + tree.triangle(place) as usize);
+    /// Like [`Self::near`], but `f` returns the reach for the triangles that follow.
+    pub fn nearest(&self, bounds: &Aabb, mut reach: f32, mut f: impl FnMut(usize) -> f32) {
+        let added = self.added.iter().map(|added| (added.start, &added.tree));
+        for (start, tree) in std::iter::once((0, &self.first)).chain(added) {
+            tree.near(bounds, reach * reach, |slot| {
+                reach = f(start + tree.triangle(slot) as usize);
                 reach * reach
             });
         }
     }
 
-    /// Shows the triangles whose boxes the ray may meet before `limit` times its direction; `see` tells the limit after each triangle.
-    pub fn along(&self, origin: Vec3, direction: Vec3, mut limit: f32, mut see: impl FnMut(usize) -> f32) {
-        let later = self.later.iter().map(|later| (later.from, &later.tree));
-        for (from, tree) in std::iter::once((0, &self.first)).chain(later) {
-            tree.along(origin, direction, limit, |place| {
-                limit = see(from + tree.triangle(place) as usize);
+    /// Calls `f` with the triangles whose boxes the ray can hit before `limit` times `direction`. `f` returns the
+    /// limit for the triangles that follow.
+    pub fn along(&self, origin: Vec3, direction: Vec3, mut limit: f32, mut f: impl FnMut(usize) -> f32) {
+        let added = self.added.iter().map(|added| (added.start, &added.tree));
+        for (start, tree) in std::iter::once((0, &self.first)).chain(added) {
+            tree.along(origin, direction, limit, |slot| {
+                limit = f(start + tree.triangle(slot) as usize);
                 limit
             });
         }

@@ -2,9 +2,9 @@
 
 use glam::{Vec3, Vec3A};
 
-/// Writes the unit normal of each vertex, the mean of its triangles' by area; 0 without area.
+/// Writes the unit normal of each vertex: the mean of its triangles' normals, weighted by area. 0 if all areas are 0.
 ///
-/// `scale` is about 1 over the length of an edge: areas neither vanish nor overflow.
+/// `scale` is about the inverse edge length, so that areas neither underflow nor overflow.
 pub(crate) fn vertex_normals(vertices: &[Vec3], triangles: &[[u32; 3]], scale: f32, normals: &mut [Vec3]) {
     normals.fill(Vec3::ZERO);
     for triangle in triangles {

@@ -1,32 +1,35 @@
-//! Which side, and whether it crosses: in `f64`, where rounding would decide.
+//! Geometric predicates for cases where rounding would decide, in `f64` or exact.
 
 use glam::{DVec3, Vec3};
 
 use crate::base::symbolic_perturbation::{is_above, triple};
 
-/// Whether the segment from `p` to `q` passes through a triangle from one side to the other, further than `depth` on both and from its
-/// border; what only touches, or lies in its plane, does not.
+/// True if the segment from `p` to `q` passes through the inside of a triangle. Both ends must be further than `depth`
+/// from its plane, and the intersection further than `depth` from its border. Touching or coplanar segments do not
+/// count.
 pub(crate) fn crosses(p: Vec3, q: Vec3, triangle: [Vec3; 3], depth: f64) -> bool {
     let corners = triangle.map(|corner| corner.as_dvec3());
     let (p, q) = (p.as_dvec3(), q.as_dvec3());
     let normal = (corners[1] - corners[0])
         .cross(corners[2] - corners[0])
         .normalize_or_zero();
-    let [before, after] = [p, q].map(|end| normal.dot(end - corners[0]));
-    if !(before.abs() > depth && after.abs() > depth && (before < 0.0) != (after < 0.0)) {
+    let [height_p, height_q] = [p, q].map(|end| normal.dot(end - corners[0]));
+    if !(height_p.abs() > depth && height_q.abs() > depth && (height_p < 0.0) != (height_q < 0.0)) {
         return false;
     }
-    let point = p.lerp(q, before / (before - after));
+    let point = p.lerp(q, height_p / (height_p - height_q));
     (0..3).all(|side| {
         let (from, to) = (corners[side], corners[(side + 1) % 3]);
         normal.dot((to - from).cross(point - from)) > depth * from.distance(to)
     })
 }
 
-/// How far along the segment from `p` to `q` it passes through a triangle, 0 to 1, and whether it goes in at its front.
+/// The fraction of the segment from `p` to `q` at which it intersects a triangle, and whether it enters through the
+/// front.
 ///
-/// As if the segment were shifted by next to nothing, in one direction for all triangles (Edelsbrunner, Muecke 1990): of triangles that share an
-/// edge or a corner, of which `nodes` are the numbers, it passes through as many as it should.
+/// Degenerate cases are resolved by a symbolic perturbation of the segment, the same for all triangles (Edelsbrunner,
+/// Muecke 1990). Among triangles that share an edge or a corner, exactly the right number is intersected. `nodes` are
+/// the triangle's node indices.
 pub(crate) fn pierce(p: DVec3, q: DVec3, corners: [DVec3; 3], nodes: [u32; 3]) -> Option<(f64, bool)> {
     let [a, b, c] = corners;
     let normal = (b - a).cross(c - a);
@@ -36,17 +39,17 @@ pub(crate) fn pierce(p: DVec3, q: DVec3, corners: [DVec3; 3], nodes: [u32; 3]) -
     if enters == is_above(triple(q - a, ab, ac), normal) {
         return None;
     }
-    let way = q - p;
-    // Each side is seen the same by both of its triangles: from the lower node on.
+    let direction = q - p;
+    // Each edge is evaluated from its lower node, so that both of its triangles get the same result.
     let passes_left = |from: usize, to: usize| {
-        let turned = nodes[from] > nodes[to];
-        let (low, high) = if turned {
+        let reversed = nodes[from] > nodes[to];
+        let (low, high) = if reversed {
             (corners[to], corners[from])
         } else {
             (corners[from], corners[to])
         };
         let (low, high) = (low - p, high - p);
-        is_above(triple(way, low, high), (low - high).cross(way)) != turned
+        is_above(triple(direction, low, high), (low - high).cross(direction)) != reversed
     };
     let left = passes_left(0, 1);
     if passes_left(1, 2) != left || passes_left(2, 0) != left {
@@ -55,8 +58,8 @@ pub(crate) fn pierce(p: DVec3, q: DVec3, corners: [DVec3; 3], nodes: [u32; 3]) -
     Some(((height_p / (height_p - height_q)).clamp(0.0, 1.0), enters))
 }
 
-/// The solid angle that a triangle takes of all that is seen from a point, 4 pi in all; above 0 where its back is seen (Van Oosterom,
-/// Strackee 1983). Over all triangles of a closed surface this is 4 pi inside and 0 outside.
+/// The signed solid angle of a triangle seen from a point, positive if its back is seen (Van Oosterom, Strackee 1983).
+/// The sum over a closed surface is 4 pi inside and 0 outside.
 pub(crate) fn solid_angle(point: DVec3, triangle: [DVec3; 3]) -> f64 {
     let [a, b, c] = triangle.map(|corner| corner - point);
     let [length_a, length_b, length_c] = [a, b, c].map(DVec3::length);

@@ -1,13 +1,14 @@
-//! What a haptic handle is to be.
+//! The definition of a haptic handle.
 
 use crate::base::{Error, Result, ToolId, above_zero, ensure, not_negative};
 
 use super::six::Vector6;
 
-/// Turning is at least so many times as stiff, at the lever, as going along: less is lost in rounding where both are solved for at once.
-const SOFTEST: f64 = 1e-6;
+/// The least ratio of angular stiffness (at the lever arm) to stiffness: a lower one is lost in rounding when both are solved together.
+const MIN_ANGULAR_RATIO: f64 = 1e-6;
 
-/// How a device is coupled to a tool. Plain data, used only during [`World::create_haptic`](crate::World::create_haptic).
+/// The definition of the coupling of a haptic device to a tool. Plain data, used only during
+/// [`World::create_haptic`](crate::World::create_haptic).
 ///
 /// ```
 /// # use sinew::*;
@@ -21,35 +22,35 @@ const SOFTEST: f64 = 1e-6;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HapticDefinition {
-    /// The tool that the device leads.
+    /// The tool that the device moves.
     pub tool: ToolId,
-    /// Of the spring between device and tool, N/m, above 0. A device should stand it with its own sampling: about half of its damping, N s/m, by
-    /// the time between ticks, or less.
+    /// The stiffness of the spring between device and tool, N/m, above 0. The device must be stable with it: use at most about half of the device's
+    /// damping, N s/m, divided by the time between ticks.
     pub stiffness: f32,
-    /// The same for turning, N m/rad, at least a millionth of the stiffness at the lever, which is half of the tool's length; 0: that stiffness.
+    /// The angular stiffness, N m/rad; 0 for `stiffness` at a lever arm of half of the tool's length. It is at least a millionth of that.
     pub angular_stiffness: f32,
-    /// Of the damper beside that spring, which acts where tissue resists: 1 damps `device_mass` on the spring critically. 0: what the loop makes of
-    /// energy is still damped away, but less surely.
+    /// The damping ratio of the coupling, which acts where tissue resists; 1 damps `device_mass` critically. Passivity control is
+    /// less effective with 0.
     pub damping_ratio: f32,
-    /// What the hand moves of the device, kg, above 0.
+    /// The mass of the moving part of the device, kg, above 0.
     pub device_mass: f32,
-    /// The largest force, N, at least 0; 0 or infinity: no limit.
+    /// The largest force, N, at least 0; no limit with 0 or infinity.
     pub force_limit: f32,
-    /// The largest torque, N m, at least 0; 0 or infinity: no limit.
+    /// The largest torque, N m, at least 0; no limit with 0 or infinity.
     pub torque_limit: f32,
-    /// How fast the force may change, N/s, at least 0; 0 or infinity: no limit. A force that such a limit makes late gives a hand more than it took: the loop is kept
-    /// passive where it is not reached.
+    /// The largest rate of change of the force, N/s, at least 0; no limit with 0 or infinity. A force delayed by this limit can return more energy than
+    /// the user supplied: the loop is passive only while the limit is not reached.
     pub force_rate_limit: f32,
-    /// How fast the torque may change, N m/s, at least 0; 0 or infinity: no limit.
+    /// The largest rate of change of the torque, N m/s, at least 0; no limit with 0 or infinity.
     pub torque_rate_limit: f32,
-    /// A model that is older, s, above 0, is stale: force and torque go to 0 until there is a newer one.
+    /// The age from which a local model is stale, s, above 0. With a stale model force and torque fade to 0.
     pub stale_after: f32,
-    /// The time in which they do, or come back, s, above 0.
+    /// The time in which force and torque fade, and return, s, above 0.
     pub ramp: f32,
 }
 
 impl HapticDefinition {
-    /// 1000 N/m, critically damped for 50 g, without limits, stale after 0.1 s, with a ramp of 0.1 s.
+    /// A coupling of 1000 N/m, critically damped for 50 g, without limits, stale after 0.1 s, with a ramp of 0.1 s.
     pub fn new(tool: ToolId) -> Self {
         Self {
             tool,
@@ -66,7 +67,7 @@ impl HapticDefinition {
         }
     }
 
-    /// As a coupling at this lever, m.
+    /// The coupling, checked, with this lever arm, m.
     pub(crate) fn coupling(&self, lever: f64) -> Result<Coupling> {
         let positive = |name: &str, value: f32| above_zero(name, value).map(|()| f64::from(value));
         let limit = |name: &str, value: f32| match value {
@@ -78,22 +79,22 @@ impl HapticDefinition {
         not_negative("angular_stiffness", self.angular_stiffness)?;
         not_negative("damping_ratio", self.damping_ratio)?;
         let mass = positive("device_mass", self.device_mass)?;
-        let turning = match self.angular_stiffness {
+        let angular = match self.angular_stiffness {
             0.0 => stiffness,
             angular => f64::from(angular) / (lever * lever),
         };
         ensure!(
-            turning >= SOFTEST * stiffness,
+            angular >= MIN_ANGULAR_RATIO * stiffness,
             "angular_stiffness is {}: must be 0 or at least {:e}",
             self.angular_stiffness,
-            SOFTEST * stiffness * lever * lever
+            MIN_ANGULAR_RATIO * stiffness * lever * lever
         );
         let critical = |stiffness: f64| 2.0 * (stiffness * mass).sqrt();
         let damping = |stiffness: f64| f64::from(self.damping_ratio) * critical(stiffness);
         Ok(Coupling {
             lever,
-            stiffness: [stiffness, turning],
-            damping: [damping(stiffness), damping(turning)],
+            stiffness: [stiffness, angular],
+            damping: [damping(stiffness), damping(angular)],
             critical: critical(stiffness),
             limits: [
                 limit("force_limit", self.force_limit)?,
@@ -109,7 +110,7 @@ impl HapticDefinition {
     }
 }
 
-/// A spring and a damper between device and proxy; what is given twice is for what goes along and for what turns, at the lever.
+/// The spring and damper between device and proxy. Pairs are for translation and for rotation, which is scaled by the lever arm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coupling {
     /// m.
@@ -118,7 +119,7 @@ pub(crate) struct Coupling {
     pub stiffness: [f64; 2],
     /// N s/m.
     pub damping: [f64; 2],
-    /// What damps the device critically, whatever the coupling does, N s/m.
+    /// The critical damping of the device, N s/m, without the damping ratio.
     pub critical: f64,
     /// N.
     pub limits: [f64; 2],
@@ -130,7 +131,7 @@ pub(crate) struct Coupling {
     pub ramp: f64,
 }
 
-/// A pair, of what goes along and what turns, as six numbers.
-pub(crate) fn spread([along, about]: [f64; 2]) -> Vector6 {
+/// Expands a pair for translation and rotation to six numbers.
+pub(crate) fn expanded([along, about]: [f64; 2]) -> Vector6 {
     [along, along, along, about, about, about]
 }

@@ -1,8 +1,8 @@
-//! What the device's thread has of a world: a pose in, a force and a torque out.
+//! The device thread's access to a tool: a pose in, a force and a torque out.
 
 use glam::{DQuat, DVec3, Vec3};
 
-use super::definition::{Coupling, spread};
+use super::definition::{Coupling, expanded};
 use super::model::{HapticContact, WrenchModel};
 use super::observer::Observer;
 use super::six::{self, Vector6};
@@ -14,30 +14,30 @@ use crate::def::finite_vector;
 use crate::geometry::rotation;
 use crate::sync::triple_buffer::{BufferReader, BufferWriter};
 
-/// Beside what the motion of the device explains, a tick changes the force by no more than this, N, or this part of it.
-const LEAST_CHANGE: f64 = 0.02;
+/// The largest change of the force in a tick beyond what the device's motion explains: absolute, N, and relative.
+const MIN_CHANGE: f64 = 0.02;
 const CHANGE: f64 = 0.02;
 
-/// A little less is used of what is allowed, for rounding.
-const SURE: f64 = 0.99;
+/// The fraction of the allowed change that is used, because of rounding.
+const SAFETY: f64 = 0.99;
 
-/// The furthest that the spring turns the proxy from the device, rad: a model of small turns says nothing of more.
-const FURTHEST_TURN: f64 = 1.0;
+/// The largest rotation interval proxy and device, rad. The local model is valid for small rotations.
+const MAX_ROTATION: f64 = 1.0;
 
-/// The longest time between ticks, s.
-const LONGEST: f32 = 1.0;
+/// The longest time interval ticks, s.
+const MAX_INTERVAL: f32 = 1.0;
 
-/// Where the proxy is, for the world.
+/// The pose of the proxy, sent to the simulation thread.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sent {
     pub pose: Pose,
-    /// By the handle's clock, s.
+    /// The time of the handle's clock, s.
     pub time: f64,
-    /// What it has done until then, by the models, J.
+    /// The work of the proxy until then according to the local models, J.
     pub work: f64,
 }
 
-/// What a tick comes to.
+/// The result of a haptic tick.
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
@@ -62,35 +62,35 @@ pub(crate) struct Sent {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HapticTick {
-    /// On the device, world axes, N.
+    /// The force on the device, world axes, N.
     pub force: Vec3,
-    /// On the device, about its position, N m.
+    /// The torque on the device about its position, N m.
     pub torque: Vec3,
-    /// Where the tool is to go: the device, but for what the spring between them is drawn out.
+    /// The pose that the tool moves to: the device's pose plus the extension of the spring.
     pub proxy: Pose,
-    /// Contacts of the tool as the model was made: [`HapticHandle::contacts`].
+    /// The number of contacts of the local model: [`HapticHandle::contacts`].
     pub contact_count: u32,
-    /// How long ago the device was where the model was made, s, by the ticks; infinite as long as there was none.
+    /// The age of the local model in time of the ticks, s; infinite before the first model.
     pub age: f32,
-    /// The steps of the world that were published for it.
+    /// The number of local models published for the handle.
     pub version: u64,
-    /// What part of the forces of the model is given: less than 1 where that was stale.
+    /// The factor on the force of the model: less than 1 after the model was stale.
     pub gain: f32,
-    /// What the coupling has lost of the energy that went through it, J: kept at 0 or above as far as damping can.
+    /// The energy dissipated by the coupling, J. Passivity control keeps it at 0 or above as far as damping can.
     pub lost: f64,
 }
 
-/// The device's side of a tool of a world, made by [`World::create_haptic`](crate::World::create_haptic): for one thread, which may tick while
+/// The device thread's access to a tool, created by [`World::create_haptic`](crate::World::create_haptic). One thread can tick it while
 /// another steps the world.
 ///
-/// A tick allocates nothing, takes no lock, waits for nothing and takes a few microseconds at most, whatever the world does meanwhile.
+/// A tick allocates nothing, takes no lock, never waits, and takes a few microseconds at most.
 ///
-/// The device is coupled to a proxy of the tool by a spring and a damper (virtual coupling: Colgate, Stanley, Brown 1995). The proxy has no mass: it is where
-/// the spring and the tissue are at rest with each other. The tissue is a model that the last step left: the wrench that the tool felt, and how it
-/// changes with the tool's motion, learnt from its last ways. What a new model says otherwise than the last one fades in over the time between
-/// two of them, and never so fast that a tick changes the force by more than `stiffness * way + damping * change of velocity` and 0.02 N or 2 %.
+/// A spring and a damper couple the device to a proxy of the tool (virtual coupling: Colgate, Stanley, Brown 1995). The massless proxy is
+/// where the spring and the tissue balance. A local model from the last step stands for the tissue: the wrench on the tool and its change with
+/// the tool's motion, learned from the last motions. The difference interval two models fades in over the time interval
+/// them. A tick changes the force by at most `stiffness * displacement + damping * change of velocity`, plus 0.02 N or 2 %.
 ///
-/// When it is dropped, the tool is the world's again.
+/// Dropping the handle ends the coupling.
 ///
 /// ```
 /// # use sinew::*;
@@ -109,34 +109,34 @@ pub struct HapticHandle {
     coupling: Coupling,
     models: BufferReader<WrenchModel>,
     poses: BufferWriter<Sent>,
-    /// Where the device was in the last tick, and how fast.
+    /// The pose and velocity of the device in the last tick.
     device: Option<(DVec3, DQuat, Vector6)>,
     clock: f64,
-    /// When the last model came.
+    /// The time when the last model arrived, s.
     arrived: f64,
-    /// What is felt beside what the model says, and how long that may take to fade, s.
-    rest: Vector6,
+    /// The remaining difference to earlier models, and the time in which it fades, s.
+    remainder: Vector6,
     fades_in: f64,
-    /// The time between the last two models, s.
-    between: f64,
-    /// What is felt, before limits.
-    felt: Vector6,
-    /// What the device was given last.
-    given: Vector6,
-    /// What the proxy met last.
-    held: Vector6,
+    /// The time interval the last two models, s.
+    interval: f64,
+    /// The wrench on the device before limits.
+    unlimited: Vector6,
+    /// The last wrench on the device.
+    on_device: Vector6,
+    /// The last wrench of the tissue on the proxy.
+    on_proxy: Vector6,
     gain: f64,
     observer: Observer,
 }
 
-/// What the device does in a tick.
+/// The motion of the device in a tick.
 struct DeviceMotion {
     position: DVec3,
     orientation: DQuat,
     velocity: Vector6,
-    /// Since the last tick.
-    way: Vector6,
-    /// What the velocity has changed since then.
+    /// The displacement since the last tick.
+    displacement: Vector6,
+    /// The change of velocity since the last tick.
     change: Vector6,
     dt: f64,
 }
@@ -150,23 +150,23 @@ impl HapticHandle {
             device: None,
             clock: 0.0,
             arrived: 0.0,
-            rest: six::ZERO,
+            remainder: six::ZERO,
             fades_in: 0.0,
-            between: 0.0,
-            felt: six::ZERO,
-            given: six::ZERO,
-            held: six::ZERO,
+            interval: 0.0,
+            unlimited: six::ZERO,
+            on_device: six::ZERO,
+            on_proxy: six::ZERO,
             gain: 1.0,
             observer: Observer::default(),
         }
     }
 
-    /// Takes where the device is and how fast it moves, m/s and rad/s, world axes, `dt` seconds after the last tick, and says what it is to feel
-    /// until the next. `None`: as fast as its way since the last tick says.
+    /// Returns the force on the device until the next tick, on_device its pose and velocity, m/s and rad/s, world axes, `dt` seconds after the last
+    /// tick. With `None` the velocity is computed from the displacement since the last tick.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: a number is not finite, a coordinate is further than 1e9 m from 0, the orientation is zero, or `dt` is not above 0 and at
-    /// most 1. Nothing has changed then; the device should be given no force. Such a call allocates its message.
+    /// most 1. After an error nothing has changed; apply no force to the device. A refused call allocates its message.
     pub fn tick(
         &mut self,
         pose: Pose,
@@ -178,40 +178,40 @@ impl HapticHandle {
         velocity.map_or(Ok(()), |velocity| finite_vector("velocity", velocity))?;
         angular_velocity.map_or(Ok(()), |velocity| finite_vector("angular_velocity", velocity))?;
         ensure!(
-            dt > 0.0 && dt <= LONGEST,
-            "dt is {dt}: must be above 0 and at most {LONGEST}"
+            dt > 0.0 && dt <= MAX_INTERVAL,
+            "dt is {dt}: must be above 0 and at most {MAX_INTERVAL}"
         );
         let motion = self.motion(pose, [velocity, angular_velocity], f64::from(dt));
         self.clock += motion.dt;
-        self.observer.hand_moved(&self.given, &motion.way);
-        let spring = spread(self.coupling.stiffness);
-        let mut pressed = self.pressed(&motion, &spring);
+        self.observer.hand_moved(&self.on_device, &motion.displacement);
+        let spring = expanded(self.coupling.stiffness);
+        let mut tissue_wrench = self.tissue_wrench(&motion, &spring);
         if self.models.take() {
-            let now = self.pressed(&motion, &spring);
-            let otherwise = six::difference(&pressed, &now);
-            self.rest = six::sum(&self.rest, &six::scaled(&otherwise, self.gain));
-            self.between = (self.clock - self.arrived)
+            let now = self.tissue_wrench(&motion, &spring);
+            let discrepancy = six::difference(&tissue_wrench, &now);
+            self.remainder = six::sum(&self.remainder, &six::scaled(&discrepancy, self.gain));
+            self.interval = (self.clock - self.arrived)
                 .min(self.coupling.stale_after)
                 .max(motion.dt);
-            self.fades_in = self.between;
+            self.fades_in = self.interval;
             self.arrived = self.clock;
-            pressed = now;
+            tissue_wrench = now;
         }
         self.ramp(motion.dt);
         self.fade(motion.dt);
-        let damped = self.damped(&motion, &pressed, &spring);
-        self.feel(&motion, &six::sum(&pressed, &damped));
-        self.account(&motion, &pressed, &spring);
+        let damped = self.damped(&motion, &tissue_wrench, &spring);
+        self.update_wrench(&motion, &six::sum(&tissue_wrench, &damped));
+        self.account(&motion, &tissue_wrench, &spring);
         Ok(self.result(&motion, &spring))
     }
 
-    /// The contacts of the tool as the model was made that the last tick used.
-    pub fn contacts(&self, mut see: impl FnMut(&HapticContact)) {
+    /// Visits the contacts of the local model that the last tick used.
+    pub fn contacts(&self, mut visit: impl FnMut(&HapticContact)) {
         self.models
-            .read(|model| model.contacts[..model.contact_count].iter().for_each(&mut see));
+            .read(|model| model.contacts[..model.contact_count].iter().for_each(&mut visit));
     }
 
-    /// Whether the tool, or its world, is gone: the last force fades as that of a stale model does.
+    /// True if the tool or its world was destroyed. The force then fades as with a stale model.
     pub fn is_over(&self) -> bool {
         self.models.is_alone()
     }
@@ -219,101 +219,105 @@ impl HapticHandle {
     fn motion(&mut self, pose: Pose, [along, about]: [Option<Vec3>; 2], dt: f64) -> DeviceMotion {
         let (position, orientation) = (pose.position.as_dvec3(), pose.orientation.as_dquat().normalize());
         let lever = self.coupling.lever;
-        let way = self.device.map_or(six::ZERO, |(from, turned_from, _)| {
+        let displacement = self.device.map_or(six::ZERO, |(from, turned_from, _)| {
             six::joined(
                 position - from,
-                rotation::turn_between(turned_from, orientation) * lever,
+                rotation::rotation_between(turned_from, orientation) * lever,
             )
         });
         let velocity = six::joined(
-            along.map_or(six::along(&way) / dt, |along| along.as_dvec3()),
-            about.map_or(six::about(&way) / dt, |about| about.as_dvec3() * lever),
+            along.map_or(six::along(&displacement) / dt, |along| along.as_dvec3()),
+            about.map_or(six::about(&displacement) / dt, |about| about.as_dvec3() * lever),
         );
         let last = self.device.replace((position, orientation, velocity));
         DeviceMotion {
             position,
             orientation,
             velocity,
-            way,
-            change: last.map_or(six::ZERO, |(_, _, slower)| six::difference(&velocity, &slower)),
+            displacement,
+            change: last.map_or(six::ZERO, |(_, _, previous)| six::difference(&velocity, &previous)),
             dt,
         }
     }
 
-    /// What tissue does to the proxy by the model.
-    fn pressed(&self, motion: &DeviceMotion, spring: &Vector6) -> Vector6 {
+    /// The wrench of the tissue on the proxy according to the model.
+    fn tissue_wrench(&self, motion: &DeviceMotion, spring: &Vector6) -> Vector6 {
         self.models.read(|model| {
             let device = model.motion_to(motion.position, motion.orientation, self.coupling.lever);
             model.wrench_at(&device, spring)
         })
     }
 
-    /// Lets what a stale model says go, and come back.
+    /// Fades the force of a stale model out, and that of a new one in.
     fn ramp(&mut self, dt: f64) {
         let is_stale = self.age().min(self.clock) > self.coupling.stale_after;
         let step = dt / self.coupling.ramp;
         self.gain = if is_stale { self.gain - step } else { self.gain + step }.clamp(0.0, 1.0);
         if self.gain == 0.0 {
-            self.observer.forget();
+            self.observer.reset();
         }
     }
 
-    /// Lets what earlier models said otherwise go.
+    /// Fades the difference to earlier models.
     fn fade(&mut self, dt: f64) {
         let left = (1.0 - dt / self.fades_in.max(dt)).max(0.0);
         self.fades_in = (self.fades_in - dt).max(0.0);
-        self.rest = six::scaled(&self.rest, left);
+        self.remainder = six::scaled(&self.remainder, left);
     }
 
-    /// What the dampers do, the coupling's where tissue resists, and the observer's.
-    fn damped(&self, motion: &DeviceMotion, pressed: &Vector6, spring: &Vector6) -> Vector6 {
+    /// The wrench of the coupling's damper, where tissue resists, and of the passivity controller.
+    fn damped(&self, motion: &DeviceMotion, tissue_wrench: &Vector6, spring: &Vector6) -> Vector6 {
         let velocity = &motion.velocity;
-        let lag = match *pressed == six::ZERO {
+        let lag = match *tissue_wrench == six::ZERO {
             true => six::ZERO,
             false => self.models.read(|model| model.lag(velocity)),
         };
-        let coupled = six::scaled(&six::each(&spread(self.coupling.damping), &lag), -1.0);
-        let pushed = six::sum(&six::scaled(&six::sum(pressed, &coupled), self.gain), &self.rest);
-        let gives = self.models.read(|model| model.gives(&pushed, spring));
-        // The step that is next to begin is told of when it is over.
-        let late = 2.0 * self.between;
+        let coupled = six::scaled(&six::each(&expanded(self.coupling.damping), &lag), -1.0);
+        let pushed = six::sum(
+            &six::scaled(&six::sum(tissue_wrench, &coupled), self.gain),
+            &self.remainder,
+        );
+        let releasable = self.models.read(|model| model.releasable_energy(&pushed, spring));
+        // The current step, and the next one, may pass before a model shows the current motion.
+        let delay = 2.0 * self.interval;
         let damper = self
             .observer
-            .damping(velocity, &pushed, gives, late, &self.coupling, motion.dt);
+            .damping(velocity, &pushed, releasable, delay, &self.coupling, motion.dt);
         six::difference(&coupled, &six::scaled(velocity, damper))
     }
 
-    /// What the device is given: what the model says, no more changed than may be, and within all limits.
-    fn feel(&mut self, motion: &DeviceMotion, said: &Vector6) {
-        let wanted = six::sum(&six::scaled(said, self.gain), &self.rest);
-        // Dampers do not hold back a tool that leaves: what presses it does not pull.
-        let wanted = self.models.read(|model| model.possible(&wanted));
-        let change = six::limited(&six::difference(&wanted, &self.felt), self.allowed(motion));
-        self.felt = six::sum(&self.felt, &change);
-        let wanted = six::limited(&self.felt, self.coupling.limits);
+    /// Updates the wrench on the device: that of the model, with limited change, within all limits.
+    fn update_wrench(&mut self, motion: &DeviceMotion, model_wrench: &Vector6) {
+        let wanted = six::sum(&six::scaled(model_wrench, self.gain), &self.remainder);
+        // Damping does not hold back a tool that leaves the tissue: contact does not pull.
+        let wanted = self.models.read(|model| model.clamped(&wanted));
+        let change = six::limited(&six::difference(&wanted, &self.unlimited), self.allowed(motion));
+        self.unlimited = six::sum(&self.unlimited, &change);
+        let wanted = six::limited(&self.unlimited, self.coupling.limits);
         let rates = self.coupling.rate_limits.map(|rate| rate * motion.dt);
-        let change = six::limited(&six::difference(&wanted, &self.given), rates);
-        self.given = six::sum(&self.given, &change);
+        let change = six::limited(&six::difference(&wanted, &self.on_device), rates);
+        self.on_device = six::sum(&self.on_device, &change);
     }
 
-    /// Keeps account of what the proxy and the hand have done.
-    fn account(&mut self, motion: &DeviceMotion, pressed: &Vector6, spring: &Vector6) {
-        let held = six::sum(pressed, &self.rest);
-        let drawn: Vector6 = std::array::from_fn(|k| (held[k] - self.held[k]) / spring[k]);
-        let way = six::sum(&motion.way, &drawn);
-        self.observer.proxy_moved([&self.held, &held], &way);
-        self.held = held;
+    /// Updates the work of the proxy and of the hand.
+    fn account(&mut self, motion: &DeviceMotion, tissue_wrench: &Vector6, spring: &Vector6) {
+        let on_proxy = six::sum(tissue_wrench, &self.remainder);
+        let extension: Vector6 = std::array::from_fn(|k| (on_proxy[k] - self.on_proxy[k]) / spring[k]);
+        let displacement = six::sum(&motion.displacement, &extension);
+        self.observer.proxy_moved([&self.on_proxy, &on_proxy], &displacement);
+        self.on_proxy = on_proxy;
         let account = self.models.read(|model| (model.work, model.sent_work));
-        self.observer.balance(account, &held, &self.coupling, motion.dt);
+        self.observer.balance(account, &on_proxy, &self.coupling, motion.dt);
     }
 
-    /// By how much what is felt may change in a tick: as the springs and dampers of the coupling would, and a little.
+    /// The largest change of the wrench in a tick: what the spring and damper of the coupling explain, plus a small amount.
     fn allowed(&self, motion: &DeviceMotion) -> [f64; 2] {
         let parts: [fn(&Vector6) -> DVec3; 2] = [six::along, six::about];
         std::array::from_fn(|k| {
-            let [way, change, felt] = [&motion.way, &motion.change, &self.felt].map(|six| parts[k](six).length());
-            let moved = self.coupling.stiffness[k] * way + self.coupling.damping[k] * change;
-            SURE * (moved + LEAST_CHANGE.max(CHANGE * felt))
+            let [displacement, change, unlimited] =
+                [&motion.displacement, &motion.change, &self.unlimited].map(|six| parts[k](six).length());
+            let moved = self.coupling.stiffness[k] * displacement + self.coupling.damping[k] * change;
+            SAFETY * (moved + MIN_CHANGE.max(CHANGE * unlimited))
         })
     }
 
@@ -324,14 +328,14 @@ impl HapticHandle {
         })
     }
 
-    /// Sends the proxy to the world, and tells the device.
+    /// Sends the proxy to the simulation, and returns the result of the tick.
     fn result(&mut self, motion: &DeviceMotion, spring: &Vector6) -> HapticTick {
-        let drawn: Vector6 = std::array::from_fn(|k| self.held[k] / spring[k]);
+        let extension: Vector6 = std::array::from_fn(|k| self.on_proxy[k] / spring[k]);
         let lever = self.coupling.lever;
-        let turned = six::about(&drawn) / lever;
+        let turned = six::about(&extension) / lever;
         let proxy = Pose {
-            position: finite(motion.position + six::along(&drawn)),
-            orientation: rotation::turned(motion.orientation, turned.clamp_length_max(FURTHEST_TURN)).as_quat(),
+            position: finite(motion.position + six::along(&extension)),
+            orientation: rotation::rotated(motion.orientation, turned.clamp_length_max(MAX_ROTATION)).as_quat(),
         };
         let (time, work) = (self.clock, self.observer.by_proxy);
         self.poses.write(|sent| {
@@ -343,19 +347,19 @@ impl HapticHandle {
         });
         let (version, contacts) = self.models.read(|model| (model.version, model.contact_count));
         HapticTick {
-            force: finite(six::along(&self.given)),
-            torque: finite(six::about(&self.given) * lever),
+            force: finite(six::along(&self.on_device)),
+            torque: finite(six::about(&self.on_device) * lever),
             proxy,
             contact_count: contacts as u32,
             age: self.age() as f32,
             version,
             gain: self.gain as f32,
-            lost: self.observer.lost,
+            lost: self.observer.dissipated,
         }
     }
 }
 
-/// Finite, however fast the device is said to be.
+/// Converts to `f32`; very large values stay finite.
 fn finite(exact: DVec3) -> Vec3 {
     exact.as_vec3().clamp(Vec3::MIN, Vec3::MAX)
 }

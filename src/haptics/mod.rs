@@ -1,7 +1,7 @@
-//! A kilohertz hand on a world of sixty steps a second.
+//! Haptic rendering at 1 kHz beside a simulation at 60 Hz.
 //!
-//! The stepping thread leaves a *model* of the tissue about a tool (`model.rs`, `secant.rs`), the device's thread feels it through a virtual coupling
-//! (`handle.rs`), which an observer of energy keeps passive (`observer.rs`). They hand each other models and poses over without waiting.
+//! The simulation thread publishes a *local model* of the tissue at a tool (`model.rs`, `secant.rs`). The device thread renders it through a virtual
+//! coupling (`handle.rs`). A passivity observer limits its energy (`observer.rs`). The threads exchange models and poses without waiting.
 
 mod definition;
 mod handle;
@@ -14,8 +14,8 @@ pub use definition::HapticDefinition;
 pub use handle::{HapticHandle, HapticTick};
 pub use model::HapticContact;
 
-pub(crate) use definition::{Coupling, spread};
+pub(crate) use definition::{Coupling, expanded};
 pub(crate) use handle::Sent;
-pub(crate) use model::{Cone, MOST_CONTACTS, WrenchModel};
+pub(crate) use model::{Cone, MAX_CONTACTS, WrenchModel};
 pub(crate) use secant::Secant;
 pub(crate) use six::{Vector6, ZERO, about, along, difference, inverse, joined, product, scaled, sum};

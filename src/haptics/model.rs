@@ -1,4 +1,4 @@
-//! The tissue about a tool as the stepping thread last saw it.
+//! The local model: an affine approximation of the wrench on a tool, valid between two steps.
 
 use glam::{DQuat, DVec3, Vec3};
 
@@ -6,13 +6,13 @@ use super::six::{self, Matrix6, Vector6};
 use crate::base::BodyId;
 use crate::geometry::rotation;
 
-/// Contacts that a model has room for; of more the most pressed.
-pub(crate) const MOST_CONTACTS: usize = 32;
+/// The largest number of contacts in a model: those with the largest forces.
+pub(crate) const MAX_CONTACTS: usize = 32;
 
-/// Tissue is taken to be at least so many times as stiff as the coupling, as long as it is not known.
-const SOFTEST: f64 = 0.05;
+/// The least assumed stiffness of tissue, relative to the coupling.
+const MIN_STIFFNESS_RATIO: f64 = 0.05;
 
-/// Where a tool pressed a body as the model was made.
+/// A contact of a tool with a body at the time of the local model.
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
@@ -41,107 +41,107 @@ pub struct HapticContact {
     pub body: BodyId,
     /// The point, m.
     pub point: Vec3,
-    /// Away from the tool, of unit length.
+    /// The unit normal, pointing away from the tool.
     pub normal: Vec3,
-    /// How fast the tissue moves there, m/s.
+    /// The velocity of the tissue there, m/s.
     pub velocity: Vec3,
-    /// On the tool, N.
+    /// The force on the tool, N.
     pub force: Vec3,
 }
 
-/// Wrenches that contact can make: tissue presses, it does not pull.
+/// The set of wrenches that contact can exert: tissue presses and does not pull.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cone {
     /// The mean direction of the forces.
     pub axis: DVec3,
-    /// How far a force may lean from it: the tangent of the angle.
-    pub lean: f64,
-    /// How large a torque may be beside the force along the axis, at the lever.
-    pub arm: f64,
+    /// The tangent of the largest angle between a force and the axis.
+    pub max_tangent: f64,
+    /// The largest torque relative to the force along the axis, at the lever max_torque_ratio.
+    pub max_torque_ratio: f64,
 }
 
-/// What a tool feels when it is moved a little: a wrench that changes with the motion.
+/// The wrench on a tool as an affine function of its motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WrenchModel {
-    /// Steps that were published.
+    /// The number of models published.
     pub version: u64,
-    /// Where the tool was in the middle of the step, for which its mean wrench stands.
+    /// The pose of the tool in the middle of the step, where the mean wrench is valid.
     pub position: DVec3,
     pub orientation: DQuat,
-    /// What the tool felt there.
+    /// The wrench at that pose.
     pub wrench: Vector6,
-    /// How much less it feels for a motion.
+    /// The decrease of the wrench per motion.
     pub stiffness: Matrix6,
-    /// The inverse of this stiffness and the coupling's together.
-    pub answer: Matrix6,
-    /// None: the tool holds something, or is held between contacts, and can be pulled too.
+    /// The inverse of the sum of this stiffness and the coupling's.
+    pub compliance: Matrix6,
+    /// The wrenches that contact can exert; `None` if attachments or opposed contacts can pull the tool.
     pub cone: Option<Cone>,
-    /// What the tool has done to the tissue since the handle was made, J.
+    /// The work of the tool on the tissue since the handle was created, J.
     pub work: f64,
-    /// When, and with what work by the models until then, the proxy was where the step led the tool: by the handle's own account.
+    /// The handle's time, and its proxy's work, when it sent the pose that the step moved the tool to.
     pub sent_at: f64,
     pub sent_work: f64,
-    pub contacts: [HapticContact; MOST_CONTACTS],
+    pub contacts: [HapticContact; MAX_CONTACTS],
     pub contact_count: usize,
 }
 
 impl WrenchModel {
-    /// Nothing is near a tool that is here, led by a spring of this stiffness.
+    /// The model of a tool without contact, coupled by a spring of this stiffness.
     pub fn free(position: DVec3, orientation: DQuat, spring: &Vector6) -> Self {
         Self {
             version: 0,
             position,
             orientation,
             wrench: six::ZERO,
-            stiffness: six::NOTHING,
-            answer: six::inverse(&six::diagonal(spring)),
+            stiffness: six::ZERO_MATRIX,
+            compliance: six::inverse(&six::diagonal(spring)),
             cone: None,
             work: 0.0,
             sent_at: 0.0,
             sent_work: 0.0,
-            contacts: [HapticContact::default(); MOST_CONTACTS],
+            contacts: [HapticContact::default(); MAX_CONTACTS],
             contact_count: 0,
         }
     }
 
-    /// The motion to here from where the model was made, with turns at the lever.
+    /// The motion from the model's pose to this one. Rotations are scaled by the lever max_torque_ratio.
     pub fn motion_to(&self, position: DVec3, orientation: DQuat, lever: f64) -> Vector6 {
         six::joined(
             position - self.position,
-            rotation::turn_between(self.orientation, orientation) * lever,
+            rotation::rotation_between(self.orientation, orientation) * lever,
         )
     }
 
-    /// What tissue does to a proxy that a device holds on springs of this stiffness, where the device has made this motion: both are at rest
-    /// with each other (Saupin, Duriez, Cotin 2008).
+    /// The wrench of the tissue on a proxy that is coupled by springs of this stiffness to a device at this motion, in static equilibrium (Saupin, Duriez,
+    /// Cotin 2008).
     pub fn wrench_at(&self, device: &Vector6, spring: &Vector6) -> Vector6 {
         let pull = six::sum(&six::each(spring, device), &self.wrench);
-        let proxy = six::product(&self.answer, &pull);
+        let proxy = six::product(&self.compliance, &pull);
         let wrench = six::difference(&self.wrench, &six::product(&self.stiffness, &proxy));
-        self.possible(&wrench)
+        self.clamped(&wrench)
     }
 
-    /// The nearest wrench that the tissue can press with.
-    pub fn possible(&self, wrench: &Vector6) -> Vector6 {
+    /// The nearest wrench that the tissue can exert.
+    pub fn clamped(&self, wrench: &Vector6) -> Vector6 {
         self.cone.map_or(*wrench, |cone| cone.nearest(wrench))
     }
 
-    /// What tissue and springs that press with this wrench give back as they let go, J.
-    pub fn gives(&self, wrench: &Vector6, spring: &Vector6) -> f64 {
+    /// The elastic energy that tissue and springs release from this wrench, J.
+    pub fn releasable_energy(&self, wrench: &Vector6, spring: &Vector6) -> f64 {
         let square = six::dot(wrench, wrench);
         let stiffness = six::dot(wrench, &six::product(&self.stiffness, wrench)) / square;
         let stored: f64 = (0..6).map(|k| wrench[k] * wrench[k] / spring[k]).sum();
-        0.5 * (stored + square / stiffness.max(SOFTEST * spring[0]))
+        0.5 * (stored + square / stiffness.max(MIN_STIFFNESS_RATIO * spring[0]))
     }
 
-    /// What of a device's velocity its proxy does not share: all where tissue is hard, nothing where there is none.
+    /// The part of the device's velocity that the proxy does not follow: all of it on hard tissue, none without tissue.
     pub fn lag(&self, velocity: &Vector6) -> Vector6 {
-        six::product(&self.answer, &six::product(&self.stiffness, velocity))
+        six::product(&self.compliance, &six::product(&self.stiffness, velocity))
     }
 }
 
 impl Cone {
-    /// The nearest wrench that contact can make.
+    /// The nearest wrench in the cone.
     fn nearest(&self, wrench: &Vector6) -> Vector6 {
         let (force, torque) = (six::along(wrench), six::about(wrench));
         let pressure = force.dot(self.axis);
@@ -150,8 +150,8 @@ impl Cone {
         }
         let across = force - self.axis * pressure;
         six::joined(
-            self.axis * pressure + across.clamp_length_max(self.lean * pressure),
-            torque.clamp_length_max(self.arm * pressure),
+            self.axis * pressure + across.clamp_length_max(self.max_tangent * pressure),
+            torque.clamp_length_max(self.max_torque_ratio * pressure),
         )
     }
 }

@@ -1,120 +1,125 @@
-//! Keeps the loop of hand and tissue passive: what the coupling gives away it must have been given.
+//! Passivity control: the coupling returns no more energy than the user supplied.
 //!
-//! The hand's work on the device, less the tool's on the tissue, less what the spring between them stores, is what the coupling has lost. Where that
-//! falls below 0 it has made energy, by what sampling and hand-over are late, and a damper takes it back (Hannaford, Ryu 2002, at two ports).
+//! The energy dissipated by the coupling is the hand's work on the device, less the tool's work on the tissue, less the energy stored in the spring. If it
+//! falls below 0, delays have generated energy, and a damper dissipates it (Hannaford, Ryu 2002, with two ports).
 
-use super::definition::{Coupling, spread};
+use super::definition::{Coupling, expanded};
 use super::six::{self, Vector6};
 
-/// What was lost may be had back up to what the spring stores when it is drawn out so far, m.
-const UNFELT: f64 = 2e-5;
+/// Dissipated energy is credited up to the energy that the spring stores at this extension, m.
+const CREDIT_EXTENSION: f64 = 2e-5;
 
-/// What was made is taken back within so long, s: at once it would be felt as a knock.
-const TAKEN_BACK: f64 = 0.02;
+/// The time in which generated energy is dissipated, s. A shorter time would be felt as a knock.
+const DISSIPATION_TIME: f64 = 0.02;
 
-/// What was made is remembered for so long, s.
-const REMEMBERED: f64 = 0.2;
+/// The time constant of the energy balance, s.
+const MEMORY_TIME: f64 = 0.2;
 
-/// The damper is at most so many times what damps the device critically: a coupling without a damper needs it most.
-const MOST: f64 = 2.0;
+/// The largest damping, relative to the critical damping of the device.
+const MAX_DAMPING: f64 = 2.0;
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Observer {
-    /// Done by the hand, J, and by the proxy on what it felt.
+    /// The work of the hand, and of the proxy on the tissue, J.
     by_hand: f64,
     pub by_proxy: f64,
-    /// What of the balance is forgotten, J.
+    /// The part of the balance that is no longer counted, J.
     forgotten: f64,
-    /// What the coupling has lost, J; below 0 it has made so much.
-    pub lost: f64,
-    /// What the hand, and the tool on the tissue, had done when the tool touched nothing last, J.
+    /// The energy dissipated by the coupling, J; below 0 it has generated energy.
+    pub dissipated: f64,
+    /// The work of the hand, and of the tool on the tissue, when the tool was last free, J.
     free: [f64; 2],
-    /// What the hand has done since then and not had back, and what tissue has given by itself, J.
-    paid: f64,
-    /// The most of that.
-    most_paid: f64,
+    /// The net work of the hand since then, plus the energy that the tissue has given, J.
+    supplied: f64,
+    /// The largest value of `supplied`.
+    max_supplied: f64,
 }
 
 impl Observer {
-    /// The hand has moved by this way against what it felt.
-    pub fn hand_moved(&mut self, felt: &Vector6, way: &Vector6) {
-        self.by_hand -= six::dot(felt, way);
+    /// Adds the hand's work over a displacement against a wrench.
+    pub fn hand_moved(&mut self, felt: &Vector6, displacement: &Vector6) {
+        self.by_hand -= six::dot(felt, displacement);
     }
 
-    /// The proxy has moved by this way against the mean of these.
-    pub fn proxy_moved(&mut self, held: [&Vector6; 2], way: &Vector6) {
-        self.by_proxy -= 0.5 * (six::dot(held[0], way) + six::dot(held[1], way));
+    /// Adds the proxy's work over a displacement against the mean of two wrenches.
+    pub fn proxy_moved(&mut self, on_proxy: [&Vector6; 2], displacement: &Vector6) {
+        self.by_proxy -= 0.5 * (six::dot(on_proxy[0], displacement) + six::dot(on_proxy[1], displacement));
     }
 
-    /// Balances what is known: the work on the tissue until the model was made, by the world's account and by the proxy's.
-    pub fn balance(&mut self, (work, sent_work): (f64, f64), held: &Vector6, coupling: &Coupling, dt: f64) {
+    /// Updates the energy balance. `work` is the tool's work on the tissue until the local model, and `sent_work` the proxy's until then.
+    pub fn balance(&mut self, (work, sent_work): (f64, f64), on_proxy: &Vector6, coupling: &Coupling, dt: f64) {
         let on_tissue = work + self.by_proxy - sent_work;
-        let stiffness = spread(coupling.stiffness);
-        let stored: f64 = held
+        let stiffness = expanded(coupling.stiffness);
+        let stored: f64 = on_proxy
             .iter()
             .zip(stiffness)
             .map(|(wrench, spring)| 0.5 * wrench * wrench / spring)
             .sum();
-        let lost = self.by_hand - on_tissue - stored - self.forgotten;
-        let reserve = 0.5 * coupling.stiffness[0] * UNFELT * UNFELT;
-        // Tissue spends by itself what it was given too much.
-        let part = (dt / REMEMBERED).min(1.0);
-        let spent = lost.min(0.0) * part;
-        self.forgotten += (lost - reserve).max(0.0) + spent;
-        self.lost = lost.min(reserve) - spent;
-        self.pay(work, *held == six::ZERO, part);
+        let dissipated = self.by_hand - on_tissue - stored - self.forgotten;
+        let reserve = 0.5 * coupling.stiffness[0] * CREDIT_EXTENSION * CREDIT_EXTENSION;
+        // The tissue dissipates an excess itself.
+        let part = (dt / MEMORY_TIME).min(1.0);
+        let spent = dissipated.min(0.0) * part;
+        self.forgotten += (dissipated - reserve).max(0.0) + spent;
+        self.dissipated = dissipated.min(reserve) - spent;
+        self.update_supplied(work, *on_proxy == six::ZERO, part);
     }
 
-    /// Knows what the hand has paid, by the hand's own account: forgets it where the tool touches nothing, and this part of it with time.
-    fn pay(&mut self, work: f64, is_free: bool, part: f64) {
+    /// Updates the energy supplied by the hand. It is reset while the tool is free, and decays by `part`.
+    fn update_supplied(&mut self, work: f64, is_free: bool, part: f64) {
         if is_free {
             self.free = [self.by_hand, work];
-            self.most_paid = 0.0;
+            self.max_supplied = 0.0;
         }
-        self.paid = self.by_hand - self.free[0] + (self.free[1] - work).max(0.0);
-        self.free[0] += self.paid.min(0.0) * part;
-        self.most_paid = self.most_paid.max(self.paid);
-        self.most_paid += (self.paid - self.most_paid) * part;
+        self.supplied = self.by_hand - self.free[0] + (self.free[1] - work).max(0.0);
+        self.free[0] += self.supplied.min(0.0) * part;
+        self.max_supplied = self.max_supplied.max(self.supplied);
+        self.max_supplied += (self.supplied - self.max_supplied) * part;
     }
 
-    /// Forgets what was made or lost.
-    pub fn forget(&mut self) {
-        self.forgotten += self.lost;
-        self.lost = 0.0;
+    /// Resets the balance.
+    pub fn reset(&mut self) {
+        self.forgotten += self.dissipated;
+        self.dissipated = 0.0;
     }
 
-    /// The damper, N s/m, that takes back what was made of a device at this velocity. Where the device is pushed by this wrench, and by what can give
-    /// back so much as it lets go, J, it is given that part of its work less that was never paid for. The world tells what was so late, s.
+    /// The damping, N s/m, that dissipates generated energy at this velocity of the device. `pushed` is the wrench on the device, and `releasable` the elastic
+    /// energy behind it, J. The part of its work that was never supplied is withheld. `delay` is the delay of the local model, s.
     pub fn damping(
         &self,
         velocity: &Vector6,
         pushed: &Vector6,
-        gives: f64,
-        late: f64,
+        releasable: f64,
+        delay: f64,
         coupling: &Coupling,
         dt: f64,
     ) -> f64 {
         let square = six::dot(velocity, velocity);
         let power = six::dot(pushed, velocity);
-        if square == 0.0 || (self.lost >= 0.0 && power <= 0.0) {
+        if square == 0.0 || (self.dissipated >= 0.0 && power <= 0.0) {
             return 0.0;
         }
-        let made = (-self.lost).max(0.0);
+        let generated = (-self.dissipated).max(0.0);
         let unpaid = match power > 0.0 {
-            true => power * (made / gives).max(self.early(power, gives, late)).clamp(0.0, 1.0),
+            true => {
+                power
+                    * (generated / releasable)
+                        .max(self.unsupplied_share(power, releasable, delay))
+                        .clamp(0.0, 1.0)
+            }
             false => 0.0,
         };
-        ((made / TAKEN_BACK.max(dt) + unpaid) / square).min(MOST * coupling.critical)
+        ((generated / DISSIPATION_TIME.max(dt) + unpaid) / square).min(MAX_DAMPING * coupling.critical)
     }
 
-    /// What part of that was never paid for as far as the hand knows by itself: asked where all would be given before the world tells.
-    fn early(&self, power: f64, gives: f64, late: f64) -> f64 {
-        let soon = (power * late / gives).min(1.0);
-        // A hand that has paid nothing is carried by the tissue.
-        let paying = match self.paid < 0.0 {
-            true => self.most_paid / (self.most_paid - self.paid),
+    /// The fraction of that energy that was never supplied, by the hand's own balance. It counts if the energy would be released within the delay.
+    fn unsupplied_share(&self, power: f64, releasable: f64, delay: f64) -> f64 {
+        let soon = (power * delay / releasable).min(1.0);
+        // A hand that has supplied nothing is moved by the tissue.
+        let paying = match self.supplied < 0.0 {
+            true => self.max_supplied / (self.max_supplied - self.supplied),
             false => 1.0,
         };
-        soon * soon * paying * (1.0 - self.paid / gives)
+        soon * soon * paying * (1.0 - self.supplied / releasable)
     }
 }

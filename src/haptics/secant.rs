@@ -1,23 +1,23 @@
-//! How stiff tissue is as a tool feels it: learnt from how its wrench changed as it moved.
+//! Estimates the stiffness of the tissue at a tool from the changes of its wrench.
 
 use glam::{DQuat, DVec3};
 
 use super::six::{self, Matrix6, Vector6};
 use crate::geometry::rotation;
 
-/// The tool has to move by this part of its lever before anything is learnt: less is lost in what tissue does by itself.
-const LEAST_WAY: f64 = 0.02;
+/// The least motion that updates the estimate, relative to the lever arm. Smaller ones are hidden by the tissue's own motion.
+const MIN_DISPLACEMENT: f64 = 0.02;
 
-/// Tissue is at most so many times as stiff as the coupling: more makes no difference to the hand.
-const STIFFEST: f64 = 3.0;
+/// The largest stiffness relative to the coupling. A larger one makes no difference to the user.
+const MAX_STIFFNESS_RATIO: f64 = 3.0;
 
-/// What is felt in so many seconds is taken together, so that short steps do not teach what nodes do between them, s.
+/// Wrenches are averaged over this time, so that short steps do not resolve the vibration of single nodes, s.
 const WINDOW: f64 = 0.01;
 
-/// The time in which the stiffness of what a tool holds loses half of what it was at most, s.
-const FORGOTTEN: f64 = 1.0;
+/// The half-life of the largest stiffness of held tissue, s.
+const HALF_LIFE: f64 = 1.0;
 
-/// Where a tool was, and what it felt there, in the mean of some steps.
+/// The mean pose and wrench of a tool over several steps.
 #[derive(Clone, Copy, Debug)]
 struct WrenchSample {
     position: DVec3,
@@ -25,14 +25,14 @@ struct WrenchSample {
     wrench: Vector6,
 }
 
-/// The stiffness that explains the last ways of a tool with the least change (Powell's symmetric form of Broyden's update, 1970).
+/// A secant estimate of the stiffness: Powell's symmetric form of Broyden's update (1970).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Secant {
     last: Option<WrenchSample>,
-    /// What has been felt since then, the mean of so many seconds.
+    /// The mean since then, and its duration, s.
     next: Option<(WrenchSample, f64)>,
     stiffness: Matrix6,
-    /// The largest along a way of late, N/m.
+    /// The largest recent stiffness along a displacement, N/m.
     largest: f64,
 }
 
@@ -41,26 +41,26 @@ impl Secant {
         Self {
             last: None,
             next: None,
-            stiffness: six::NOTHING,
+            stiffness: six::ZERO_MATRIX,
             largest: 0.0,
         }
     }
 
-    /// The stiffness as it is known, N/m.
+    /// The current estimate, N/m.
     pub fn stiffness(&self) -> &Matrix6 {
         &self.stiffness
     }
 
-    /// Learns from what a tool felt here in a step of `dt` seconds, with turns at the lever, m, beside a coupling of this stiffness, N/m; where it
-    /// touches nothing what was learnt is forgotten. What it holds swings on: it seems soft as it comes back, and a tool that gave way to that
-    /// would feed it. So it is no softer than it was of late.
-    pub fn learn(
+    /// Updates the estimate with the wrench at a pose in a step of `dt` seconds. `lever` scales rotations, m; `coupling` is the coupling's stiffness, N/m.
+    /// A free tool resets the estimate. Held tissue oscillates and seems soft as it swings back; yielding to that would feed the oscillation. The
+    /// estimate for held tissue therefore stays at the largest recent value.
+    pub fn update(
         &mut self,
         (position, orientation): (DVec3, DQuat),
         wrench: &Vector6,
         dt: f64,
         lever: f64,
-        (coupling, holds): (f64, bool),
+        (coupling, is_holding): (f64, bool),
     ) {
         let sample = WrenchSample {
             position,
@@ -72,12 +72,12 @@ impl Secant {
             self.last = Some(sample);
             return;
         }
-        let (mean, lasts) = match self.next {
-            Some((mean, lasts)) => (mean.and(&sample, dt / (lasts + dt)), lasts + dt),
+        let (mean, duration) = match self.next {
+            Some((mean, duration)) => (mean.lerp(&sample, dt / (duration + dt)), duration + dt),
             None => (sample, dt),
         };
-        self.next = Some((mean, lasts));
-        if lasts < WINDOW * (1.0 - 1e-3) {
+        self.next = Some((mean, duration));
+        if duration < WINDOW * (1.0 - 1e-3) {
             return;
         }
         let Some(last) = self.last else {
@@ -91,40 +91,41 @@ impl Secant {
             wrench,
         } = mean;
         self.next = None;
-        let way = six::joined(
+        let displacement = six::joined(
             position - last.position,
-            rotation::turn_between(last.orientation, orientation) * lever,
+            rotation::rotation_between(last.orientation, orientation) * lever,
         );
-        let square = six::dot(&way, &way);
-        if !(square.sqrt() >= LEAST_WAY * lever) {
+        let square = six::dot(&displacement, &displacement);
+        if !(square.sqrt() >= MIN_DISPLACEMENT * lever) {
             return;
         }
         let resisted = six::difference(&last.wrench, &wrench);
-        let missing = six::difference(&resisted, &six::product(&self.stiffness, &way));
-        let along = six::dot(&missing, &way) / square;
+        let missing = six::difference(&resisted, &six::product(&self.stiffness, &displacement));
+        let along = six::dot(&missing, &displacement) / square;
         for i in 0..6 {
             for j in 0..6 {
-                let change = missing[i] * way[j] + way[i] * missing[j] - along * way[i] * way[j];
+                let change = missing[i] * displacement[j] + displacement[i] * missing[j]
+                    - along * displacement[i] * displacement[j];
                 self.stiffness[i][j] += change / square;
             }
         }
-        let stiffest = STIFFEST * coupling;
-        let along = (six::dot(&resisted, &way) / square).abs();
-        self.largest = along.max(self.largest / (1.0 + lasts / FORGOTTEN)).min(stiffest);
-        let softest = if holds { self.largest } else { 0.0 };
+        let stiffest = MAX_STIFFNESS_RATIO * coupling;
+        let along = (six::dot(&resisted, &displacement) / square).abs();
+        self.largest = along.max(self.largest / (1.0 + duration / HALF_LIFE)).min(stiffest);
+        let softest = if is_holding { self.largest } else { 0.0 };
         self.stiffness = six::clamped(&self.stiffness, [softest, stiffest]);
         self.last = Some(mean);
     }
 }
 
 impl WrenchSample {
-    /// With a part of another: the mean of both.
-    fn and(&self, other: &Self, part: f64) -> Self {
+    /// Interpolates to another sample.
+    fn lerp(&self, other: &Self, part: f64) -> Self {
         Self {
             position: self.position.lerp(other.position, part),
-            orientation: rotation::turned(
+            orientation: rotation::rotated(
                 self.orientation,
-                part * rotation::turn_between(self.orientation, other.orientation),
+                part * rotation::rotation_between(self.orientation, other.orientation),
             ),
             wrench: std::array::from_fn(|k| self.wrench[k] + part * (other.wrench[k] - self.wrench[k])),
         }
@@ -136,9 +137,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_learns_a_stiffness_from_six_ways() {
+    fn it_learns_a_stiffness_from_six_directions() {
         // Turned and scaled along its axes: symmetric and positive definite.
-        let mut truth = six::NOTHING;
+        let mut truth = six::ZERO_MATRIX;
         for (i, row) in truth.iter_mut().enumerate() {
             for (j, entry) in row.iter_mut().enumerate() {
                 *entry = if i == j { 200.0 + 50.0 * i as f64 } else { 20.0 };
@@ -153,8 +154,8 @@ mod tests {
                 // Small enough that turns add up.
                 motion[axis] = 0.25e-3 * f64::from(round % 2 + 1);
                 let wrench = six::difference(&base, &six::product(&truth, &motion));
-                let turned = rotation::turned(DQuat::IDENTITY, six::about(&motion) / lever);
-                secant.learn((six::along(&motion), turned), &wrench, 0.016, lever, (1000.0, false));
+                let turned = rotation::rotated(DQuat::IDENTITY, six::about(&motion) / lever);
+                secant.update((six::along(&motion), turned), &wrench, 0.016, lever, (1000.0, false));
             }
         }
         for (learnt, row) in secant.stiffness().iter().zip(&truth) {

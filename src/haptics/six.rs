@@ -1,6 +1,6 @@
-//! Motions and wrenches as six numbers: along x, y, z, and about them.
+//! Motions and wrenches as vectors of six numbers: three for translation and three for rotation.
 //!
-//! What turns is measured in metres at the lever of a tool, so that all six have the same unit: a motion is (way, lever angle), m, a wrench
+//! Rotations are scaled by the lever arm of a tool, so that all numbers have the same unit: a motion is (displacement, lever angle), m, a wrench
 //! (force, torque / lever), N.
 
 use glam::DVec3;
@@ -11,19 +11,19 @@ pub(crate) type Vector6 = [f64; 6];
 pub(crate) type Matrix6 = [Vector6; 6];
 
 pub(crate) const ZERO: Vector6 = [0.0; 6];
-pub(crate) const NOTHING: Matrix6 = [ZERO; 6];
+pub(crate) const ZERO_MATRIX: Matrix6 = [ZERO; 6];
 
-/// What goes along and what turns as six numbers.
+/// Joins the parts for translation and rotation.
 pub(crate) fn joined(along: DVec3, about: DVec3) -> Vector6 {
     [along.x, along.y, along.z, about.x, about.y, about.z]
 }
 
-/// What goes along.
+/// The part for translation.
 pub(crate) fn along(six: &Vector6) -> DVec3 {
     DVec3::new(six[0], six[1], six[2])
 }
 
-/// What turns.
+/// The part for rotation.
 pub(crate) fn about(six: &Vector6) -> DVec3 {
     DVec3::new(six[3], six[4], six[5])
 }
@@ -40,7 +40,7 @@ pub(crate) fn scaled(a: &Vector6, by: f64) -> Vector6 {
     a.map(|part| part * by)
 }
 
-/// Number by number.
+/// The elementwise product.
 pub(crate) fn each(a: &Vector6, b: &Vector6) -> Vector6 {
     std::array::from_fn(|k| a[k] * b[k])
 }
@@ -53,7 +53,7 @@ pub(crate) fn product(matrix: &Matrix6, six: &Vector6) -> Vector6 {
     std::array::from_fn(|row| dot(&matrix[row], six))
 }
 
-/// Both parts no longer than these.
+/// Clamps the lengths of both parts.
 pub(crate) fn limited(six: &Vector6, [most_along, most_about]: [f64; 2]) -> Vector6 {
     joined(
         along(six).clamp_length_max(most_along),
@@ -61,12 +61,12 @@ pub(crate) fn limited(six: &Vector6, [most_along, most_about]: [f64; 2]) -> Vect
     )
 }
 
-/// The matrix with these on its diagonal.
+/// The diagonal matrix of these numbers.
 pub(crate) fn diagonal(six: &Vector6) -> Matrix6 {
     std::array::from_fn(|row| std::array::from_fn(|column| if row == column { six[row] } else { 0.0 }))
 }
 
-/// The inverse of a symmetric positive definite matrix (Gauss and Jordan); there is one.
+/// The inverse of a symmetric positive definite matrix by Gauss-Jordan elimination.
 pub(crate) fn inverse(matrix: &Matrix6) -> Matrix6 {
     let mut left = *matrix;
     let mut inverse = diagonal(&[1.0; 6]);
@@ -83,10 +83,10 @@ pub(crate) fn inverse(matrix: &Matrix6) -> Matrix6 {
     inverse
 }
 
-/// Sweeps of rotations: what is off the diagonal is rounding after five.
+/// The number of Jacobi sweeps. After five the off-diagonal elements are rounding.
 const SWEEPS: usize = 8;
 
-/// The symmetric matrix whose eigenvalues are those of this one within a range (cyclic Jacobi rotations).
+/// The symmetric matrix with its eigenvalues clamped to a range (cyclic Jacobi rotations).
 pub(crate) fn clamped(matrix: &Matrix6, range: [f64; 2]) -> Matrix6 {
     let mut rest = *matrix;
     let mut vectors = diagonal(&[1.0; 6]);
@@ -184,7 +184,7 @@ mod tests {
         for _ in 0..100 {
             let from = DQuat::from_xyzw(next(), next(), next(), next()).normalize();
             let by = DVec3::new(next(), next(), next()) * 4.0;
-            let found = rotation::turn_between(from, rotation::turned(from, by));
+            let found = rotation::rotation_between(from, rotation::rotated(from, by));
             assert!((found - by).length() < 1e-12, "{found} {by}");
         }
     }

@@ -1,9 +1,9 @@
-//! Tissue by a laboratory's numbers: the stiffnesses of springs from Young's modulus, masses from density.
+//! Tissue by physical properties: spring stiffnesses from Young's modulus, masses from density.
 //!
-//! A material is worked out when a body is made. It becomes stiffnesses and masses of the definition, and a body keeps nothing
-//! else of it.
+//! A material is evaluated when a body is created. It becomes stiffnesses and masses of the definition; the body
+//! stores nothing else of it.
 
-mod filled;
+mod elements;
 mod masses;
 pub mod presets;
 mod springs;
@@ -11,15 +11,15 @@ mod springs;
 use crate::base::{Error, Result};
 use crate::def::{BodyDefinition, Values};
 pub use crate::def::{Material, Model, Viscosity, Yielding};
-use crate::elements::Law;
-use filled::Filled;
+use crate::elements::ElasticLaw;
+use elements::MaterialElements;
 
-/// How far a ratio may be from the one that the model implies.
+/// The allowed difference of Poisson's ratio from the one that springs imply.
 const SAME_RATIO: f32 = 1e-3;
 
 impl Material {
-    /// Refuses a Poisson's ratio that the model does not have on such elements.
-    fn check_poisson_ratio(&self, elements: &Filled) -> Result<()> {
+    /// Returns an error if the model cannot represent Poisson's ratio with these elements.
+    fn check_poisson_ratio(&self, elements: &MaterialElements) -> Result<()> {
         let given = self.poisson_ratio;
         match self.model {
             Model::Tetrahedra => Ok(()),
@@ -37,27 +37,30 @@ impl Material {
     }
 }
 
-/// What a material makes of a definition.
+/// Springs, masses and the elastic law that a material gives to a definition.
 #[derive(Debug)]
-pub(crate) struct Made {
-    /// With their stiffnesses; `None`: the definition's own, none where it gives none.
+pub(crate) struct DerivedProperties {
+    /// Springs and their stiffnesses; `None` keeps those of the definition.
     springs: Option<(Vec<[u32; 2]>, Vec<f32>)>,
-    /// What tetrahedra follow, where they are elements.
-    pub law: Option<Law>,
-    /// `None`: the definition's own.
+    /// The elastic law of finite elements.
+    pub law: Option<ElasticLaw>,
+    /// Nodal masses; `None` keeps those of the definition.
     masses: Option<Vec<f32>>,
 }
 
-impl Made {
-    /// Of a definition that has been checked and whose material this is.
-    pub fn of(material: &Material, definition: &BodyDefinition) -> Result<Self> {
-        let elements = Filled::of(definition, material.thickness)?;
+impl DerivedProperties {
+    /// Derives them from a checked definition that has this material.
+    pub fn derive(material: &Material, definition: &BodyDefinition) -> Result<Self> {
+        let elements = MaterialElements::from_definition(definition, material.thickness)?;
         material.check_poisson_ratio(&elements)?;
         let (springs, law) = match material.model {
-            Model::Springs => (Some(springs::of(&elements, material.young_modulus, definition)?), None),
+            Model::Springs => (
+                Some(springs::edge_springs(&elements, material.young_modulus, definition)?),
+                None,
+            ),
             Model::Tetrahedra => (
                 None,
-                Some(Law::new(
+                Some(ElasticLaw::new(
                     material.young_modulus,
                     material.poisson_ratio,
                     definition.element_law,
@@ -66,12 +69,12 @@ impl Made {
         };
         let masses = match material.density {
             0.0 => None,
-            density => Some(masses::of(&elements, density, definition)?),
+            density => Some(masses::nodal_masses(&elements, density, definition)?),
         };
         Ok(Self { springs, law, masses })
     }
 
-    /// The definition with what was made.
+    /// Returns the definition with the derived springs, stiffnesses and masses.
     pub fn complete<'a>(&'a self, definition: &BodyDefinition<'a>) -> BodyDefinition<'a> {
         let (springs, stiffnesses) = match &self.springs {
             Some((springs, stiffnesses)) => (&springs[..], Values::Each(stiffnesses)),

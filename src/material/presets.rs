@@ -1,8 +1,8 @@
-//! Tissues by figures from the literature, each with its source.
+//! Properties of tissues from the literature, with sources.
 
 use std::ffi::CStr;
 
-/// A tissue's figures. Those of single organs differ from one another by more than the digits given here suggest.
+/// The properties of a tissue. Organs differ from one another by more than the precision of these numbers.
 ///
 /// ```
 /// use sinew::material::{Material, Model, presets::LIVER};
@@ -13,32 +13,32 @@ use std::ffi::CStr;
 ///     density: LIVER.density,
 ///     ..Material::default()
 /// };
-/// // Soft tissue hardly changes its volume: E is three times G.
+/// Soft tissue is nearly incompressible: E is three times G.
 /// assert_eq!(material.young_modulus, 3.0 * LIVER.shear_modulus);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preset {
-    /// `CStr`: handed out by the C interface too.
+    /// A `CStr`, because the C API returns it too.
     pub(crate) name: &'static CStr,
     pub(crate) source: &'static CStr,
-    /// Pa, measured slowly, at small strains.
+    /// The shear modulus, from slow measurements at small strains, Pa.
     pub shear_modulus: f32,
-    /// kg/m³.
+    /// The density, kg/m³.
     pub density: f32,
 }
 
 impl Preset {
-    /// What tissue it is.
+    /// The name of the tissue.
     pub fn name(&self) -> &'static str {
         self.name.to_str().unwrap_or_default()
     }
 
-    /// Where the figures are from.
+    /// The source of the numbers.
     pub fn source(&self) -> &'static str {
         self.source.to_str().unwrap_or_default()
     }
 
-    /// Pa: three times the shear modulus, since tissue hardly changes its volume.
+    /// Young's modulus, three times the shear modulus because tissue is nearly incompressible, Pa.
     pub fn young_modulus(&self) -> f32 {
         3.0 * self.shear_modulus
     }
@@ -53,9 +53,9 @@ const fn tissue(name: &'static CStr, source: &'static CStr, shear_modulus: f32, 
     }
 }
 
-/// All of them, in the order of their numbers in C. All figures are from one table, which has collected them: table 1 of Phys.
-/// Med. Biol. 64 (2019) 225001, doi 10.1088/1361-6560/ab5010, PMC6925591. Skin is not among them: what is published for it lies
-/// between 5 kPa and 140 MPa, by the way it is measured (Kalra et al., *Mechanical behaviour of skin: a review*, 2016).
+/// All presets, in the order of the C API. All numbers are from one review: table 1 of Phys. Med. Biol. 64 (2019)
+/// 225001, doi 10.1088/1361-6560/ab5010, PMC6925591. Skin is missing: published values range from 5 kPa to 140 MPa,
+/// depending on the method (Kalra et al., *Mechanical behaviour of skin: a review*, 2016).
 pub const PRESETS: [Preset; 7] = [
     LIVER,
     FIBROTIC_LIVER,

@@ -1,42 +1,43 @@
-//! Springs along the edges of elements, as stiff as Young's modulus asks for: see [`Model::Springs`](crate::def::Model::Springs).
+//! Springs along the edges of elements, with stiffnesses from Young's modulus. See
+//! [`Model::Springs`](crate::def::Model::Springs).
 
 use glam::DVec3;
 
-use super::filled::{Filled, corners, triangle_area};
+use super::elements::{MaterialElements, corners, triangle_area};
 use crate::base::{Error, Result, ensure, memory};
 use crate::def::BodyDefinition;
 use crate::mesh::{
     CELL_DIAGONALS, CELL_EDGES, TETRAHEDRON_EDGES, TRIANGLE_EDGES, element_edges, pack, tetrahedron_volume, unpack,
 };
 
-/// Of the stiffness 0.4 E a of a spring in an endless lattice of cubes of edge a, what each of the four cells at an edge and of
-/// the two at a diagonal has, over E a.
+/// The contribution of one cell to a spring's stiffness, over E a. In an infinite lattice of cubes of edge a, each
+/// spring has 0.4 E a; four cells share an edge and two share a diagonal.
 const CELL_EDGE: f64 = 0.4 / 4.0;
 const CELL_DIAGONAL: f64 = 0.4 / 2.0;
 
-/// Stiffnesses are merged where they differ by no more than this part of themselves, however coarse the positions.
+/// The largest relative difference of stiffnesses that are merged, for any rounding of positions.
 const LARGEST_MERGER: f64 = 1e-3;
 
-/// What one element adds to the stiffness of an edge, packed, N/m.
-type EdgeShare = (u64, f64);
+/// An edge as a packed pair, and the stiffness that one element adds to it, N/m.
+type EdgeStiffness = (u64, f64);
 
-/// The springs of a material, each once, in ascending order, and their stiffnesses in N/m.
-pub(super) fn of(
-    elements: &Filled,
+/// The unique springs of a material, in ascending order, and their stiffnesses, N/m.
+pub(super) fn edge_springs(
+    elements: &MaterialElements,
     young_modulus: f32,
     definition: &BodyDefinition,
 ) -> Result<(Vec<[u32; 2]>, Vec<f32>)> {
-    let mut shares = shares(elements, f64::from(young_modulus), definition)?;
-    // Among those of an edge by size, so that the order of the elements does not matter.
-    shares.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let count = shares.chunk_by(|a, b| a.0 == b.0).count();
+    let mut contributions = contributions(elements, f64::from(young_modulus), definition)?;
+    // Contributions to an edge are sorted by size, so that the result does not depend on the order of elements.
+    contributions.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let count = contributions.chunk_by(|a, b| a.0 == b.0).count();
     let mut springs = memory::reserved(count)?;
     let mut sums = memory::reserved(count)?;
-    for shares in shares.chunk_by(|a, b| a.0 == b.0) {
-        springs.push(unpack(shares[0].0));
-        sums.push(shares.iter().map(|share| share.1).sum::<f64>());
+    for contributions in contributions.chunk_by(|a, b| a.0 == b.0) {
+        springs.push(unpack(contributions[0].0));
+        sums.push(contributions.iter().map(|contribution| contribution.1).sum::<f64>());
     }
-    if !matches!(elements, Filled::Triangles(..)) {
+    if !matches!(elements, MaterialElements::Triangles(..)) {
         check_surface(&springs, elements, definition)?;
     }
     let stiffnesses = merged(&springs, &sums, definition)?;
@@ -49,40 +50,48 @@ pub(super) fn of(
     }
 }
 
-fn shares(elements: &Filled, young_modulus: f64, definition: &BodyDefinition) -> Result<Vec<EdgeShare>> {
+fn contributions(
+    elements: &MaterialElements,
+    young_modulus: f64,
+    definition: &BodyDefinition,
+) -> Result<Vec<EdgeStiffness>> {
     let rest = definition.rest_positions.unwrap_or(definition.positions);
-    let along = |corners: &[DVec3], [a, b]: [usize; 2], energy: f64| energy / corners[a].distance_squared(corners[b]);
-    let mut shares;
+    let stiffness =
+        |corners: &[DVec3], [a, b]: [usize; 2], energy: f64| energy / corners[a].distance_squared(corners[b]);
+    let mut contributions;
     match elements {
-        Filled::Tetrahedra(tetrahedra) => {
-            shares = memory::reserved(6 * tetrahedra.len())?;
+        MaterialElements::Tetrahedra(tetrahedra) => {
+            contributions = memory::reserved(6 * tetrahedra.len())?;
             for tetrahedron in *tetrahedra {
                 let corners = corners(tetrahedron, rest);
                 let energy = young_modulus * tetrahedron_volume(corners).abs();
-                shares.extend(TETRAHEDRON_EDGES.map(|ends| (pack(tetrahedron, ends), along(&corners, ends, energy))));
+                contributions
+                    .extend(TETRAHEDRON_EDGES.map(|ends| (pack(tetrahedron, ends), stiffness(&corners, ends, energy))));
             }
         }
-        Filled::Triangles(triangles, thickness) => {
-            shares = memory::reserved(3 * triangles.len())?;
+        MaterialElements::Triangles(triangles, thickness) => {
+            contributions = memory::reserved(3 * triangles.len())?;
             for triangle in *triangles {
                 let corners = corners(triangle, rest);
                 let energy = young_modulus * thickness * triangle_area(corners);
-                shares.extend(TRIANGLE_EDGES.map(|ends| (pack(triangle, ends), along(&corners, ends, energy))));
+                contributions
+                    .extend(TRIANGLE_EDGES.map(|ends| (pack(triangle, ends), stiffness(&corners, ends, energy))));
             }
         }
-        Filled::Cells(cells, edge) => {
-            shares = memory::reserved(24 * cells.len())?;
+        MaterialElements::Cells(cells, edge) => {
+            contributions = memory::reserved(24 * cells.len())?;
             for cell in *cells {
-                shares.extend(CELL_EDGES.map(|ends| (pack(cell, ends), CELL_EDGE * young_modulus * edge)));
-                shares.extend(CELL_DIAGONALS.map(|ends| (pack(cell, ends), CELL_DIAGONAL * young_modulus * edge)));
+                contributions.extend(CELL_EDGES.map(|ends| (pack(cell, ends), CELL_EDGE * young_modulus * edge)));
+                contributions
+                    .extend(CELL_DIAGONALS.map(|ends| (pack(cell, ends), CELL_DIAGONAL * young_modulus * edge)));
             }
         }
     }
-    Ok(shares)
+    Ok(contributions)
 }
 
-/// Refuses triangles with an edge that no spring joins: beside other elements they are surface, and nothing would hold it.
-fn check_surface(springs: &[[u32; 2]], elements: &Filled, definition: &BodyDefinition) -> Result<()> {
+/// Returns an error if an edge of a surface triangle has no spring: nothing would hold the surface there.
+fn check_surface(springs: &[[u32; 2]], elements: &MaterialElements, definition: &BodyDefinition) -> Result<()> {
     for edge in element_edges(definition.triangles, &[], &[])? {
         ensure!(
             springs.binary_search(&edge).is_ok(),
@@ -95,26 +104,25 @@ fn check_surface(springs: &[[u32; 2]], elements: &Filled, definition: &BodyDefin
     Ok(())
 }
 
-/// The stiffnesses, of which those that differ by what rounded positions make of them are one: bodies of few kinds of spring
-/// are faster.
+/// Merges stiffnesses that differ only by the rounding of positions. Bodies with few kinds of springs are faster.
 fn merged(springs: &[[u32; 2]], exact: &[f64], definition: &BodyDefinition) -> Result<Vec<f32>> {
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let reach = f64::from(definition.rounding().reach);
     let mut order: Vec<u32> = memory::collected(0..springs.len() as u32)?;
     order.sort_unstable_by(|&a, &b| exact[a as usize].total_cmp(&exact[b as usize]).then(a.cmp(&b)));
     let mut stiffnesses = memory::filled(0.0, springs.len())?;
-    let mut left = &*order;
-    while let Some(&first) = left.first() {
+    let mut remaining = &*order;
+    while let Some(&first) = remaining.first() {
         let [a, b] = springs[first as usize].map(|node| rest[node as usize].as_dvec3());
         let width = (8.0 * f64::from(f32::EPSILON) * reach / a.distance(b)).min(LARGEST_MERGER);
         let softest = exact[first as usize];
-        let count = left.partition_point(|&spring| exact[spring as usize] - softest <= width * softest);
-        let (same, others) = left.split_at(count);
-        let stiffest = exact[same[count - 1] as usize];
-        for &spring in same {
+        let count = remaining.partition_point(|&spring| exact[spring as usize] - softest <= width * softest);
+        let (merged_springs, others) = remaining.split_at(count);
+        let stiffest = exact[merged_springs[count - 1] as usize];
+        for &spring in merged_springs {
             stiffnesses[spring as usize] = (0.5 * (softest + stiffest)) as f32;
         }
-        left = others;
+        remaining = others;
     }
     Ok(stiffnesses)
 }

@@ -1,39 +1,42 @@
-//! Surfaces that enclose a solid, checked once.
+//! Closed surfaces of solids, validated on creation.
 
 use glam::{DVec3, Vec3};
 
 use super::{check_indices, tetrahedron_volume};
 use crate::base::{DisjointSets, ensure, memory};
-use crate::geometry::Bounds;
+use crate::geometry::Aabb;
+use crate::geometry::bvh::Bvh;
 use crate::geometry::predicates::{crosses, solid_angle};
-use crate::geometry::tree::Tree;
 use crate::{Error, Result};
 
-/// A triangle lies along a line where it is lower than this part of its longest side: about what rounding makes of it.
+/// A triangle is degenerate if its height is below this fraction of its longest side, which is about its rounding
+/// error.
 const FLAT: f64 = 1e-6;
 
-/// Triangles cross where they pass through each other by more than this part of the largest coordinate: about what rounding makes of them.
+/// Triangles intersect if they pass through each other by more than this fraction of the largest coordinate, about its
+/// rounding error.
 const CROSSING: f64 = 1e-6;
 
-/// Rounds of turning edges, at most: of a row of flat triangles along one edge, each round parts one.
-const ROUNDS: usize = 100;
+/// The most passes of edge flips. In a row of flat triangles along one edge, each pass removes one.
+const MAX_PASSES: usize = 100;
 
-/// No node lies further from the origin, m: squares of distances stay finite in `f32`.
-pub(crate) const FURTHEST: f32 = 1e9;
+/// The largest distance of a node from the origin, m. It keeps squared distances finite in `f32`.
+pub(crate) const MAX_COORDINATE: f32 = 1e9;
 
-/// So many triangles of a part are tried for one that no other part touches.
-const TRIES: usize = 16;
+/// The most triangles of a component that are sampled to find one that touches no other component.
+const MAX_SAMPLES: usize = 16;
 
-/// The surface of a solid: triangles that enclose a volume, face outward and do not cross each other.
+/// The surface of a solid: triangles that enclose a volume, face outward and do not intersect each other.
 ///
-/// Parts that lie apart, touch, or are hollow (an outer surface and an inner one that faces into the hole) are one solid.
+/// Components that are separate, touch, or are hollow form one solid. A hollow component has an outer surface and an
+/// inner one that faces into the hole.
 ///
 /// ```
 /// use sinew::mesh::{ClosedSurface, Mesh};
 /// let block = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
 /// let surface = ClosedSurface::new(&block.positions, &block.surface()?)?;
 /// assert!((surface.volume() - 1e-3).abs() < 1e-9);
-/// // A sheet encloses nothing.
+/// A sheet encloses no volume.
 /// let sheet = Mesh::cloth([0.1, 0.1], [2, 2])?;
 /// assert!(ClosedSurface::new(&sheet.positions, &sheet.triangles).is_err());
 /// # Ok::<(), sinew::Error>(())
@@ -46,17 +49,20 @@ pub struct ClosedSurface {
 }
 
 impl ClosedSurface {
-    /// Checks that `triangles` (three node indices each, outward by the right-hand rule) over `positions` (metres) enclose a solid.
+    /// Checks that `triangles` enclose a solid. Each has three node indices, outward by the right-hand rule;
+    /// `positions` are in meters.
     ///
-    /// Nodes at exactly the same place count as one, as in STL files, where each triangle brings its own corners: triangles then name
-    /// the first of them. A triangle that lies along a line, lower than 1e-6 of its longest side, closes a gap where nodes lie on the edge
-    /// of a neighbour; it takes a part of that neighbour, so that both have an area.
+    /// Nodes at exactly equal positions count as one, because in STL files each triangle has its own corners.
+    /// Triangles then refer to the first of them. A degenerate triangle, lower than 1e-6 of its longest side, closes a
+    /// gap between nodes on the edge of a neighbor. It receives a part of that neighbor by edge flips, so that both
+    /// have an area.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`], naming triangles and nodes, where there are no triangles; an index is that of no node; a position is
-    /// not finite or further than 1e9 m from the origin; a triangle repeats a place, or lies along a line and has no neighbour to take a
-    /// part of; an edge is not gone along as often in one direction as in the other, so that the surface is open; the surface, or a part of
-    /// it, is inside out; two triangles pass through each other, by more than 1e-6 of the largest coordinate. [`Error::OutOfMemory`].
+    /// [`Error::InvalidArgument`], with the indices of triangles and nodes, in these cases: there are no triangles; an
+    /// index is out of range; a position is not finite or further than 1e9 m from the origin; a triangle has two
+    /// corners at one position, or is degenerate and no flip helps; the surface is open, that is, an edge is used more
+    /// often in one direction than in the other; the surface or a component is inverted; two triangles intersect by
+    /// more than 1e-6 of the largest coordinate. [`Error::OutOfMemory`].
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
         ensure!(!triangles.is_empty(), "no triangles: they enclose nothing");
         check_indices("triangle", triangles, positions.len())?;
@@ -68,8 +74,8 @@ impl ClosedSurface {
         );
         for (node, position) in positions.iter().enumerate() {
             ensure!(
-                position.abs().max_element() <= FURTHEST && position.is_finite(),
-                "the position of node {node} is {position}: must be finite and within {FURTHEST:e} m of the origin"
+                position.abs().max_element() <= MAX_COORDINATE && position.is_finite(),
+                "the position of node {node} is {position}: must be finite and within {MAX_COORDINATE:e} m of the origin"
             );
         }
         let mut surface = Self {
@@ -79,39 +85,40 @@ impl ClosedSurface {
         };
         surface.weld()?;
         surface.check_corners()?;
-        let parts = surface.parts()?;
-        surface.part_flat_triangles()?;
+        let components = surface.components()?;
+        surface.flip_flat_triangles()?;
         surface.check_volume()?;
-        // Of parts that cross, neither lies within the other.
+        // Components that intersect cannot contain each other.
         surface.check_crossings()?;
-        surface.check_parts(parts)?;
+        surface.check_components(components)?;
         Ok(surface)
     }
 
-    /// The same of what may cross itself, and have triangles without an area: it is closed, and encloses something.
-    pub(super) fn loose(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
+    /// Creates a closed surface that may intersect itself and may have degenerate triangles. It must enclose a
+    /// positive volume.
+    pub(super) fn allowing_intersections(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
         let mut surface = Self {
             positions,
             triangles,
             volume: 0.0,
         };
-        surface.parts()?;
+        surface.components()?;
         surface.check_volume()?;
         Ok(surface)
     }
 
-    /// Where each node is, as given.
+    /// The position of each node, as given, m.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions
     }
 
-    /// The triangles in the order given; of nodes at the same place they name the first, and what lay along a line has taken a part of its
-    /// neighbour.
+    /// The triangles in the given order. Nodes at equal positions are replaced by the first of them, and degenerate
+    /// triangles have received a part of a neighbor.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// What it encloses, m³.
+    /// The enclosed volume, m³.
     pub fn volume(&self) -> f64 {
         self.volume
     }
@@ -120,21 +127,21 @@ impl ClosedSurface {
         self.triangles[triangle].map(|node| self.positions[node as usize])
     }
 
-    /// Names nodes at the same place by the first of them.
+    /// Replaces nodes at equal positions by the first of them.
     fn weld(&mut self) -> Result<()> {
         let positions = &self.positions;
         let mut order: Vec<u32> = memory::collected(0..positions.len() as u32)?;
-        // Adding 0 makes one of the two zeros.
-        let place = |node: u32| (positions[node as usize] + 0.0).to_array().map(f32::to_bits);
-        order.sort_unstable_by_key(|&node| (place(node), node));
-        let mut first_at: Vec<u32> = memory::filled(0, positions.len())?;
-        for same in order.chunk_by(|&a, &b| place(a) == place(b)) {
-            for &node in same {
-                first_at[node as usize] = same[0];
+        // Adding 0 turns negative zeros into positive ones.
+        let bits = |node: u32| (positions[node as usize] + 0.0).to_array().map(f32::to_bits);
+        order.sort_unstable_by_key(|&node| (bits(node), node));
+        let mut first_of: Vec<u32> = memory::filled(0, positions.len())?;
+        for group in order.chunk_by(|&a, &b| bits(a) == bits(b)) {
+            for &node in group {
+                first_of[node as usize] = group[0];
             }
         }
         for triangle in &mut self.triangles {
-            *triangle = triangle.map(|node| first_at[node as usize]);
+            *triangle = triangle.map(|node| first_of[node as usize]);
         }
         Ok(())
     }
@@ -153,16 +160,17 @@ impl ClosedSurface {
         relative_height(self.corners(triangle)) <= FLAT
     }
 
-    /// Turns edges until no triangle is flat: the longest of each, so that it parts its neighbour there. Where the lower of the two would become no
-    /// higher, the neighbour's longest edge is turned first (longest-edge paths: Rivara 1997). Refused where this does not help.
-    fn part_flat_triangles(&mut self) -> Result<()> {
+    /// Flips the longest edge of each degenerate triangle until none is left. If a flip would not increase the smaller
+    /// of the two heights, the neighbor's longest edge is flipped first (longest-edge paths: Rivara 1997). Returns an
+    /// error if this does not succeed.
+    fn flip_flat_triangles(&mut self) -> Result<()> {
         let mut sides: Vec<(u64, u32, u32)> = Vec::new();
-        let mut touched: Vec<bool> = Vec::new();
-        for round in 0..=ROUNDS {
+        let mut modified: Vec<bool> = Vec::new();
+        for pass in 0..=MAX_PASSES {
             let Some(first) = (0..self.triangles.len()).find(|&index| self.is_flat(index)) else {
                 return Ok(());
             };
-            if round == ROUNDS {
+            if pass == MAX_PASSES {
                 let [a, b, c] = self.triangles[first];
                 return Err(Error::invalid(format!(
                     "triangle {first} has no area: nodes {a}, {b} and {c} lie along a line"
@@ -176,21 +184,21 @@ impl ClosedSurface {
                 }
             }
             sides.sort_unstable();
-            touched.clear();
-            touched.try_reserve(self.triangles.len())?;
-            touched.resize(self.triangles.len(), false);
+            modified.clear();
+            modified.try_reserve(self.triangles.len())?;
+            modified.resize(self.triangles.len(), false);
             for flat in first..self.triangles.len() {
                 if self.is_flat(flat) {
-                    self.turn_edge_beside(flat, &sides, &mut touched);
+                    self.flip_edge_near(flat, &sides, &mut modified);
                 }
             }
         }
         Ok(())
     }
 
-    /// Turns the longest edge of a flat triangle, or a longer one that leads on from there. `sides` has the edges of all triangles in order, as they were
-    /// when none was `touched`.
-    fn turn_edge_beside(&mut self, flat: usize, sides: &[(u64, u32, u32)], touched: &mut [bool]) {
+    /// Flips the longest edge of a degenerate triangle, or the first possible one on its longest-edge path. `sides`
+    /// has the edges of all triangles in order, from before the first flip of the pass.
+    fn flip_edge_near(&mut self, flat: usize, sides: &[(u64, u32, u32)], modified: &mut [bool]) {
         let mut triangle = flat;
         let mut length = 0.0;
         loop {
@@ -201,65 +209,66 @@ impl ClosedSurface {
             let (Some(one), Some(two), None) = (others.next(), others.next(), others.next()) else {
                 return;
             };
-            let &(_, neighbour, across) = if one.1 as usize == triangle { two } else { one };
-            let neighbour = neighbour as usize;
-            if squared <= length || touched[triangle] || touched[neighbour] {
+            let &(_, neighbor, neighbor_side) = if one.1 as usize == triangle { two } else { one };
+            let neighbor = neighbor as usize;
+            if squared <= length || modified[triangle] || modified[neighbor] {
                 return;
             }
-            let turn = |triangle: [u32; 3], by: usize| [0, 1, 2].map(|corner| triangle[(corner + by) % 3]);
-            // From `c` to `a` along the edge, and in the neighbour back.
-            let [c, a, b] = turn(self.triangles[triangle], side);
-            let [_, _, d] = turn(self.triangles[neighbour], across as usize);
-            let turned = [[a, b, d], [b, c, d]];
-            let parting = (u64::from(b.min(d)) << 32) | u64::from(b.max(d));
-            let is_there = sides.binary_search_by_key(&parting, |other| other.0).is_ok();
+            let rotate = |triangle: [u32; 3], by: usize| [0, 1, 2].map(|corner| triangle[(corner + by) % 3]);
+            // The triangle runs from `c` to `a` along the edge, and the neighbor back.
+            let [c, a, b] = rotate(self.triangles[triangle], side);
+            let [_, _, d] = rotate(self.triangles[neighbor], neighbor_side as usize);
+            let flipped = [[a, b, d], [b, c, d]];
+            let new_edge = (u64::from(b.min(d)) << 32) | u64::from(b.max(d));
+            let exists = sides.binary_search_by_key(&new_edge, |other| other.0).is_ok();
             let height = |nodes: [u32; 3]| relative_height(nodes.map(|node| self.positions[node as usize]));
-            let least = |both: [[u32; 3]; 2]| height(both[0]).min(height(both[1]));
-            let now = least([self.triangles[triangle], self.triangles[neighbour]]);
-            if b != d && !is_there && least(turned) > now {
-                [self.triangles[triangle], self.triangles[neighbour]] = turned;
-                (touched[triangle], touched[neighbour]) = (true, true);
+            let min_height = |pair: [[u32; 3]; 2]| height(pair[0]).min(height(pair[1]));
+            let current = min_height([self.triangles[triangle], self.triangles[neighbor]]);
+            if b != d && !exists && min_height(flipped) > current {
+                [self.triangles[triangle], self.triangles[neighbor]] = flipped;
+                (modified[triangle], modified[neighbor]) = (true, true);
                 return;
             }
-            (triangle, length) = (neighbour, squared);
+            (triangle, length) = (neighbor, squared);
         }
     }
 
-    /// For each triangle the first of those that are joined to it by edges; refused where an edge is open.
-    fn parts(&self) -> Result<Vec<u32>> {
+    /// The connected component of each triangle, as its lowest triangle. Returns an error if an edge is open.
+    fn components(&self) -> Result<Vec<u32>> {
         let mut sides: Vec<(u64, u32, bool)> = memory::reserved(3 * self.triangles.len())?;
         for (index, triangle) in (0_u32..).zip(&self.triangles) {
             for ends in super::TRIANGLE_EDGES {
-                let ahead = triangle[ends[0]] < triangle[ends[1]];
-                sides.push((super::pack(triangle, ends), index, ahead));
+                let forward = triangle[ends[0]] < triangle[ends[1]];
+                sides.push((super::pack(triangle, ends), index, forward));
             }
         }
         sides.sort_unstable();
-        let mut parts = DisjointSets::new(self.triangles.len())?;
-        for same in sides.chunk_by(|a, b| a.0 == b.0) {
-            let ahead = same.iter().filter(|side| side.2).count();
-            let back = same.len() - ahead;
-            if ahead != back {
-                let [low, high] = super::unpack(same[0].0);
-                let (from, to) = if ahead > back { (low, high) } else { (high, low) };
-                let more = same.iter().find(|side| side.2 == (ahead > back));
-                let triangle = more.map_or(same[0].1, |side| side.1);
+        let mut components = DisjointSets::new(self.triangles.len())?;
+        for group in sides.chunk_by(|a, b| a.0 == b.0) {
+            let forward = group.iter().filter(|side| side.2).count();
+            let backward = group.len() - forward;
+            if forward != backward {
+                let [low, high] = super::unpack(group[0].0);
+                let (from, to) = if forward > backward { (low, high) } else { (high, low) };
+                let excess = group.iter().find(|side| side.2 == (forward > backward));
+                let triangle = excess.map_or(group[0].1, |side| side.1);
                 return Err(Error::invalid(format!(
                     "the surface is not closed: triangle {triangle} goes along the edge from node {from} to node {to} as {} do, and {} \
                      the other way",
-                    ahead.max(back),
-                    ahead.min(back)
+                    forward.max(backward),
+                    forward.min(backward)
                 )));
             }
-            for pair in same.windows(2) {
-                parts.unite(pair[0].1 as usize, pair[1].1 as usize);
+            for pair in group.windows(2) {
+                components.unite(pair[0].1 as usize, pair[1].1 as usize);
             }
         }
-        Ok(parts.into_lowest())
+        Ok(components.into_lowest())
     }
 
-    /// What some triangles enclose, m³: seen from a point of theirs, so that a solid far away loses no digits.
-    fn enclosed(&self, triangles: impl Iterator<Item = usize>) -> f64 {
+    /// The volume enclosed by these triangles, m³. The apex is one of their points, so that a distant solid loses no
+    /// digits.
+    fn enclosed_volume(&self, triangles: impl Iterator<Item = usize>) -> f64 {
         let mut apex = None;
         let mut volume = 0.0;
         for index in triangles {
@@ -270,7 +279,7 @@ impl ClosedSurface {
     }
 
     fn check_volume(&mut self) -> Result<()> {
-        self.volume = self.enclosed(0..self.triangles.len());
+        self.volume = self.enclosed_volume(0..self.triangles.len());
         ensure!(
             self.volume > 0.0,
             "the surface encloses {:e} m³: its triangles face inward, or enclose nothing",
@@ -279,29 +288,31 @@ impl ClosedSurface {
         Ok(())
     }
 
-    /// Refuses parts that are inside out: those that face outward lie outside of all others, those that face inward within one.
-    fn check_parts(&self, parts: Vec<u32>) -> Result<()> {
-        let mut order: Vec<u32> = memory::collected(0..parts.len() as u32)?;
-        order.sort_unstable_by_key(|&triangle| (parts[triangle as usize], triangle));
-        let same = |a: &u32, b: &u32| parts[*a as usize] == parts[*b as usize];
-        if order.chunk_by(same).nth(1).is_none() {
+    /// Returns an error for inverted components. A component that faces outward must be outside of all others, one
+    /// that faces inward must be within one.
+    fn check_components(&self, components: Vec<u32>) -> Result<()> {
+        let mut order: Vec<u32> = memory::collected(0..components.len() as u32)?;
+        order.sort_unstable_by_key(|&triangle| (components[triangle as usize], triangle));
+        let same_component = |a: &u32, b: &u32| components[*a as usize] == components[*b as usize];
+        if order.chunk_by(same_component).nth(1).is_none() {
             return Ok(());
         }
         let mut boxes = Vec::new();
-        for part in order.chunk_by(same) {
-            let points = part.iter().flat_map(|&triangle| self.corners(triangle as usize));
-            memory::push(&mut boxes, Bounds::of(points))?;
+        for component in order.chunk_by(same_component) {
+            let points = component.iter().flat_map(|&triangle| self.corners(triangle as usize));
+            memory::push(&mut boxes, Aabb::of(points))?;
         }
-        for (index, part) in order.chunk_by(same).enumerate() {
-            // How often the others wind about a point of it: the clearest of some, as parts may touch.
+        for (index, component) in order.chunk_by(same_component).enumerate() {
+            // The winding number of the other components around a point of this one: the most reliable of several
+            // samples.
             let mut winding = 0.0;
-            let mut doubt = f64::INFINITY;
-            for &triangle in part.iter().step_by(part.len().div_ceil(TRIES)) {
+            let mut ambiguity = f64::INFINITY;
+            for &triangle in component.iter().step_by(component.len().div_ceil(MAX_SAMPLES)) {
                 let corners = self.corners(triangle as usize);
                 let point = corners.iter().map(|corner| corner.as_dvec3()).sum::<DVec3>() / 3.0;
-                let here = Bounds::of(std::iter::once(point.as_vec3()));
+                let here = Aabb::of(std::iter::once(point.as_vec3()));
                 let mut angle = 0.0;
-                for (other, others) in order.chunk_by(same).enumerate() {
+                for (other, others) in order.chunk_by(same_component).enumerate() {
                     if other != index && boxes[other].overlaps(&here) {
                         angle += others
                             .iter()
@@ -311,29 +322,29 @@ impl ClosedSurface {
                             .sum::<f64>();
                     }
                 }
-                let found = angle / (4.0 * std::f64::consts::PI);
-                if (found - found.round()).abs() < doubt {
-                    doubt = (found - found.round()).abs();
-                    winding = found.round();
+                let sample_winding = angle / (4.0 * std::f64::consts::PI);
+                if (sample_winding - sample_winding.round()).abs() < ambiguity {
+                    ambiguity = (sample_winding - sample_winding.round()).abs();
+                    winding = sample_winding.round();
                 }
-                if doubt < 1e-3 {
+                if ambiguity < 1e-3 {
                     break;
                 }
             }
-            let volume = self.enclosed(part.iter().map(|&triangle| triangle as usize));
-            let asked = if volume > 0.0 { 0.0 } else { 1.0 };
-            // Where it touches others wherever it was tried, nothing is known.
-            if winding != asked && doubt < 0.1 {
+            let volume = self.enclosed_volume(component.iter().map(|&triangle| triangle as usize));
+            let expected = if volume > 0.0 { 0.0 } else { 1.0 };
+            // If all samples touch other components, the winding is unknown.
+            if winding != expected && ambiguity < 0.1 {
                 return Err(Error::invalid(if volume > 0.0 {
                     format!(
                         "the part of the surface with triangle {} faces outward and lies within another part: leave it out, or turn \
                          its triangles where it is a hole",
-                        part[0]
+                        component[0]
                     )
                 } else {
                     format!(
                         "the part of the surface with triangle {} is inside out: its triangles face inward and no part lies around it",
-                        part[0]
+                        component[0]
                     )
                 }));
             }
@@ -342,15 +353,15 @@ impl ClosedSurface {
     }
 
     fn check_crossings(&self) -> Result<()> {
-        let tree = Tree::new(self.triangles.len(), |triangle| self.corners(triangle as usize))?;
+        let tree = Bvh::new(self.triangles.len(), |triangle| self.corners(triangle as usize))?;
         let bounds = tree.bounds();
         let depth = CROSSING * f64::from(bounds.magnitudes().max_element());
         for (index, nodes) in self.triangles.iter().enumerate() {
             let corners = self.corners(index);
-            let bounds = Bounds::of(corners.into_iter());
+            let bounds = Aabb::of(corners.into_iter());
             let mut crossed = None;
-            tree.near(&bounds, 0.0, |place| {
-                let other = tree.triangle(place) as usize;
+            tree.near(&bounds, 0.0, |slot| {
+                let other = tree.triangle(slot) as usize;
                 if other > index
                     && crossed.is_none()
                     && (pierces(nodes, corners, &self.triangles[other], self.corners(other), depth)
@@ -370,7 +381,7 @@ impl ClosedSurface {
     }
 }
 
-/// The number of a triangle's longest side, and the square of its length.
+/// The index of a triangle's longest side, and its squared length.
 fn longest_side(corners: [Vec3; 3]) -> (usize, f64) {
     let mut longest = (0, 0.0);
     for side in 0..3 {
@@ -384,13 +395,13 @@ fn longest_side(corners: [Vec3; 3]) -> (usize, f64) {
     longest
 }
 
-/// A triangle's height over its longest side, as a part of that; 0 of a point.
+/// A triangle's height above its longest side, relative to that side; 0 if all corners coincide.
 fn relative_height(corners: [Vec3; 3]) -> f64 {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     ((b - a).cross(c - a).length() / longest_side(corners).1).max(0.0)
 }
 
-/// Whether an edge of the first triangle passes through the second, with which it shares no node.
+/// True if an edge of the first triangle passes through the second, counting only edges that share no node with it.
 fn pierces(nodes: &[u32; 3], corners: [Vec3; 3], others: &[u32; 3], triangle: [Vec3; 3], depth: f64) -> bool {
     super::TRIANGLE_EDGES.iter().any(|ends| {
         ends.iter().all(|&end| !others.contains(&nodes[end]))

@@ -2,23 +2,23 @@
 
 use glam::Vec3;
 
-use super::tidy::NO_NODE;
+use super::repair::NO_NODE;
 use super::{Mesh, boundary, cell_boundary};
 use crate::base::{above_zero, ensure, memory};
 use crate::{Error, Result};
 
-/// The tetrahedra of a cell, by its corners x + 2 y + 4 z: one in the middle and four at its corners. Cells that share a
-/// face are cut in opposite ways, so that the diagonals meet.
+/// The tetrahedra of a cell, by its corners x + 2 y + 4 z: one in the middle and four at corners. Cells that share a
+/// face use opposite patterns, so that the diagonals match.
 pub(super) const EVEN_CELL: [[usize; 4]; 5] = [[0, 3, 6, 5], [1, 0, 5, 3], [2, 0, 3, 6], [4, 0, 6, 5], [7, 3, 5, 6]];
 const ODD_CELL: [[usize; 4]; 5] = [[1, 2, 4, 7], [0, 1, 2, 4], [3, 1, 7, 2], [5, 1, 4, 7], [6, 2, 7, 4]];
 
 impl Mesh {
-    /// A rectangle in the plane y = 0 about the origin, facing up (+y): `size` along x and z in metres, above 0, in
-    /// `cells` along each. Node `x + z (cells[0] + 1)`; two triangles a cell, their diagonals alternating so that no
-    /// direction is favoured.
+    /// A rectangle in the plane y = 0, centered at the origin and facing up (+y). `size` is its extent along x and z,
+    /// above 0, m; `cells` is the number of cells along each. Nodes have the indices `x + z (cells[0] + 1)`. Each cell
+    /// has two triangles, with alternating diagonals so that no direction is preferred.
     ///
-    /// Errors: [`Error::InvalidArgument`] for a size that is not above 0 and finite, no cells, more than `u32` can count,
-    /// or cells so small that their nodes would coincide; [`Error::OutOfMemory`].
+    /// Errors: [`Error::InvalidArgument`] if a size is not finite and above 0, a number of cells is 0, `u32` cannot
+    /// count the nodes, or cells are so small that nodes would coincide; [`Error::OutOfMemory`].
     pub fn cloth(size: [f32; 2], cells: [u32; 2]) -> Result<Mesh> {
         check_node_count(&cells)?;
         let xs = axis("x", f64::from(size[0]), cells[0])?;
@@ -44,9 +44,9 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// A box about the origin: `size` along x, y and z in metres, above 0, in `cells` along each. Node
-    /// `x + (cells[0] + 1) (y + (cells[1] + 1) z)`; five tetrahedra a cell, cut in opposite ways in neighbouring cells,
-    /// and the surface as triangles.
+    /// A box centered at the origin. `size` is its extent along x, y and z, above 0, m; `cells` is the number of cells
+    /// along each. Nodes have the indices `x + (cells[0] + 1) (y + (cells[1] + 1) z)`. Each cell has five tetrahedra,
+    /// in opposite patterns in neighboring cells. The surface is in `triangles`.
     ///
     /// Errors: those of [`Mesh::cloth`].
     pub fn block(size: [f32; 3], cells: [u32; 3]) -> Result<Mesh> {
@@ -73,15 +73,16 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// A box about the origin of cubes: `edge` is the length of theirs in metres, above 0, `cells` their number along x, y
-    /// and z. Nodes as in [`Mesh::block`]; the cubes are in `cells`, and the surface is there as triangles too.
+    /// A box of cubes, centered at the origin. `edge` is the edge length of a cube, above 0, m; `cells` is the number
+    /// of cubes along x, y and z. Nodes are those of [`Mesh::block`]; the cubes are in `cells`, and the surface is in
+    /// `triangles`.
     ///
     /// Errors: those of [`Mesh::cloth`].
     pub fn lattice(edge: f32, cells: [u32; 3]) -> Result<Mesh> {
         check_node_count(&cells)?;
         above_zero("edge", edge)?;
         let [xs, ys, zs] = [("x", 0), ("y", 1), ("z", 2)]
-            .map(|(name, along)| axis(name, f64::from(edge) * f64::from(cells[along]), cells[along]));
+            .map(|(name, axis_index)| axis(name, f64::from(edge) * f64::from(cells[axis_index]), cells[axis_index]));
         let mut mesh = Mesh {
             positions: grid(&xs?, &ys?, &zs?)?,
             cells: memory::reserved(cells.iter().map(|&count| count as usize).product())?,
@@ -93,7 +94,7 @@ impl Mesh {
     }
 }
 
-/// The nodes of a grid in three dimensions, x first.
+/// The nodes of a three-dimensional grid, x first.
 fn grid(xs: &[f32], ys: &[f32], zs: &[f32]) -> Result<Vec<Vec3>> {
     let mut positions = memory::reserved(xs.len() * ys.len() * zs.len())?;
     for &z in zs {
@@ -104,20 +105,25 @@ fn grid(xs: &[f32], ys: &[f32], zs: &[f32]) -> Result<Vec<Vec3>> {
     Ok(positions)
 }
 
-/// The cells of a grid in three dimensions and their corners, x first.
+/// The cells of a three-dimensional grid and their corners, x first.
 fn cells_of_grid([nx, ny, nz]: [u32; 3]) -> impl Iterator<Item = ([u32; 3], [u32; 8])> {
     let row = nx + 1;
     let layer = row * (ny + 1);
-    let [across, area] = [nx as usize, nx as usize * ny as usize];
-    (0..area * nz as usize).map(move |cell| {
-        let [x, y, z] = [cell % across, cell % area / across, cell / area].map(|place| place as u32);
+    let [cells_per_row, cells_per_layer] = [nx as usize, nx as usize * ny as usize];
+    (0..cells_per_layer * nz as usize).map(move |cell| {
+        let [x, y, z] = [
+            cell % cells_per_row,
+            cell % cells_per_layer / cells_per_row,
+            cell / cells_per_layer,
+        ]
+        .map(|index| index as u32);
         let first = x + y * row + z * layer;
         let corner = |bits: u32| first + (bits & 1) + (bits >> 1 & 1) * row + (bits >> 2) * layer;
         ([x, y, z], std::array::from_fn(|bits| corner(bits as u32)))
     })
 }
 
-/// Refuses a grid whose nodes `u32` cannot count.
+/// Returns an error if `u32` cannot count the nodes of a grid.
 fn check_node_count(cells: &[u32]) -> Result<()> {
     let nodes = cells.iter().map(|&count| u128::from(count) + 1);
     let node_count: u128 = nodes.product();
@@ -128,7 +134,7 @@ fn check_node_count(cells: &[u32]) -> Result<()> {
     Ok(())
 }
 
-/// The places of a grid's nodes along one axis, about 0.
+/// The coordinates of a grid's nodes along one axis, centered at 0.
 fn axis(name: &str, size: f64, cells: u32) -> Result<Vec<f32>> {
     ensure!(cells != 0, "cells along {name} is 0: there must be at least 1");
     above_zero(&format!("size along {name}"), size as f32)?;
@@ -138,12 +144,12 @@ fn axis(name: &str, size: f64, cells: u32) -> Result<Vec<f32>> {
             size as f32
         ))
     };
-    // f32 has no more evenly spaced values than that; no need to try.
+    // `f32` cannot represent more evenly spaced values.
     ensure!(cells <= 1 << 25, coincide());
-    let places = (0..=cells).map(|i| ((f64::from(i) / f64::from(cells) - 0.5) * size) as f32);
-    let places = memory::collected_within(cells as usize + 1, places)?;
-    if places.windows(2).any(|pair| pair[0] >= pair[1]) {
+    let coordinates = (0..=cells).map(|i| ((f64::from(i) / f64::from(cells) - 0.5) * size) as f32);
+    let coordinates = memory::collected_within(cells as usize + 1, coordinates)?;
+    if coordinates.windows(2).any(|pair| pair[0] >= pair[1]) {
         return Err(coincide());
     }
-    Ok(places)
+    Ok(coordinates)
 }

@@ -1,4 +1,4 @@
-//! Points of the surface that have no mass of their own: they go where the nodes of their material go.
+//! Bound points: indices of the render surface without mass, at weighted means of nodes.
 
 use glam::Vec3;
 
@@ -6,21 +6,22 @@ use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::soa::Vectors;
 
-/// A point that is bound to nodes, which are not bound themselves. It has a number among the body's nodes, without mass or springs.
+/// Binding of a point to up to four nodes, which are not bound themselves. The point has an index among the body's
+/// nodes, but no mass and no springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Bound {
+pub(crate) struct NodeBinding {
     pub node: u32,
-    /// Those that count come first.
+    /// Nodes with a nonzero weight come first.
     pub nodes: [u32; 4],
-    /// At least 0, 1 in sum.
+    /// Nonnegative weights with sum 1.
     pub weights: [f32; 4],
 }
 
-saved! { Bound { node, nodes, weights } }
+saved! { NodeBinding { node, nodes, weights } }
 
-impl Bound {
-    /// A node that is bound to none: to itself.
-    fn itself(node: u32) -> Self {
+impl NodeBinding {
+    /// Binding of a node to itself.
+    fn identity(node: u32) -> Self {
         Self {
             node,
             nodes: [node; 4],
@@ -28,106 +29,108 @@ impl Bound {
         }
     }
 
-    /// The nodes that count, with their weights.
-    pub fn parts(&self) -> impl Iterator<Item = (u32, f32)> {
-        self.into_parts()
+    /// Nodes with a nonzero weight, and the weights.
+    pub fn weighted_nodes(&self) -> impl Iterator<Item = (u32, f32)> {
+        self.into_weighted_nodes()
     }
 
-    fn into_parts(self) -> impl Iterator<Item = (u32, f32)> {
-        let parts = self.nodes.into_iter().zip(self.weights);
-        parts.filter(|&(_, weight)| weight > 0.0)
+    fn into_weighted_nodes(self) -> impl Iterator<Item = (u32, f32)> {
+        let pairs = self.nodes.into_iter().zip(self.weights);
+        pairs.filter(|&(_, weight)| weight > 0.0)
     }
 
-    /// What the nodes' vectors make of it.
-    pub fn of(&self, vector_of: impl Fn(usize) -> Vec3) -> Vec3 {
-        self.parts()
+    /// Weighted mean of the nodes' vectors.
+    pub fn interpolate(&self, vector_of: impl Fn(usize) -> Vec3) -> Vec3 {
+        self.weighted_nodes()
             .map(|(node, weight)| vector_of(node as usize) * weight)
             .sum()
     }
 }
 
-/// What a new node is.
+/// Kind of a new node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum NewNode {
-    /// It moves as this one does, and is damped as it is; it has no mass yet, and is held by nothing.
+    /// A copy of this node's motion and damping, without mass, pin or springs.
     Copy(u32),
-    /// A point that is bound to others.
-    Bound(Bound),
+    /// A bound point.
+    Bound(NodeBinding),
 }
 
-/// The bound points of a body, in the order of their numbers.
+/// Bound points of a body, by ascending index.
 #[derive(Debug, Default)]
 pub(crate) struct Bindings {
-    points: Vec<Bound>,
-    /// For each number from that of the first point on its place among them; [`NOT_BOUND`] where it has none.
-    places: Vec<u32>,
-    /// A bit for each of the body's numbers up to the last that nobody draws or touches.
+    points: Vec<NodeBinding>,
+    /// Position in `points` of each index from the first bound point on; [`NOT_BOUND`] for a node.
+    indices: Vec<u32>,
+    /// One bit per index, set if it is neither drawn nor in contact. It ends at the last such index.
     hidden: Vec<u64>,
 }
 
-saved! { Bindings { points, places, hidden } }
+saved! { Bindings { points, indices, hidden } }
 
-/// That of these vectors which a number has: its own, or what the nodes that it is bound to make of theirs.
+/// Vector at an index: that of the node, or the weighted mean of a bound point.
 #[inline]
 pub(crate) fn vector(bindings: Option<&Bindings>, vectors: &Vectors, node: usize) -> Vec3 {
     match bindings.and_then(|bindings| bindings.get(node as u32)) {
-        Some(bound) => bound.of(|node| vectors.get(node)),
+        Some(binding) => binding.interpolate(|node| vectors.get(node)),
         None => vectors.get(node),
     }
 }
 
-/// The nodes that a number stands for, with their weights: itself where it is not bound, as where nothing is.
+/// Nodes and weights of an index; the node itself with weight 1 if it is not bound.
 #[inline]
-pub(crate) fn parts(bindings: Option<&Bindings>, node: u32) -> impl Iterator<Item = (u32, f32)> + use<> {
-    let bound = bindings.and_then(|bindings| bindings.get(node)).copied();
-    bound.unwrap_or_else(|| Bound::itself(node)).into_parts()
+pub(crate) fn weighted_nodes(bindings: Option<&Bindings>, node: u32) -> impl Iterator<Item = (u32, f32)> + use<> {
+    let binding = bindings.and_then(|bindings| bindings.get(node)).copied();
+    binding
+        .unwrap_or_else(|| NodeBinding::identity(node))
+        .into_weighted_nodes()
 }
 
 const NOT_BOUND: u32 = u32::MAX;
 
 impl Bindings {
-    /// Makes room for so many numbers more than the body has, of which any may be bound and any hidden.
+    /// Reserves capacity for `count` new indices, any of which may be bound or hidden.
     pub fn reserve(&mut self, count: usize, node_count: usize) -> Result<()> {
         self.points.try_reserve(count)?;
-        self.places.try_reserve(count)?;
+        self.indices.try_reserve(count)?;
         memory::reserve(&mut self.hidden, (node_count + count).div_ceil(64))
     }
 
-    /// Adds a point, for which there is room, of a higher number than those before.
-    pub fn push(&mut self, bound: Bound) {
-        let first = self.points.first().map_or(bound.node, |bound| bound.node);
-        self.places.resize((bound.node - first) as usize, NOT_BOUND);
-        self.places.push(self.points.len() as u32);
-        self.points.push(bound);
+    /// Adds a bound point with a higher index than those before, within the capacity.
+    pub fn push(&mut self, binding: NodeBinding) {
+        let first = self.points.first().map_or(binding.node, |binding| binding.node);
+        self.indices.resize((binding.node - first) as usize, NOT_BOUND);
+        self.indices.push(self.points.len() as u32);
+        self.points.push(binding);
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = &Bound> {
+    pub fn iter(&self) -> impl Iterator<Item = &NodeBinding> {
         self.points.iter()
     }
 
-    pub fn get(&self, node: u32) -> Option<&Bound> {
-        self.points.get(self.place(node)?)
+    pub fn get(&self, node: u32) -> Option<&NodeBinding> {
+        self.points.get(self.index_of(node)?)
     }
 
-    pub fn get_mut(&mut self, node: u32) -> Option<&mut Bound> {
-        let place = self.place(node)?;
-        self.points.get_mut(place)
+    pub fn get_mut(&mut self, node: u32) -> Option<&mut NodeBinding> {
+        let index = self.index_of(node)?;
+        self.points.get_mut(index)
     }
 
     #[inline]
-    fn place(&self, node: u32) -> Option<usize> {
-        let place = node.checked_sub(self.points.first()?.node)?;
-        let &place = self.places.get(place as usize)?;
-        (place != NOT_BOUND).then_some(place as usize)
+    fn index_of(&self, node: u32) -> Option<usize> {
+        let index = node.checked_sub(self.points.first()?.node)?;
+        let &index = self.indices.get(index as usize)?;
+        (index != NOT_BOUND).then_some(index as usize)
     }
 
-    /// The nodes that a number stands for, with their weights: itself where it is not bound.
+    /// Nodes and weights of an index; the node itself with weight 1 if it is not bound.
     #[inline]
-    pub fn parts(&self, node: u32) -> impl Iterator<Item = (u32, f32)> {
-        parts(Some(self), node)
+    pub fn weighted_nodes(&self, node: u32) -> impl Iterator<Item = (u32, f32)> {
+        weighted_nodes(Some(self), node)
     }
 
-    /// Nobody draws or touches this number any more; there is room for it.
+    /// Hides an index, within the capacity: it is neither drawn nor in contact.
     pub fn hide(&mut self, node: u32) {
         let word = node as usize / 64;
         if word >= self.hidden.len() {
@@ -136,7 +139,7 @@ impl Bindings {
         self.hidden[word] |= 1 << (node % 64);
     }
 
-    /// It is drawn again.
+    /// Makes an index visible again.
     pub fn show(&mut self, node: u32) {
         if let Some(word) = self.hidden.get_mut(node as usize / 64) {
             *word &= !(1 << (node % 64));
@@ -149,21 +152,21 @@ impl Bindings {
         word.is_some_and(|word| word >> (node % 64) & 1 == 1)
     }
 
-    /// What contact depends on.
+    /// Hashes the data that contact depends on.
     pub fn hash(&self, hasher: &mut StateHasher) {
-        for bound in &self.points {
-            hasher.write_u64(u64::from(bound.node));
-            bound.nodes.iter().for_each(|&node| hasher.write_u64(u64::from(node)));
-            hasher.write_floats(&bound.weights);
+        for binding in &self.points {
+            hasher.write_u64(u64::from(binding.node));
+            binding.nodes.iter().for_each(|&node| hasher.write_u64(u64::from(node)));
+            hasher.write_floats(&binding.weights);
         }
         self.hidden.iter().for_each(|&word| hasher.write_u64(word));
     }
 
-    /// Makes the vectors of all points what those of their nodes make of them.
-    pub fn follow(&self, vectors: &mut Vectors) {
-        for bound in &self.points {
-            let vector = bound.of(|node| vectors.get(node));
-            vectors.set(bound.node as usize, vector);
+    /// Sets the vectors of all bound points to the weighted means of their nodes.
+    pub fn update_points(&self, vectors: &mut Vectors) {
+        for binding in &self.points {
+            let vector = binding.interpolate(|node| vectors.get(node));
+            vectors.set(binding.node as usize, vector);
         }
     }
 }

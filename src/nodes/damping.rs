@@ -1,22 +1,22 @@
-//! Damping of nodes against the world, solved exactly over a step: `m v' = f - gamma v` (Halic et al., section 3).
+//! Damping of nodes against the world, integrated exactly: `m v' = f - gamma v` (Halic et al., section 3).
 //!
-//! Over a time t with a constant force, `v(t) = v e^-s + f t/m (1 - e^-s)/s` with s = gamma t / m. The paper's factor
-//! per step becomes the same decay and the same terminal velocity at every step.
+//! For a constant force over the time t, `v(t) = v e^-s + f t/m (1 - e^-s)/s` with s = gamma t / m. Unlike the paper's
+//! factor per step, this yields the same decay and the same terminal velocity at every step length.
 
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::soa::{TILE, per_node};
 
-/// What half a substep does to each node's velocity; kept only by bodies that have node damping.
+/// Factors of node damping for half a substep. Only bodies with node damping have them.
 #[derive(Debug)]
 pub(crate) struct NodeDamping {
-    /// gamma / m of each node, 1/s; 0 where the mass is 0.
+    /// gamma / m of each node, 1/s; 0 if the mass is 0.
     rates: Vec<f32>,
-    /// `1 - e^-s` over half a substep: what is lost, not what remains, so that small losses keep their digits.
+    /// `1 - e^-s` over half a substep. Storing the loss keeps the digits of small values.
     pub loss: Vec<f32>,
     /// `t (1 - e^-s)/s` over half a substep, s.
     pub gain: Vec<f32>,
-    /// The substep that the factors are for, s.
+    /// Substep of the factors, s.
     substep: f32,
 }
 
@@ -34,7 +34,7 @@ impl NodeDamping {
         })
     }
 
-    /// Has a node be damped as another is.
+    /// Copies the damping of `source` to `node`.
     pub fn copy(&mut self, source: usize, node: usize) {
         for values in [&mut self.rates, &mut self.loss, &mut self.gain] {
             values[node] = values[source];
@@ -45,7 +45,7 @@ impl NodeDamping {
         &self.rates
     }
 
-    /// Gives a node another rate, 1/s; the factors have to be prepared again then.
+    /// Sets the rate of a node, 1/s. The factors must be prepared again after a change.
     pub fn set_rate(&mut self, node: usize, rate: f32) {
         if self.rates[node] != rate {
             self.rates[node] = rate;
@@ -53,7 +53,7 @@ impl NodeDamping {
         }
     }
 
-    /// Makes the factors those of half of `substep`.
+    /// Updates the factors to half of `substep`.
     pub fn prepare(&mut self, substep: f32) {
         if substep == self.substep {
             return;
@@ -61,7 +61,7 @@ impl NodeDamping {
         let half = 0.5 * f64::from(substep);
         let mut last = (f32::NAN, 0.0, 0.0);
         for ((&rate, loss), gain) in self.rates.iter().zip(&mut self.loss).zip(&mut self.gain) {
-            // Most bodies have few different rates, mostly side by side.
+            // Rates are mostly few, and equal for neighboring nodes.
             if rate != last.0 {
                 let s = f64::from(rate) * half;
                 let lost = -libm::expm1(-s);
@@ -74,24 +74,24 @@ impl NodeDamping {
     }
 }
 
-/// How nodes answer an impulse within a kick.
+/// Response of nodes to impulses within a kick.
 #[derive(Clone, Copy)]
 pub(crate) struct Mobility<'a> {
     pub inverse_masses: &'a [f32],
     pub damping: Option<&'a NodeDamping>,
-    /// The substep of the kick, s.
+    /// Substep of the kick, s.
     pub substep: f32,
-    /// Whether the kick is half of one.
+    /// True for a half kick.
     pub half: bool,
-    /// By tile: what sleeps does not move.
+    /// True for each sleeping tile. Its nodes do not move.
     pub asleep: Option<&'a [bool]>,
 }
 
 impl Mobility<'_> {
-    /// The change of velocity for an impulse, 1/kg; 0 for a pinned node. The force that gives the impulse acts over the
-    /// whole kick, so that damping takes of it what it takes of any force.
+    /// Velocity change per impulse, 1/kg; 0 for a pinned node. The force of the impulse acts over the whole kick, so it
+    /// is damped like any force.
     #[inline]
-    pub fn of(&self, node: usize) -> f32 {
+    pub fn inverse_mass(&self, node: usize) -> f32 {
         if self.asleep.is_some_and(|asleep| asleep[node / TILE]) {
             return 0.0;
         }

@@ -2,26 +2,26 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-/// An offset is taken for the whole multiple of the axes that it comes this near to, in axes.
+/// The largest distance from an integer multiple of the axes at which an offset counts as that multiple, in axes.
 pub(super) const NEAR: f64 = 0.25;
 
-/// The smallest height of an axis over those before it, in its length.
-const STEEP: f64 = 0.3;
+/// The smallest height of an axis above the span of the previous ones, relative to its length.
+const MIN_SINE: f64 = 0.3;
 
-/// No spring of a lattice reaches further than this many axes.
+/// The largest reach of a lattice's spring, in axes.
 const REACH: f64 = 4.0;
 
-/// Three vectors, of which a lattice steps along the first ones: in a sheet the third is its normal.
+/// Three vectors. A lattice steps along the first ones; in a sheet the third is its normal.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Axes([Vec3; 3]);
 
 impl Axes {
-    /// The first of these offsets that do not lie in one line or plane with those before: the axes, and how many there are.
-    pub fn of(offsets: impl Iterator<Item = DVec3>) -> (Self, usize) {
+    /// Takes the first linearly independent offsets as axes. Returns the axes and their number.
+    pub fn from_offsets(offsets: impl Iterator<Item = DVec3>) -> (Self, usize) {
         let mut axes = Self::default();
         let mut count = 0;
         for offset in offsets {
-            if count < 3 && axes.height(count, offset) > STEEP * offset.length() {
+            if count < 3 && axes.height(count, offset) > MIN_SINE * offset.length() {
                 axes.0[count] = offset.as_vec3();
                 count += 1;
             }
@@ -30,13 +30,13 @@ impl Axes {
         (axes, count)
     }
 
-    /// What takes an offset in space to one in axes: not of numbers if they lie in a plane.
+    /// The map from an offset in space to one in axes; not finite if the axes are coplanar.
     pub fn inverse(&self) -> DMat3 {
         let [a, b, c] = self.0.map(|axis| axis.as_dvec3());
         DMat3::from_cols(a, b, c).inverse()
     }
 
-    /// Takes the first `count` axes from steps along them, as far as there are any, and the rest accordingly.
+    /// Refits the first `count` axes to single steps along them, if there are any, and completes the rest.
     pub fn fit(&mut self, steps: &AxisSteps, count: usize) {
         for axis in 0..count {
             if steps.counts[axis] > 0.0 {
@@ -46,7 +46,7 @@ impl Axes {
         self.complete(count);
     }
 
-    /// How far an offset reaches out of what the first axes span.
+    /// The height of an offset above the span of the first axes.
     fn height(&self, count: usize, offset: DVec3) -> f64 {
         let [a, b, _] = self.0.map(|axis| axis.as_dvec3());
         match count {
@@ -56,7 +56,7 @@ impl Axes {
         }
     }
 
-    /// Makes up what is missing, at right angles to the first axes.
+    /// Completes missing axes perpendicular to the first ones.
     fn complete(&mut self, count: usize) {
         if count == 0 {
             self.0[0] = Vec3::X;
@@ -72,7 +72,7 @@ impl Axes {
     }
 }
 
-/// Single steps along the axes, in space.
+/// Sums of single steps along the axes, in space.
 #[derive(Default)]
 pub(super) struct AxisSteps {
     sums: [DVec3; 3],
@@ -80,7 +80,7 @@ pub(super) struct AxisSteps {
 }
 
 impl AxisSteps {
-    /// Adds an offset that is this whole multiple of the axes, if that is a single step.
+    /// Adds an offset with this integer multiple of the axes, if it is a single step.
     pub fn add(&mut self, offset: DVec3, multiple: [i32; 3]) {
         let axis = match multiple {
             [1 | -1, 0, 0] => 0,
@@ -93,9 +93,9 @@ impl AxisSteps {
     }
 }
 
-/// The whole multiple of the axes that an offset in axes comes nearest to, and whether it is near and not 0.
-pub(super) fn whole(offset: DVec3) -> ([i32; 3], bool) {
-    // Conversion of numbers above 0 rounds down; every processor has it, and to round as such not every one.
+/// The integer multiple of the axes nearest to an offset in axes. The flag is true if it is near and not 0.
+pub(super) fn nearest_multiple(offset: DVec3) -> ([i32; 3], bool) {
+    // Conversion of positive numbers rounds down on every processor; a rounding instruction is not available on all.
     let up = REACH + 0.5;
     let steps = offset.clamp(DVec3::splat(-REACH), DVec3::splat(REACH)) + up;
     let steps = steps.to_array().map(|step| step as i32 - REACH as i32);

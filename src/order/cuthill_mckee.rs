@@ -1,11 +1,12 @@
-//! Nodes breadth first, each node's neighbours by their degree, else in the order of its springs (Cuthill and McKee 1969), and that order reversed (George
-//! 1971): it asks for no positions, and makes rows of most lattices.
+//! Reverse Cuthill-McKee order: breadth first with neighbors sorted by degree (Cuthill and McKee 1969), then reversed
+//! (George 1971). It needs no positions and makes rows of most lattices.
 
 use super::links::Links;
 use crate::Result;
 use crate::base::memory;
 
-/// Walks to the far end of a part before the one that makes the order: the further apart its ends, the narrower it is.
+/// The number of searches for a far end of a component before ordering. A start at an extremal node gives narrow
+/// levels.
 const SEARCHES: u32 = 2;
 
 /// Marks nodes that are in the order.
@@ -18,7 +19,7 @@ pub(super) fn reverse_cuthill_mckee(links: &Links) -> Result<Vec<u32>> {
     let mut marks = memory::filled(0, count)?;
     let mut reached = memory::reserved(count)?;
     let mut order: Vec<u32> = memory::reserved(count)?;
-    let mut found = Vec::new();
+    let mut new_neighbors = Vec::new();
     for node in 0..count as u32 {
         if marks[node as usize] == DONE {
             continue;
@@ -32,34 +33,34 @@ pub(super) fn reverse_cuthill_mckee(links: &Links) -> Result<Vec<u32>> {
         order.push(start);
         while let Some(&node) = order.get(next) {
             next += 1;
-            found.clear();
-            for (index, &neighbour) in links.of(node).iter().enumerate() {
-                if std::mem::replace(&mut marks[neighbour as usize], DONE) != DONE {
-                    memory::push(&mut found, (links.degree(neighbour), index, neighbour))?;
+            new_neighbors.clear();
+            for (index, &neighbor) in links.neighbors(node).iter().enumerate() {
+                if std::mem::replace(&mut marks[neighbor as usize], DONE) != DONE {
+                    memory::push(&mut new_neighbors, (links.degree(neighbor), index, neighbor))?;
                 }
             }
-            found.sort_unstable();
-            order.extend(found.iter().map(|&(.., neighbour)| neighbour));
+            new_neighbors.sort_unstable();
+            order.extend(new_neighbors.iter().map(|&(.., neighbor)| neighbor));
         }
     }
     order.reverse();
     Ok(order)
 }
 
-/// Of the nodes that are the most springs away from `start`, the one with the fewest springs.
+/// The node with the fewest springs among those at the largest graph distance from `start`.
 fn far_end(start: u32, links: &Links, search: u32, marks: &mut [u32], reached: &mut Vec<u32>) -> u32 {
     reached.clear();
     reached.push(start);
     marks[start as usize] = search;
-    // Where the nodes begin that are as far away as the last one.
+    // The start of the current breadth-first level.
     let mut level = 0;
     let mut next = 0;
     while next < reached.len() {
         level = next;
         for index in level..reached.len() {
-            for &neighbour in links.of(reached[index]) {
-                if std::mem::replace(&mut marks[neighbour as usize], search) != search {
-                    reached.push(neighbour);
+            for &neighbor in links.neighbors(reached[index]) {
+                if std::mem::replace(&mut marks[neighbor as usize], search) != search {
+                    reached.push(neighbor);
                 }
             }
             next = index + 1;

@@ -4,23 +4,23 @@ use super::Costs;
 use crate::Result;
 use crate::base::memory;
 
-/// As many as the processor writes to side by side.
+/// The number of groups: the processor can write to this many streams concurrently.
 const GROUPS: usize = 256;
 
-/// For each node the nodes it has springs to, in the order of the springs.
+/// The neighbors of each node, in the order of its springs.
 pub(super) struct Links {
-    /// Where the neighbours of each node begin; one more entry at the end.
+    /// The start of each node's neighbors, with one more entry at the end.
     starts: Vec<usize>,
-    neighbours: Vec<u32>,
-    /// What they cost.
+    neighbors: Vec<u32>,
+    /// The costs of the springs' columns.
     pub costs: Costs,
 }
 
 impl Links {
-    /// The links of nodes of which number `n` of the springs is called `names[n]`.
+    /// The links of nodes where node `n` of the springs is renumbered to `names[n]`.
     pub fn new(springs: &[[u32; 2]], names: &[u32], costs: Costs) -> Result<Self> {
         let ends = ends(springs, names)?;
-        // Counted one place late, so that filling in moves each start to its place.
+        // Counted one entry late, so that filling advances each start to its final value.
         let mut starts = memory::filled(0_usize, names.len() + 2)?;
         for &[node, _] in &ends {
             starts[node as usize + 2] += 1;
@@ -28,16 +28,16 @@ impl Links {
         for node in 2..starts.len() {
             starts[node] += starts[node - 1];
         }
-        let mut neighbours = memory::filled(0, ends.len())?;
-        for &[node, neighbour] in &ends {
-            let place = &mut starts[node as usize + 1];
-            neighbours[*place] = neighbour;
-            *place += 1;
+        let mut neighbors = memory::filled(0, ends.len())?;
+        for &[node, neighbor] in &ends {
+            let slot = &mut starts[node as usize + 1];
+            neighbors[*slot] = neighbor;
+            *slot += 1;
         }
         starts.pop();
         Ok(Self {
             starts,
-            neighbours,
+            neighbors,
             costs,
         })
     }
@@ -46,23 +46,23 @@ impl Links {
         self.starts.len() - 1
     }
 
-    /// Twice the springs.
+    /// The number of links: twice the number of springs.
     pub fn count(&self) -> usize {
-        self.neighbours.len()
+        self.neighbors.len()
     }
 
-    pub fn of(&self, node: u32) -> &[u32] {
+    pub fn neighbors(&self, node: u32) -> &[u32] {
         let node = node as usize;
-        &self.neighbours[self.starts[node]..self.starts[node + 1]]
+        &self.neighbors[self.starts[node]..self.starts[node + 1]]
     }
 
     pub fn degree(&self, node: u32) -> usize {
-        self.of(node).len()
+        self.neighbors(node).len()
     }
 }
 
-/// Both ends of each spring, the other one after it, sorted by the leading bits of the node: what is then done for each node
-/// stays in the caches, many times as fast where springs are given in random order.
+/// Both ends of each spring, sorted by the leading bits of the node. Work per node then stays in the caches, many times
+/// as fast for springs in random order.
 fn ends(springs: &[[u32; 2]], names: &[u32]) -> Result<Vec<[u32; 2]>> {
     let shift = (usize::BITS - names.len().leading_zeros()).saturating_sub(GROUPS.ilog2());
     let group = |node: u32| node as usize >> shift;
@@ -80,9 +80,9 @@ fn ends(springs: &[[u32; 2]], names: &[u32]) -> Result<Vec<[u32; 2]>> {
     let mut ends = memory::filled([0; 2], 2 * springs.len())?;
     for &[a, b] in &renamed {
         for end in [[a, b], [b, a]] {
-            let place = &mut starts[group(end[0])];
-            ends[*place] = end;
-            *place += 1;
+            let slot = &mut starts[group(end[0])];
+            ends[*slot] = end;
+            *slot += 1;
         }
     }
     Ok(ends)

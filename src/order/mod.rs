@@ -1,8 +1,8 @@
-//! The order in which packed storage keeps nodes for itself: one that makes neighbours neighbours.
+//! The node order of packed storage: it makes neighbors adjacent in memory.
 //!
-//! Several ways to order nodes are tried, and the one for which packed storage needs the least work is taken: rows, which
-//! suit lattices best; a space-filling curve and reverse Cuthill-McKee, for what is no lattice; each as it is, and with
-//! nodes that have equally many springs side by side.
+//! Several orders are tried, and the one with the least estimated work is taken. Rows suit lattices best; a
+//! space-filling curve and reverse Cuthill-McKee suit other meshes. Each is tried as it is and with nodes grouped by
+//! their number of springs.
 
 mod axes;
 mod cost;
@@ -28,33 +28,33 @@ use links::Links;
 use rows::along_rows;
 pub(crate) use split::{BlockSplit, Costs, GATHER, Row, cheapest};
 
-/// Nodes side by side whose links share columns.
+/// The number of consecutive nodes that share columns.
 pub(crate) const LANES: usize = 16;
 
-/// What another order must save to be taken instead of the caller's, and what is too little to look further for.
-const WORTH: f64 = 0.03;
+/// The relative saving for which another order replaces the caller's; below it the search stops.
+const MIN_GAIN: f64 = 0.03;
 
-/// Nodes are sorted by their number of springs within windows of this many: more would tear neighbours apart.
+/// The window within which nodes are sorted by degree; a larger one would separate neighbors.
 const WINDOW: usize = 512;
 
-/// The order in which packed storage works fastest, `order[new] = old`; `None` where that in which nodes are given is as good
-/// within 3 %. The springs join nodes that there are, each two at most once; `costs` are those of most of them.
+/// The order in which packed storage is fastest, `order[new] = old`. `None` if the given order is within 3 % of it.
+/// Each spring joins two existing nodes, and each pair occurs once. `costs` are those of most springs.
 ///
 /// Errors: [`Error::OutOfMemory`](crate::Error::OutOfMemory).
 pub(crate) fn best_order(positions: &[Vec3], springs: &[[u32; 2]], costs: Costs) -> Result<Option<Vec<u32>>> {
     if springs.is_empty() {
         return Ok(None);
     }
-    // Nodes are named along the curve here: whatever walks from neighbour to neighbour then stays in the caches, several times
-    // as fast where nodes are given in random order.
+    // Nodes are renumbered along the curve first. Neighbor walks then stay in the caches, several times as fast for
+    // nodes in random order.
     let curve = along_curve(positions)?;
     let given = inverse(&curve)?;
     let links = Links::new(springs, &given, costs)?;
 
-    let mut best = Best {
+    let mut best = BestOrder {
         order: None,
-        cost: cost(&given, &links)? * (1.0 - WORTH),
-        settled: least_cost(&links) / (1.0 - WORTH),
+        cost: cost(&given, &links)? * (1.0 - MIN_GAIN),
+        good_enough: least_cost(&links) / (1.0 - MIN_GAIN),
         links: &links,
     };
     if best.cost <= least_cost(&links) {
@@ -64,7 +64,7 @@ pub(crate) fn best_order(positions: &[Vec3], springs: &[[u32; 2]], costs: Costs)
     if let Some(rows) = along_rows(&named_positions, &links)? {
         best.offer(rows)?;
     }
-    if !best.is_settled() {
+    if !best.is_good_enough() {
         best.offer(given)?;
         let names = memory::collected(0..curve.len() as u32)?;
         best.offer(names)?;
@@ -80,18 +80,18 @@ pub(crate) fn best_order(positions: &[Vec3], springs: &[[u32; 2]], costs: Costs)
 }
 
 /// The best order so far.
-struct Best<'a> {
-    /// `None`: the caller's.
+struct BestOrder<'a> {
+    /// `None`: the caller's order.
     order: Option<Vec<u32>>,
     cost: f64,
-    /// With that cost there is little left to gain.
-    settled: f64,
+    /// A cost that leaves little to gain.
+    good_enough: f64,
     links: &'a Links,
 }
 
-impl Best<'_> {
-    fn is_settled(&self) -> bool {
-        self.cost <= self.settled
+impl BestOrder<'_> {
+    fn is_good_enough(&self) -> bool {
+        self.cost <= self.good_enough
     }
 
     /// Takes an order if it is better, as it is or sorted by degree.
@@ -108,7 +108,7 @@ impl Best<'_> {
     }
 }
 
-/// The nodes of each window by how many springs they have, the most first, and else as they were.
+/// Sorts the nodes of each window by descending degree, otherwise in their order.
 fn by_degree(order: &[u32], links: &Links) -> Result<Vec<u32>> {
     let mut sorted = memory::reserved(order.len())?;
     let mut keyed = memory::reserved(WINDOW)?;
@@ -117,7 +117,7 @@ fn by_degree(order: &[u32], links: &Links) -> Result<Vec<u32>> {
         keyed.extend(
             (0_u32..)
                 .zip(window)
-                .map(|(place, &node)| (Reverse(links.degree(node)), place, node)),
+                .map(|(index, &node)| (Reverse(links.degree(node)), index, node)),
         );
         keyed.sort_unstable();
         sorted.extend(keyed.iter().map(|&(.., node)| node));
@@ -125,11 +125,11 @@ fn by_degree(order: &[u32], links: &Links) -> Result<Vec<u32>> {
     Ok(sorted)
 }
 
-/// Where each node is in an order.
+/// The rank of each node in an order.
 fn inverse(order: &[u32]) -> Result<Vec<u32>> {
-    let mut places = memory::filled(0, order.len())?;
-    for (place, &node) in (0..).zip(order) {
-        places[node as usize] = place;
+    let mut ranks = memory::filled(0, order.len())?;
+    for (rank, &node) in (0..).zip(order) {
+        ranks[node as usize] = rank;
     }
-    Ok(places)
+    Ok(ranks)
 }

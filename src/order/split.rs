@@ -1,17 +1,16 @@
-//! Which links of a block of nodes go into runs, which into gathers, and which are left beside the columns.
+//! Splits the links of a block of nodes into runs, gathers and strays.
 
 use super::LANES;
 use crate::base::{Result, memory};
 
-/// The fewest links that are worth a gather: alone they cost a third as much as a gather of sixteen.
+/// The fewest links for which a gather pays off: as strays they cost a third more than a gather of sixteen.
 pub(crate) const GATHER: usize = 4;
 
-/// How few links a run may have, from many runs to none. A run is cheaper than a gather, but what runs take may leave gathers
-/// half empty.
-const FEWEST: [usize; 5] = [5, 8, 11, 14, LANES + 1];
+/// The candidates for the fewest links of a run, from many runs to none. A run is cheaper than a gather, but the links
+/// it takes may leave gathers half empty.
+const RUN_LENGTHS: [usize; 5] = [5, 8, 11, 14, LANES + 1];
 
-/// What a column costs, in cycles of the processor, measured with AVX-512: sixteen neighbours side by side, sixteen
-/// anywhere; and a link of a node that has far more of them than those around it.
+/// The costs of columns in processor cycles, measured with AVX-512: a run and a gather of sixteen, and one stray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Costs {
     pub run: f64,
@@ -20,13 +19,13 @@ pub(crate) struct Costs {
 }
 
 impl Costs {
-    /// Of springs that share their parameters.
+    /// The costs of columns with shared parameters.
     pub const SHARED: Self = Self {
         run: 9.0,
         gather: 30.0,
         stray: 10.0,
     };
-    /// Of springs that bring their own.
+    /// The costs of columns with per-spring parameters.
     pub const OWN: Self = Self {
         run: 16.0,
         gather: 34.0,
@@ -34,13 +33,13 @@ impl Costs {
     };
 }
 
-/// Links of a block that lead equally far in the order of nodes: a run, if they are many.
+/// The links of a block with the same index offset. Many of them make a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row {
-    /// Rows that share their parameters, or have to bring their own, come one after the other.
-    pub kind: u16,
+    /// The parameter class. Rows of the same class are adjacent.
+    pub class: u16,
     pub costs: Costs,
-    /// The nodes that have such a link.
+    /// A mask of the nodes that have such a link.
     pub lanes: u16,
 }
 
@@ -50,39 +49,39 @@ impl Row {
     }
 }
 
-/// How a block is split.
+/// The split of a block into columns.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlockSplit {
     /// The fewest links that make a run.
-    pub run: usize,
-    /// Whether springs are gathered whatever their kinds, and each brings its own parameters.
+    pub min_run: usize,
+    /// True if gathers mix springs of all classes, with per-spring parameters.
     pub mixed: bool,
     pub cost: f64,
 }
 
-/// Finds the split of a block that costs least; `levels` is room to count in.
+/// Finds the split of a block with the least cost. `levels` is working memory.
 pub(crate) fn cheapest(rows: &[Row], levels: &mut Vec<u32>) -> Result<BlockSplit> {
-    let has_kinds = rows.windows(2).any(|pair| pair[0].kind != pair[1].kind);
+    let has_classes = rows.windows(2).any(|pair| pair[0].class != pair[1].class);
     let mut best = BlockSplit {
-        run: FEWEST[0],
+        min_run: RUN_LENGTHS[0],
         mixed: false,
-        cost: cost(rows, FEWEST[0], false, levels)?,
+        cost: cost(rows, RUN_LENGTHS[0], false, levels)?,
     };
-    let mut offer = |run, mixed| -> Result<()> {
-        let cost = cost(rows, run, mixed, levels)?;
+    let mut offer = |min_run, mixed| -> Result<()> {
+        let cost = cost(rows, min_run, mixed, levels)?;
         if cost < best.cost {
-            best = BlockSplit { run, mixed, cost };
+            best = BlockSplit { min_run, mixed, cost };
         }
         Ok(())
     };
-    if has_kinds {
-        offer(FEWEST[0], true)?;
+    if has_classes {
+        offer(RUN_LENGTHS[0], true)?;
     }
-    for pair in FEWEST.windows(2) {
-        // Else it is the same split.
+    for pair in RUN_LENGTHS.windows(2) {
+        // Otherwise the split is the same.
         if rows.iter().any(|row| (pair[0]..pair[1]).contains(&row.links())) {
             offer(pair[1], false)?;
-            if has_kinds {
+            if has_classes {
                 offer(pair[1], true)?;
             }
         }
@@ -90,14 +89,14 @@ pub(crate) fn cheapest(rows: &[Row], levels: &mut Vec<u32>) -> Result<BlockSplit
     Ok(best)
 }
 
-/// What a block costs with runs of at least so many links, and gathers of kinds or mixed.
-fn cost(rows: &[Row], run: usize, mixed: bool, levels: &mut Vec<u32>) -> Result<f64> {
+/// The cost of a block with runs of at least `min_run` links, and gathers per class or mixed.
+fn cost(rows: &[Row], min_run: usize, mixed: bool, levels: &mut Vec<u32>) -> Result<f64> {
     let mut cost = 0.0;
-    for rows in rows.chunk_by(|a, b| mixed || a.kind == b.kind) {
+    for rows in rows.chunk_by(|a, b| mixed || a.class == b.class) {
         let mut heights = [0; LANES];
         levels.clear();
         for row in rows {
-            if row.links() >= run {
+            if row.links() >= min_run {
                 cost += row.costs.run;
                 continue;
             }
@@ -113,7 +112,7 @@ fn cost(rows: &[Row], run: usize, mixed: bool, levels: &mut Vec<u32>) -> Result<
             }
         }
         let costs = if mixed { Costs::OWN } else { rows[0].costs };
-        // A level is never fuller than the one below.
+        // A level never has more links than the level below.
         for &links in &*levels {
             cost += if links as usize >= GATHER {
                 costs.gather

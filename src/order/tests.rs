@@ -6,7 +6,7 @@ use crate::random::Random;
 
 type TestBody = (Vec<Vec3>, Vec<[u32; 2]>);
 
-/// A lattice in rows along x, every node joined to all around it.
+/// A lattice in rows along x, with every node joined to all around it.
 fn lattice(size: [u32; 3]) -> TestBody {
     let [nx, ny, nz] = size;
     let node = |x, y, z| x + nx * (y + ny * z);
@@ -16,9 +16,10 @@ fn lattice(size: [u32; 3]) -> TestBody {
         for y in 0..ny {
             for x in 0..nx {
                 positions.push(Vec3::new(x as f32, y as f32, z as f32) * 0.01);
-                // The half of the 26 ways that comes after the middle.
-                for way in 14..27 {
-                    let [a, b, c] = [x + way % 3, y + way / 3 % 3, z + way / 9].map(|place| place.wrapping_sub(1));
+                // The half of the 26 directions that comes after the center.
+                for direction in 14..27 {
+                    let [a, b, c] = [x + direction % 3, y + direction / 3 % 3, z + direction / 9]
+                        .map(|coordinate| coordinate.wrapping_sub(1));
                     if a < nx && b < ny && c < nz {
                         springs.push([node(x, y, z), node(a, b, c)]);
                     }
@@ -29,15 +30,15 @@ fn lattice(size: [u32; 3]) -> TestBody {
     (positions, springs)
 }
 
-/// The same body, its nodes and springs in random order.
+/// The body with its nodes and springs in random order.
 fn mixed((positions, springs): &TestBody) -> TestBody {
     let mut random = Random(7);
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();
     random.shuffle(&mut order);
-    let places = inverse(&order).expect("memory for a test");
+    let ranks = inverse(&order).expect("memory for a test");
     let mut springs: Vec<_> = springs
         .iter()
-        .map(|spring| spring.map(|node| places[node as usize]))
+        .map(|spring| spring.map(|node| ranks[node as usize]))
         .collect();
     random.shuffle(&mut springs);
     (order.iter().map(|&node| positions[node as usize]).collect(), springs)
@@ -62,7 +63,7 @@ fn cost_as_given(body: &TestBody) -> f64 {
     cost_of(&identity(body.0.len()), body)
 }
 
-/// The best order, checked to be one.
+/// The best order, checked to be a permutation.
 fn best((positions, springs): &TestBody) -> Option<Vec<u32>> {
     let order = best_order(positions, springs, Costs::SHARED).expect("memory for a test");
     if let Some(order) = &order {
@@ -99,7 +100,7 @@ fn a_mixed_lattice_comes_back_in_rows() {
 fn a_lattice_may_be_turned_and_bent() {
     let rows = lattice([200, 150, 1]);
     let turn = Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.5, 0.7);
-    // Rolled up more than once around an axis, in a spiral, and stretched along it.
+    // Rolled up around an axis more than once, in a spiral, and stretched along it.
     let bent = |p: Vec3| {
         let angle = 5.0 * p.x;
         let radius = 1.0 + 0.05 * angle;
@@ -129,18 +130,18 @@ fn random_points_come_in_an_order_that_keeps_neighbours_near() {
     let positions: Vec<Vec3> = (0..20_000)
         .map(|_| Vec3::new(random.unit(), random.unit(), random.unit()))
         .collect();
-    // Along x only those within the radius are compared.
+    // Sorted by x, so that only nodes within the radius are compared.
     let mut by_x = identity(positions.len());
     by_x.sort_by(|&a, &b| positions[a as usize].x.total_cmp(&positions[b as usize].x));
     let radius = 0.055;
     let mut springs = Vec::new();
     for (i, &a) in by_x.iter().enumerate() {
-        let at = positions[a as usize];
+        let position = positions[a as usize];
         let near = by_x[i + 1..]
             .iter()
-            .take_while(|&&b| positions[b as usize].x - at.x < radius);
+            .take_while(|&&b| positions[b as usize].x - position.x < radius);
         springs.extend(
-            near.filter(|&&b| positions[b as usize].distance(at) < radius)
+            near.filter(|&&b| positions[b as usize].distance(position) < radius)
                 .map(|&b| [a, b]),
         );
     }
@@ -156,7 +157,7 @@ fn the_order_does_not_depend_on_the_run() {
     assert_eq!(best(&body), best(&body));
 }
 
-/// Bodies that a definition may describe, though nobody would call them meshes.
+/// Degenerate bodies that a definition may still describe.
 fn nasty() -> Vec<(&'static str, TestBody)> {
     let count = 3000;
     let mut random = Random(11);
@@ -185,7 +186,7 @@ fn nasty() -> Vec<(&'static str, TestBody)> {
     tangle.dedup();
     tangle.retain(|[a, b]| a != b);
 
-    let places = [
+    let layouts = [
         ("somewhere", somewhere),
         ("all in one place", vec![Vec3::splat(3.0); count]),
         ("on a line", on_a_line),
@@ -199,7 +200,7 @@ fn nasty() -> Vec<(&'static str, TestBody)> {
         ("one node", (vec![Vec3::ONE], Vec::new())),
         ("one spring", (vec![Vec3::ONE, Vec3::ZERO], vec![[1, 0]])),
     ];
-    for (name, positions) in places {
+    for (name, positions) in layouts {
         for springs in [&chain, &star, &pairs, &tangle, &Vec::new()] {
             bodies.push((name, (positions.clone(), springs.clone())));
         }
@@ -231,21 +232,21 @@ fn chains_that_are_coincident_are_ordered_by_their_springs() {
     let count = 4000;
     let chain = (1..count).map(|n| [n - 1, n]).collect();
     let body = mixed(&(vec![Vec3::ZERO; count as usize], chain));
-    // Two springs a node, and but for the ends nothing but full runs.
+    // Two springs per node, and full runs except at the ends.
     assert!(best_cost(&body) < 1.03 * (2.0 * Costs::SHARED.run * f64::from(count) / 16.0));
 }
 
 #[test]
 fn columns_are_counted_as_they_are_packed() {
-    // Two blocks of sixteen; each node joined to that sixteen further on: one full run in each.
+    // Two blocks of sixteen, with each node joined to the one sixteen further on: one full run in each.
     let run: Vec<[u32; 2]> = (0..16).map(|n| [n, n + 16]).collect();
     let body = (vec![Vec3::ZERO; 32], run);
     assert_eq!(cost_as_given(&body), 2.0 * Costs::SHARED.run);
-    // The same joined crosswise: no two offsets are alike, one gather in each.
+    // The blocks joined crosswise: no two offsets are equal, so there is one gather in each.
     let gather: Vec<[u32; 2]> = (0..16).map(|n| [n, 31 - n]).collect();
     let body = (vec![Vec3::ZERO; 32], gather);
     assert_eq!(cost_as_given(&body), 2.0 * Costs::SHARED.gather);
-    // Three springs alone make no gather: each end by itself.
+    // Three springs are too few for a gather, so each end is a stray.
     let strays = vec![[0, 31], [5, 20], [9, 30]];
     let body = (vec![Vec3::ZERO; 32], strays);
     assert_eq!(cost_as_given(&body), 6.0 * Costs::SHARED.stray);
@@ -253,7 +254,7 @@ fn columns_are_counted_as_they_are_packed() {
 
 #[test]
 fn the_curve_passes_from_cell_to_neighbouring_cell() {
-    // In a cube of 8 cells along each edge, in the middles of what the curve's own cells are at that level.
+    // Nodes at the centers of the curve's cells, in a cube of 8 cells along each edge.
     let mut positions = Vec::new();
     for i in 0..512 {
         positions.push(Vec3::new((i % 8) as f32, (i / 8 % 8) as f32, (i / 64) as f32));

@@ -1,28 +1,28 @@
-//! Where a ray meets the surface of a tool.
+//! Ray casts against the surface of a tool.
 
 use glam::{DQuat, DVec3};
 
-use crate::contact::{Form, Tool};
+use crate::contact::{Tool, ToolShape};
 use crate::geometry::predicates::pierce;
 
-/// How far along the unit vector `way` from `start`, m, it first meets the tool's surface, and the outward normal there.
-pub(super) fn meet(tool: &Tool, start: DVec3, way: DVec3) -> Option<(f64, DVec3)> {
+/// The distance from `start` along the unit vector `direction` to the tool's surface, m, and the outward normal there.
+pub(super) fn meet(tool: &Tool, start: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
     let turn: DQuat = tool.pose.orientation.as_dquat().normalize();
     let from = turn.inverse() * (start - tool.pose.position.as_dvec3());
-    let along = turn.inverse() * way;
-    let (distance, normal) = match &tool.form {
-        Form::Rounded { radius, half_length } => {
+    let along = turn.inverse() * direction;
+    let (distance, normal) = match &tool.shape {
+        ToolShape::Rounded { radius, half_length } => {
             meet_capsule(from, along, f64::from(*radius), f64::from(*half_length))?
         }
-        Form::HalfSpace => {
+        ToolShape::HalfSpace => {
             let distance = -from.y / along.y;
             (distance >= 0.0 && distance.is_finite()).then_some((distance, DVec3::Y))?
         }
-        Form::Mesh(solid) => {
+        ToolShape::Mesh(solid) => {
             let surface = solid.surface();
             let (positions, triangles) = (surface.positions(), surface.triangles());
             let furthest = |far: f64, corner: &glam::Vec3| far.max(corner.as_dvec3().length());
-            // Past all of it.
+            // Beyond the tool.
             let length = 2.0 * (from.length() + positions.iter().fold(0.0, furthest));
             let mut first: Option<(f64, DVec3)> = None;
             for &nodes in triangles {
@@ -40,7 +40,7 @@ pub(super) fn meet(tool: &Tool, start: DVec3, way: DVec3) -> Option<(f64, DVec3)
     Some((distance, turn * normal))
 }
 
-/// The same of a capsule along y, which without a length is a sphere.
+/// The hit on a capsule along y; without a length it is a sphere.
 fn meet_capsule(from: DVec3, along: DVec3, radius: f64, half_length: f64) -> Option<(f64, DVec3)> {
     let mut first: Option<(f64, DVec3)> = None;
     let mut see = |distance: f64, normal: DVec3| {
@@ -59,7 +59,7 @@ fn meet_capsule(from: DVec3, along: DVec3, radius: f64, half_length: f64) -> Opt
         let centre = DVec3::Y * end;
         for distance in crossings(from - centre, along, radius) {
             let out = from + along * distance - centre;
-            // Of each cap the half beyond its centre.
+            // Each cap is the half of a sphere beyond its center.
             if out.y * end >= 0.0 {
                 see(distance, out / radius);
             }
@@ -68,7 +68,7 @@ fn meet_capsule(from: DVec3, along: DVec3, radius: f64, half_length: f64) -> Opt
     first
 }
 
-/// Where a line is `radius` away from the origin; NaN where it is not.
+/// The distance along a line to a sphere about the origin; NaN without a hit.
 fn crossings(from: DVec3, along: DVec3, radius: f64) -> [f64; 2] {
     let (a, b, c) = (
         along.length_squared(),
@@ -96,7 +96,7 @@ mod tests {
             (cap.0 - 6.5).abs() < 1e-12 && (cap.1 - DVec3::Y).length() < 1e-12,
             "{cap:?}"
         );
-        // From within, the way out; beside it, nothing.
+        // From inside, the exit; from outside beside it, no hit.
         let out = met(DVec3::ZERO, DVec3::Y).expect("met");
         assert!((out.0 - 2.5).abs() < 1e-12, "{out:?}");
         assert_eq!(met(DVec3::new(-3.0, 2.6, 0.0), DVec3::X), None);

@@ -1,4 +1,4 @@
-//! Where a picture is taken from.
+//! The camera of an image.
 
 use super::view::{View, axes};
 use crate::Result;
@@ -7,13 +7,13 @@ use crate::base::Error;
 use crate::base::ensure;
 use glam::{DVec3, Vec3};
 
-/// How much of the half width or height a fitted view leaves free on each side.
+/// The free margin of a fitted view, as a fraction of the half width or height.
 const MARGIN: f64 = 0.06;
 
-/// How far a fitted camera stays from the nearest point, as a share of the points' size.
+/// The least distance of a fitted camera from the nearest point, as a fraction of the points' extent.
 const NEAREST: f64 = 0.02;
 
-/// The near plane, as a share of the distance from the eye to the target.
+/// The near plane, as a fraction of the distance from the eye to the target.
 const NEAR: f64 = 1e-3;
 
 /// A pinhole camera.
@@ -28,27 +28,28 @@ const NEAR: f64 = 1e-3;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where the camera is, in metres.
+    /// The position of the camera, m.
     pub eye: Vec3,
-    /// What it looks at, in metres; the middle of the picture.
+    /// The point that the camera looks at, in the center of the image, m.
     pub target: Vec3,
-    /// What points upwards in the picture, of any length. Along the view, another axis is chosen.
+    /// The direction that points up in the image, of any length. If it is parallel to the view direction, another axis
+    /// replaces it.
     pub up: Vec3,
-    /// Angle between the upper and the lower edge of the picture, in radians, above 0 and below pi.
+    /// The vertical field of view, between 0 and pi, rad.
     pub field_of_view: f32,
 }
 
 impl Camera {
-    /// The nearest camera in this direction that has all `points` in the frame, 6 % away from its edges.
+    /// The nearest camera in a direction that has all `points` in the frame, with a margin of 6 %.
     ///
-    /// `direction` points from the scene towards the camera, `aspect` is width over height. The fit is exact: points
-    /// touch one pair of opposite margins, unless that would bring the camera closer to the nearest point than 2 % of the
-    /// size of them all, as of a row of points along the view. Points that are not finite are passed over. A single point is seen from
-    /// 1 m away; without points that is the origin. A direction of zero or `up` along it is replaced.
-    ///
+    /// `direction` points from the scene to the camera; `aspect` is width over height. The fit is exact: points touch
+    /// one pair of opposite margins. The exception is a camera closer to the nearest point than 2 % of the points'
+    /// extent, for example with points in a row along the view; it moves back to that distance. Points that are not
+    /// finite are ignored. A single point is viewed from 1 m; without points it is the origin. A zero direction, or an
+    /// `up` parallel to it, is replaced.
     /// # Errors
-    /// [`Error::InvalidArgument`]: a direction, up or angle that is not finite, an angle not between 0 and pi, an aspect
-    /// that is not above 0.
+    /// [`Error::InvalidArgument`] if a direction, `up` or the angle is not finite, the angle is not between 0 and pi,
+    /// or the aspect is not above 0.
     pub fn fitted(
         points: impl IntoIterator<Item = Vec3>,
         direction: Vec3,
@@ -69,17 +70,17 @@ impl Camera {
         let tangent_y = f64::from(field_of_view / 2.0).tan() * (1.0 - MARGIN);
         let tangent_x = tangent_y * f64::from(aspect);
 
-        // Each side of the frame is a plane through the eye: the farthest point beyond it decides where it has to be.
+        // Each side of the frame is a plane through the eye. The point furthest outside determines its position.
         let mut sides = [f64::NEG_INFINITY; 4];
         let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for point in points.into_iter().filter(|point| point.is_finite()) {
             let point = point.as_dvec3();
-            let seen = DVec3::new(point.dot(right), point.dot(upwards), -point.dot(forward));
-            bounds = (bounds.0.min(seen), bounds.1.max(seen));
-            let reach = [seen.x, -seen.x, seen.y, -seen.y];
+            let view_point = DVec3::new(point.dot(right), point.dot(upwards), -point.dot(forward));
+            bounds = (bounds.0.min(view_point), bounds.1.max(view_point));
+            let outward = [view_point.x, -view_point.x, view_point.y, -view_point.y];
             for (i, side) in sides.iter_mut().enumerate() {
                 let tangent = if i < 2 { tangent_x } else { tangent_y };
-                *side = side.max(reach[i] + tangent * seen.z);
+                *side = side.max(outward[i] + tangent * view_point.z);
             }
         }
         if bounds.0.x > bounds.1.x {
@@ -87,25 +88,25 @@ impl Camera {
             sides = [0.0; 4];
         }
         let size = (bounds.1 - bounds.0).length();
-        let smallest = if size > 0.0 { NEAREST * size } else { 1.0 };
-        let along = ((sides[0] + sides[1]) / (2.0 * tangent_x))
+        let least_distance = if size > 0.0 { NEAREST * size } else { 1.0 };
+        let distance = ((sides[0] + sides[1]) / (2.0 * tangent_x))
             .max((sides[2] + sides[3]) / (2.0 * tangent_y))
-            .max(bounds.1.z + smallest);
-        let across = right * ((sides[0] - sides[1]) / 2.0) + upwards * ((sides[2] - sides[3]) / 2.0);
+            .max(bounds.1.z + least_distance);
+        let offset = right * ((sides[0] - sides[1]) / 2.0) + upwards * ((sides[2] - sides[3]) / 2.0);
         let middle = (bounds.0.z + bounds.1.z) / 2.0;
         Ok(Camera {
-            eye: (across - forward * along).as_vec3(),
-            target: (across - forward * middle).as_vec3(),
+            eye: (offset - forward * distance).as_vec3(),
+            target: (offset - forward * middle).as_vec3(),
             up: upwards.as_vec3(),
             field_of_view,
         })
     }
 
-    /// The view of `width` x `height` square pixels.
+    /// The view with `width` x `height` square pixels.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a coordinate that is not finite, an eye at the target, an angle not between 0 and pi,
-    /// a width or height of 0 or above 32768.
+    /// [`Error::InvalidArgument`] if a coordinate is not finite, the eye is at the target, the angle is not between 0
+    /// and pi, or the width or height is not 1 to 32768.
     pub fn view(&self, width: u32, height: u32) -> Result<View> {
         for (name, size) in [("width", width), ("height", height)] {
             ensure!((1..=32_768).contains(&size), "{name} is {size}, not 1 to 32768");

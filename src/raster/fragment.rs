@@ -1,6 +1,6 @@
-//! What goes into the rasteriser and what comes out.
+//! Input and output of the rasterizer.
 
-/// How far from the origin, in pixels, a vertex may be for exact integer coverage.
+/// The largest coordinate of a vertex, in pixels from the origin, for which integer coverage is exact.
 pub const GUARD: f64 = 131_072.0;
 
 /// A vertex in pixel coordinates.
@@ -14,17 +14,17 @@ pub const GUARD: f64 = 131_072.0;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelVertex {
-    /// Pixels from the left edge of the picture.
+    /// The distance from the left edge of the image, in pixels.
     pub x: f64,
-    /// Pixels from the upper edge, downwards.
+    /// The distance from the upper edge, downward, in pixels.
     pub y: f64,
-    /// Distance along the viewing direction, in metres.
+    /// The distance along the view direction, m.
     pub depth: f64,
-    /// 1 / depth in a perspective view, 1 in an orthographic one: what makes weights and depth perspective-correct.
+    /// 1 / depth in a perspective view, 1 in an orthographic one. It makes weights and depth perspective-correct.
     pub reciprocal: f64,
 }
 
-/// A rectangle of pixels; the right column and the bottom row are outside.
+/// A rectangle of pixels. `right` and `bottom` are exclusive.
 ///
 /// ```
 /// use sinew::raster::Window;
@@ -33,9 +33,9 @@ pub struct PixelVertex {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
-    /// First column.
+    /// The first column.
     pub left: u32,
-    /// First row.
+    /// The first row.
     pub top: u32,
     /// One past the last column.
     pub right: u32,
@@ -44,7 +44,7 @@ pub struct Window {
 }
 
 impl Window {
-    /// The whole of a picture.
+    /// The window of a whole image.
     pub fn new(width: u32, height: u32) -> Self {
         Window {
             left: 0,
@@ -55,7 +55,7 @@ impl Window {
     }
 }
 
-/// One pixel of a triangle or a line.
+/// A pixel of a triangle or a line.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -64,24 +64,25 @@ impl Window {
 /// let mut depths = Vec::new();
 /// let corners = [Vec3::NEG_Z, Vec3::new(0.1, 0.0, -1.0), Vec3::new(0.0, 0.1, -1.0)];
 /// view.triangle(&Window::new(64, 48), corners, |fragment| depths.push(fragment.depth));
-/// // Half of ten by ten pixels, 1 m away.
+/// Half of ten by ten pixels, at a depth of 1 m.
 /// assert!((45..=55).contains(&depths.len()) && depths.iter().all(|depth| (depth - 1.0).abs() < 1e-6));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fragment {
-    /// Column.
+    /// The column.
     pub x: u32,
-    /// Row, downwards.
+    /// The row, downward.
     pub y: u32,
-    /// Distance along the viewing direction at the pixel's centre, in metres.
+    /// The distance along the view direction at the pixel's center, m.
     pub depth: f32,
-    /// Barycentric weights of the vertices in space, in the caller's order; their sum is 1. A line has two, then 0.
+    /// The barycentric weights of the vertices in space, in the caller's order; their sum is 1. A line has two weights
+    /// and a 0.
     pub weights: [f32; 3],
-    /// Whether the vertices appear counter-clockwise to the viewer; true for a line.
+    /// True if the vertices are counter-clockwise in the image; true for a line.
     pub front: bool,
 }
 
-/// For tests: in an orthographic view, 1 m away.
+/// A test vertex in an orthographic view, at a depth of 1 m.
 #[cfg(test)]
 pub(super) fn vertex(x: f64, y: f64) -> PixelVertex {
     PixelVertex {

@@ -1,4 +1,4 @@
-//! A scene as one list of triangles, ready to be rasterised.
+//! A scene as a list of triangles for the rasterizer.
 
 use super::scale::{ColourScale, Coloured};
 use super::scene::{Lines, Look, Scene, Shape, Surface};
@@ -9,37 +9,37 @@ use crate::base::memory;
 use crate::{Error, Result};
 use glam::Vec3;
 
-/// Everything in a scene as triangles.
+/// All objects of a scene as triangles.
 #[derive(Default)]
 pub(crate) struct Geometry {
     pub positions: Vec<Vec3>,
     pub normals: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,
-    /// For each triangle its part.
-    pub part_of: Vec<u32>,
+    /// The part of each triangle.
+    pub part_index: Vec<u32>,
     pub parts: Vec<MeshPart>,
 }
 
-/// What a run of triangles belongs to.
+/// The appearance of a run of triangles.
 pub(crate) struct MeshPart {
     pub look: Look,
-    /// The look's colour as light.
+    /// The look's color in linear RGB.
     pub colour: Vec3,
-    pub kind: Kind,
-    /// What it is coloured by.
-    pub chart: Option<Chart>,
+    pub kind: PartKind,
+    /// The values that color the part; `None` for the look's color.
+    pub value_colors: Option<ValueColors>,
 }
 
-/// Numbers that a part is coloured by.
-pub(crate) struct Chart {
+/// Values that color a part by a scale.
+pub(crate) struct ValueColors {
     scale: ColourScale,
-    /// The part's first position.
+    /// The index of the part's first position.
     first: u32,
-    /// One for each of its positions.
+    /// A value for each position.
     values: Vec<f32>,
 }
 
-impl Chart {
+impl ValueColors {
     fn new(coloured: &Coloured, first: usize, count: usize) -> Result<Self> {
         Ok(Self {
             scale: coloured.scale,
@@ -49,18 +49,18 @@ impl Chart {
     }
 }
 
-/// What a part is, as far as light is concerned.
+/// The kind of a part, which decides about shadows.
 #[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Kind {
-    /// Casts shadows and receives them.
+pub(crate) enum PartKind {
+    /// Casts and receives shadows.
     Solid,
-    /// Too thin for shadows.
+    /// A line, too thin for shadows.
     Thread,
-    /// Receives shadows, has a pattern and fades out.
+    /// A plane that receives shadows, has a pattern and fades out.
     Ground(Ground),
 }
 
-/// The pattern of a plane: squares about its centre.
+/// The checkerboard pattern of a plane, around its center.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct Ground {
     pub centre: Vec3,
@@ -70,7 +70,7 @@ pub(crate) struct Ground {
 }
 
 impl Geometry {
-    /// Triangles of a scene as seen in `view`, `height` pixels high.
+    /// Converts a scene to triangles for `view`, in an image `height` pixels high.
     pub fn new(scene: &Scene, view: &View, height: u32) -> Result<Self> {
         let mut geometry = Geometry::default();
         for surface in &scene.surfaces {
@@ -96,15 +96,15 @@ impl Geometry {
         check_indices(surface.triangles.as_flattened(), surface.positions.len())?;
         let first = self.begin(
             surface.look,
-            Kind::Solid,
+            PartKind::Solid,
             surface.positions.len(),
             surface.triangles.len(),
         )?;
         if let Some(coloured) = &surface.coloured {
             coloured.check(surface.positions.len())?;
-            let mut chart = Chart::new(coloured, first as usize, coloured.values.len())?;
-            chart.values.extend_from_slice(coloured.values);
-            self.set_chart(chart);
+            let mut value_colors = ValueColors::new(coloured, first as usize, coloured.values.len())?;
+            value_colors.values.extend_from_slice(coloured.values);
+            self.set_value_colors(value_colors);
         }
         self.positions.extend_from_slice(surface.positions);
         self.normals.resize(self.positions.len(), Vec3::ZERO);
@@ -120,11 +120,11 @@ impl Geometry {
     fn add_lines(&mut self, lines: &Lines, view: &View, height: u32) -> Result<()> {
         check_indices(lines.pairs.as_flattened(), lines.positions.len())?;
         let count = lines.pairs.len();
-        self.begin(lines.look, Kind::Thread, 4 * count, 2 * count)?;
-        let mut chart = None;
+        self.begin(lines.look, PartKind::Thread, 4 * count, 2 * count)?;
+        let mut value_colors = None;
         if let Some(coloured) = &lines.coloured {
             coloured.check(lines.positions.len())?;
-            chart = Some(Chart::new(coloured, self.positions.len(), 4 * count)?);
+            value_colors = Some(ValueColors::new(coloured, self.positions.len(), 4 * count)?);
         }
         let eye = view.origin().as_vec3();
         let half_pixels = (f64::from(lines.thickness) / 1000.0 * f64::from(height) / 2.0).max(0.25);
@@ -134,27 +134,27 @@ impl Geometry {
             let [Some(a), Some(b)] = projected else {
                 continue;
             };
-            let half_widths = [a, b].map(|end| (half_pixels * view.metres_per_pixel(end.depth)) as f32);
+            let half_widths = [a, b].map(|end| (half_pixels * view.meters_per_pixel(end.depth)) as f32);
             if let Some((positions, normals, triangles)) = tessellate::ribbon(ends, half_widths, eye) {
                 let first = self.positions.len() as u32;
                 self.positions.extend(positions);
                 self.normals.extend(normals);
                 self.add_triangles(first, &triangles);
-                if let (Some(chart), Some(coloured)) = (&mut chart, &lines.coloured) {
+                if let (Some(value_colors), Some(coloured)) = (&mut value_colors, &lines.coloured) {
                     let [a, b] = pair.map(|node| coloured.values[node as usize]);
-                    chart.values.extend([a, b, b, a]);
+                    value_colors.values.extend([a, b, b, a]);
                 }
             }
         }
-        if let Some(chart) = chart {
-            self.set_chart(chart);
+        if let Some(value_colors) = value_colors {
+            self.set_value_colors(value_colors);
         }
         Ok(())
     }
 
-    fn set_chart(&mut self, chart: Chart) {
+    fn set_value_colors(&mut self, value_colors: ValueColors) {
         if let Some(part) = self.parts.last_mut() {
-            part.chart = Some(chart);
+            part.value_colors = Some(value_colors);
         }
     }
 
@@ -162,11 +162,11 @@ impl Geometry {
         match *shape {
             Shape::Sphere { centre, radius } => {
                 let sphere = tessellate::capsule(centre, centre, radius);
-                self.add_tessellation(&sphere, *look, Kind::Solid)
+                self.add_tessellation(&sphere, *look, PartKind::Solid)
             }
             Shape::Capsule { start, end, radius } => {
                 let capsule = tessellate::capsule(start, end, radius);
-                self.add_tessellation(&capsule, *look, Kind::Solid)
+                self.add_tessellation(&capsule, *look, PartKind::Solid)
             }
             Shape::Plane { point, normal } => {
                 let normal = normal.normalize_or_zero();
@@ -181,7 +181,7 @@ impl Geometry {
                     radius: 3.5 * radius,
                 };
                 let disc = tessellate::disc(centre, normal, ground.radius);
-                self.add_tessellation(&disc, *look, Kind::Ground(ground))
+                self.add_tessellation(&disc, *look, PartKind::Ground(ground))
             }
         }
     }
@@ -190,7 +190,7 @@ impl Geometry {
         &mut self,
         (positions, normals, triangles): &Tessellation,
         look: Look,
-        kind: Kind,
+        kind: PartKind,
     ) -> Result<()> {
         let first = self.begin(look, kind, positions.len(), triangles.len())?;
         self.positions.extend_from_slice(positions);
@@ -199,20 +199,20 @@ impl Geometry {
         Ok(())
     }
 
-    /// Opens a part and reserves what it needs; answers the index of its first position.
-    fn begin(&mut self, look: Look, kind: Kind, positions: usize, triangles: usize) -> Result<u32> {
+    /// Starts a part and reserves memory for it. Returns the index of its first position.
+    fn begin(&mut self, look: Look, kind: PartKind, positions: usize, triangles: usize) -> Result<u32> {
         let too_many = || Error::Unsupported("a picture of more than 2^32 points".into());
         let total = self.positions.len() + positions;
         u32::try_from(total.max(self.triangles.len() + triangles)).map_err(|_| too_many())?;
         self.positions.try_reserve_exact(positions)?;
         self.normals.try_reserve_exact(positions)?;
         self.triangles.try_reserve_exact(triangles)?;
-        self.part_of.try_reserve_exact(triangles)?;
+        self.part_index.try_reserve_exact(triangles)?;
         self.parts.push(MeshPart {
             look,
             colour: linear(look.colour),
             kind,
-            chart: None,
+            value_colors: None,
         });
         u32::try_from(self.positions.len()).map_err(|_| too_many())
     }
@@ -221,12 +221,12 @@ impl Geometry {
         let part = (self.parts.len() - 1) as u32;
         self.triangles
             .extend(triangles.iter().map(|triangle| triangle.map(|index| first + index)));
-        self.part_of.resize(self.triangles.len(), part);
+        self.part_index.resize(self.triangles.len(), part);
     }
 
-    /// The part that a triangle belongs to.
+    /// The part of a triangle.
     pub fn part(&self, triangle: u32) -> &MeshPart {
-        &self.parts[self.part_of[triangle as usize] as usize]
+        &self.parts[self.part_index[triangle as usize] as usize]
     }
 
     /// The corners of a triangle.
@@ -234,17 +234,17 @@ impl Geometry {
         self.triangles[triangle as usize].map(|index| self.positions[index as usize])
     }
 
-    /// The colour inside a triangle, as light.
+    /// The color inside a triangle, in linear RGB.
     pub fn colour(&self, triangle: u32, weights: [f32; 3]) -> Vec3 {
         let part = self.part(triangle);
-        let Some(Chart { scale, first, values }) = &part.chart else {
+        let Some(ValueColors { scale, first, values }) = &part.value_colors else {
             return part.colour;
         };
         let corners = self.triangles[triangle as usize].map(|index| values[(index - first) as usize]);
         scale.colour((0..3).map(|i| corners[i] * weights[i]).sum())
     }
 
-    /// The smooth normal inside a triangle, towards the eye; and whether that is its outside.
+    /// The interpolated normal inside a triangle, oriented toward the eye, and whether the outside faces the eye.
     pub fn normal(&self, triangle: u32, weights: [f32; 3], to_eye: Vec3) -> (Vec3, bool) {
         let [a, b, c] = self.corners(triangle);
         let face = (b - a).cross(c - a);
@@ -253,9 +253,9 @@ impl Geometry {
         let smooth = (0..3).map(|i| corners[i] * weights[i]).sum::<Vec3>();
         let smooth = smooth.try_normalize().unwrap_or(face.normalize_or_zero());
         let normal = if front { smooth } else { -smooth };
-        // Near the outline a smooth normal may point away from the eye: bring it back to the rim.
-        let away = normal.dot(to_eye).min(0.0);
-        ((normal - to_eye * away).normalize_or_zero(), front)
+        // Near the silhouette, an interpolated normal can point away from the eye. It is projected back.
+        let excess = normal.dot(to_eye).min(0.0);
+        ((normal - to_eye * excess).normalize_or_zero(), front)
     }
 }
 
@@ -266,14 +266,14 @@ fn check_indices(indices: &[u32], count: usize) -> Result<()> {
     }
 }
 
-/// Two axes in the plane, along those of the world where it is level or upright.
+/// Two axes in the plane, aligned with those of the world if the plane is.
 fn ground_axes(normal: Vec3) -> [Vec3; 2] {
     let helper = if normal.x.abs() < 0.9 { Vec3::X } else { Vec3::Z };
     let first = (helper - normal * helper.dot(normal)).normalize_or_zero();
     [first, normal.cross(first)]
 }
 
-/// The largest of 1, 2, 5 times a power of ten that is not above `length`.
+/// The largest of 1, 2, 5 times a power of ten that is at most `length`.
 fn round_length(length: f32) -> f32 {
     let power = 10.0_f32.powf(length.log10().floor());
     let steps = [5.0, 2.0, 1.0].map(|step| step * power);

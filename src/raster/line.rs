@@ -1,12 +1,12 @@
-//! Lines to fragments.
+//! Rasterization of lines.
 
 use super::fragment::{Fragment, PixelVertex, Window};
 
-/// Calls `sink` once per column (a line that is wider than high) or per row (else) of `window` that the line crosses at
-/// a pixel's centre.
+/// Calls `sink` for each column of `window`, for a line wider than high, or else for each row, whose pixel center line
+/// the line crosses.
 ///
-/// The start belongs to the line and the end does not, so a chain of lines visits no centre twice. A line with a
-/// coordinate that is not finite has no fragments, nor has one that is shorter than the way to the next centre.
+/// The start belongs to the line and the end does not, so a chain of lines visits no pixel twice. A line with a
+/// coordinate that is not finite has no fragments; neither has one that ends before the next pixel center.
 pub fn rasterise_line(window: &Window, vertices: &[PixelVertex; 2], mut sink: impl FnMut(Fragment)) {
     let [a, b] = vertices;
     let finite = [a, b].iter().all(|vertex| {
@@ -15,14 +15,14 @@ pub fn rasterise_line(window: &Window, vertices: &[PixelVertex; 2], mut sink: im
     if !finite {
         return;
     }
-    // Along the major axis every centre is visited; across it the pixel is the one that the line is in there.
-    let wide = (b.x - a.x).abs() >= (b.y - a.y).abs();
-    let (major, minor) = if wide {
+    // Every center along the major axis is visited. The pixel across it is the one that contains the line there.
+    let is_wide = (b.x - a.x).abs() >= (b.y - a.y).abs();
+    let (major, minor) = if is_wide {
         ((a.x, b.x), (a.y, b.y))
     } else {
         ((a.y, b.y), (a.x, b.x))
     };
-    let (major_window, minor_window) = if wide {
+    let (major_window, minor_window) = if is_wide {
         (window.left..window.right, window.top..window.bottom)
     } else {
         (window.top..window.bottom, window.left..window.right)
@@ -31,7 +31,7 @@ pub fn rasterise_line(window: &Window, vertices: &[PixelVertex; 2], mut sink: im
     if length == 0.0 {
         return;
     }
-    // Centres in [start, end) when walked forwards, in (end, start] when walked backwards.
+    // Centers in [start, end) for a forward line, in (end, start] for a backward one.
     let (low, high) = if length > 0.0 {
         ((major.0 - 0.5).ceil(), (major.1 - 0.5).ceil())
     } else {
@@ -42,19 +42,19 @@ pub fn rasterise_line(window: &Window, vertices: &[PixelVertex; 2], mut sink: im
     if low >= high {
         return;
     }
-    for along in low as u32..high as u32 {
-        let share = (f64::from(along) + 0.5 - major.0) / length;
-        let across = (minor.0 + share * (minor.1 - minor.0)).floor();
-        if across < f64::from(minor_window.start) || across >= f64::from(minor_window.end) {
+    for major_pixel in low as u32..high as u32 {
+        let t = (f64::from(major_pixel) + 0.5 - major.0) / length;
+        let minor_position = (minor.0 + t * (minor.1 - minor.0)).floor();
+        if minor_position < f64::from(minor_window.start) || minor_position >= f64::from(minor_window.end) {
             continue;
         }
-        let (first, second) = ((1.0 - share) * a.reciprocal, share * b.reciprocal);
+        let (first, second) = ((1.0 - t) * a.reciprocal, t * b.reciprocal);
         let weights = [first / (first + second), second / (first + second)];
         let depth = weights[0] * a.depth + weights[1] * b.depth;
-        let (x, y) = if wide {
-            (along, across as u32)
+        let (x, y) = if is_wide {
+            (major_pixel, minor_position as u32)
         } else {
-            (across as u32, along)
+            (minor_position as u32, major_pixel)
         };
         sink(Fragment {
             x,
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_or_broken_line_stays_in_the_window() {
+    fn a_long_or_invalid_line_stays_in_the_window() {
         assert_eq!(pixels([(-1e300, 2.5), (1e300, 2.5)]).len(), 8);
         assert!(pixels([(0.0, f64::NAN), (4.0, 4.0)]).is_empty());
         assert!(pixels([(f64::INFINITY, 1.0), (4.0, 4.0)]).is_empty());

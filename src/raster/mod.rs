@@ -1,12 +1,12 @@
-//! One depth-buffer rasteriser, for pictures and for contact in image space.
+//! A depth-buffer rasterizer, for images and for image-space contact.
 //!
-//! The core turns triangles and lines into [`Fragment`]s: [`View::triangle`] and [`View::line`] project and clip,
-//! [`rasterise_triangle`] and [`rasterise_line`] decide which pixels are covered, and a closure receives each of them with
-//! its depth, its barycentric weights and the side that is seen. It knows nothing of buffers, colours or light.
-//! [`traverse_line`] gives all pixels that a line passes through.
+//! The core turns triangles and lines into [`Fragment`]s. [`View::triangle`] and [`View::line`] project and clip.
+//! [`rasterise_triangle`] and [`rasterise_line`] determine the covered pixels. A closure receives each pixel with its
+//! depth, barycentric weights and visible side. The core has no buffers, colors or lights. [`traverse_line`] visits
+//! all pixels that a line passes through.
 //!
-//! On top of it, [`Scene::draw`] makes pictures: the nearest triangle of each sample is found first, then each pixel is
-//! shaded once, with a shadow map and ambient occlusion that are drawn with the same core.
+//! [`Scene::draw`] renders images with the core: it finds the nearest triangle of each sample, then shades each pixel
+//! once. Shadow map and ambient occlusion are rendered with the same core.
 
 mod camera;
 mod fragment;

@@ -1,11 +1,11 @@
-//! Pictures of a scene.
+//! Rendering of a scene into an image.
 
 use super::camera::Camera;
 use super::fragment::Window;
-use super::geometry::{Geometry, Kind};
+use super::geometry::{Geometry, PartKind};
 use super::occlusion::Occlusion;
 use super::scene::Scene;
-use super::shade::{self, Encoder, Lights, SurfacePlace};
+use super::shade::{self, Encoder, Lights, ShadingPoint};
 use super::shadow::ShadowMap;
 use super::view::{Homogeneous, View};
 use crate::Result;
@@ -14,18 +14,18 @@ use crate::base::Error;
 use crate::base::{ensure, memory};
 use glam::Vec3;
 
-/// Samples per pixel along each axis.
-const FINE: u32 = 2;
-/// Samples that are kept at once; a large picture is drawn in bands of rows.
-const BAND: u32 = 1 << 18;
-/// The longer side of the picture that ambient occlusion is computed in.
-const SMALL: f64 = 640.0;
-/// The longest side of a picture.
+/// The samples per pixel along each axis.
+const SUPERSAMPLING: u32 = 2;
+/// The most samples in memory at once; a large image is rendered in bands of rows.
+const BAND_SAMPLES: u32 = 1 << 18;
+/// The longer side of the image for ambient occlusion, in pixels.
+const OCCLUSION_SIZE: f64 = 640.0;
+/// The longest side of an image, in pixels.
 const MAX_SIZE: u32 = 16_384;
-/// No triangle.
+/// The index of no triangle.
 const NOTHING: u32 = u32::MAX;
 
-/// Pixels, row by row from the upper left.
+/// An image: pixels row by row from the upper left.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -43,38 +43,38 @@ const NOTHING: u32 = u32::MAX;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// Pixels in a row.
+    /// The number of pixels in a row.
     pub width: u32,
-    /// Rows.
+    /// The number of rows.
     pub height: u32,
-    /// Red, green, blue, alpha (sRGB); width x height of them.
+    /// Red, green, blue and alpha (sRGB) of width x height pixels.
     pub pixels: Vec<[u8; 4]>,
 }
 
 impl Scene<'_> {
-    /// A picture of the scene, anti-aliased with four samples per pixel. The same scene gives the same picture.
+    /// Renders the scene, anti-aliased with four samples per pixel. The result is deterministic.
     ///
-    /// Triangles and lines with a coordinate that is not finite are left out. Beside the picture it takes about 50 bytes
-    /// per triangle and 30 MB.
+    /// Triangles and lines with a coordinate that is not finite are ignored. Besides the image, rendering takes about
+    /// 50 bytes per triangle and 30 MB.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a width or height that is not 1 to 16384, an index without a position, a camera that
-    /// [`Camera::view`] refuses. [`Error::OutOfMemory`].
+    /// [`Error::InvalidArgument`] if the width or height is not 1 to 16384, an index has no position, or
+    /// [`Camera::view`] returns an error. [`Error::OutOfMemory`].
     pub fn draw(&self, camera: &Camera, width: u32, height: u32) -> Result<Image> {
         for (name, size) in [("width", width), ("height", height)] {
             ensure!((1..=MAX_SIZE).contains(&size), "{name} is {size}, not 1 to {MAX_SIZE}");
         }
-        let view = camera.view(width * FINE, height * FINE)?;
+        let view = camera.view(width * SUPERSAMPLING, height * SUPERSAMPLING)?;
         let geometry = Geometry::new(self, &view, height)?;
-        let painter = Painter::new(&geometry, camera, view, [width, height], self)?;
+        let renderer = Renderer::new(&geometry, camera, view, [width, height], self)?;
         let mut pixels = memory::reserved(width as usize * height as usize)?;
-        painter.paint(&mut pixels)?;
+        renderer.render(&mut pixels)?;
         Ok(Image { width, height, pixels })
     }
 }
 
-/// Draws one picture.
-struct Painter<'a> {
+/// The renderer of one image.
+struct Renderer<'a> {
     geometry: &'a Geometry,
     view: View,
     width: u32,
@@ -82,21 +82,21 @@ struct Painter<'a> {
     lights: Lights,
     shadows: ShadowMap,
     occlusion: Occlusion,
-    /// How far something hides the sky, in metres.
+    /// The largest distance of an occluder, m.
     reach: f32,
     encoder: Encoder,
 }
 
-/// What a sample sees first.
+/// The nearest triangle at a sample.
 #[derive(Clone, Copy)]
 struct PixelSample {
     depth: f32,
     triangle: u32,
-    /// Of the first two corners.
+    /// The barycentric weights of the first two corners.
     weights: [f32; 2],
 }
 
-/// The colour of a sample, and how much it faces the eye, 0 to 1.
+/// The color of a sample, and the cosine between normal and view direction.
 #[derive(Clone, Copy)]
 struct Shaded {
     colour: Vec3,
@@ -104,22 +104,22 @@ struct Shaded {
 }
 
 /// The samples of a pixel.
-type Samples = [PixelSample; (FINE * FINE) as usize];
+type Samples = [PixelSample; (SUPERSAMPLING * SUPERSAMPLING) as usize];
 
-impl<'a> Painter<'a> {
+impl<'a> Renderer<'a> {
     fn new(geometry: &'a Geometry, camera: &Camera, view: View, size: [u32; 2], scene: &Scene) -> Result<Self> {
         let [right, up, forward] = view.axes().map(|axis| axis.as_vec3());
         let lights = Lights::new([right, up, -forward]);
         let extent = scene.extent().map_or(0.0, |(low, high)| (high - low).length());
         let extent = if extent > 0.0 { extent } else { 1.0 };
         let longest = f64::from(size[0].max(size[1]));
-        let scale = (SMALL / longest).min(1.0);
+        let scale = (OCCLUSION_SIZE / longest).min(1.0);
         let small = size.map(|length| ((f64::from(length) * scale).round() as u32).max(1));
-        // Heights decide the scale of a view; this is what rounding has made of it.
+        // The height defines the scale of a view, here after rounding.
         let scale = f64::from(small[1]) / f64::from(size[1]);
         let reach = 0.09 * extent;
         let small_view = camera.view(small[0], small[1])?;
-        Ok(Painter {
+        Ok(Renderer {
             geometry,
             view,
             width: size[0],
@@ -133,21 +133,21 @@ impl<'a> Painter<'a> {
     }
 
     /// Appends all pixels, band by band.
-    fn paint(&self, pixels: &mut Vec<[u8; 4]>) -> Result<()> {
+    fn render(&self, pixels: &mut Vec<[u8; 4]>) -> Result<()> {
         let positions = &self.geometry.positions;
         let points = memory::collected(positions.iter().map(|&point| self.view.transform(point)))?;
-        let ghosts = self.geometry.parts.iter().any(|part| part.look.show_through > 0.0);
+        let hidden_layer = self.geometry.parts.iter().any(|part| part.look.show_through > 0.0);
 
-        let fine_width = self.width * FINE;
-        let rows = (BAND / fine_width / FINE).clamp(1, self.height);
-        let count = (rows * FINE * fine_width) as usize;
+        let fine_width = self.width * SUPERSAMPLING;
+        let rows = (BAND_SAMPLES / fine_width / SUPERSAMPLING).clamp(1, self.height);
+        let count = (rows * SUPERSAMPLING * fine_width) as usize;
         let mut front = memory::reserved(count)?;
-        let mut behind = memory::reserved(if ghosts { count } else { 0 })?;
+        let mut behind = memory::reserved(if hidden_layer { count } else { 0 })?;
         for top in (0..self.height).step_by(rows as usize) {
             let bottom = (top + rows).min(self.height);
-            self.find_nearest(&points, top, bottom, &mut front, |_| true);
-            if ghosts {
-                self.find_nearest(&points, top, bottom, &mut behind, |triangle| {
+            self.rasterize_nearest(&points, top, bottom, &mut front, |_| true);
+            if hidden_layer {
+                self.rasterize_nearest(&points, top, bottom, &mut behind, |triangle| {
                     self.geometry.part(triangle).look.show_through > 0.0
                 });
             }
@@ -155,17 +155,17 @@ impl<'a> Painter<'a> {
                 let background = shade::background((y as f32 + 0.5) / self.height as f32);
                 let empty = self.encoder.encode(background);
                 for x in 0..self.width {
-                    let place = ((y - top) * FINE * fine_width + x * FINE) as usize;
-                    let gather = |layer: &[PixelSample]| -> Samples {
-                        let below = place + fine_width as usize;
-                        [place, place + 1, below, below + 1].map(|place| layer[place])
+                    let sample_index = ((y - top) * SUPERSAMPLING * fine_width + x * SUPERSAMPLING) as usize;
+                    let pixel_samples = |layer: &[PixelSample]| -> Samples {
+                        let below = sample_index + fine_width as usize;
+                        [sample_index, sample_index + 1, below, below + 1].map(|sample_index| layer[sample_index])
                     };
-                    let seen = gather(&front);
+                    let seen = pixel_samples(&front);
                     if seen.iter().all(|sample| sample.triangle == NOTHING) {
                         pixels.push(empty);
                         continue;
                     }
-                    let hidden = ghosts.then(|| gather(&behind));
+                    let hidden = hidden_layer.then(|| pixel_samples(&behind));
                     let colour = self.pixel(x, y, &seen, hidden.as_ref(), background);
                     pixels.push(self.encoder.encode(colour));
                 }
@@ -174,21 +174,21 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// The nearest of some triangles in each sample of rows `top` to `bottom` of the picture.
-    fn find_nearest(
+    /// Finds the nearest accepted triangle at each sample of the image rows `top` to `bottom`.
+    fn rasterize_nearest(
         &self,
         points: &[Homogeneous],
         top: u32,
         bottom: u32,
         samples: &mut Vec<PixelSample>,
-        wanted: impl Fn(u32) -> bool,
+        accepts: impl Fn(u32) -> bool,
     ) {
-        let width = self.width * FINE;
+        let width = self.width * SUPERSAMPLING;
         let window = Window {
             left: 0,
-            top: top * FINE,
+            top: top * SUPERSAMPLING,
             right: width,
-            bottom: bottom * FINE,
+            bottom: bottom * SUPERSAMPLING,
         };
         let empty = PixelSample {
             depth: f32::INFINITY,
@@ -199,13 +199,13 @@ impl<'a> Painter<'a> {
         samples.resize(((window.bottom - window.top) * width) as usize, empty);
         for (triangle, corners) in self.geometry.triangles.iter().enumerate() {
             let triangle = triangle as u32;
-            if !wanted(triangle) {
+            if !accepts(triangle) {
                 continue;
             }
             let corners = corners.map(|index| points[index as usize]);
             self.view.transformed_triangle(&window, corners, |fragment| {
-                let place = (fragment.y - window.top) * width + fragment.x;
-                let sample = &mut samples[place as usize];
+                let sample_index = (fragment.y - window.top) * width + fragment.x;
+                let sample = &mut samples[sample_index as usize];
                 if fragment.depth < sample.depth {
                     *sample = PixelSample {
                         depth: fragment.depth,
@@ -217,7 +217,7 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// The colour of a pixel, and of the hidden instrument that shows through it.
+    /// The color of a pixel, including the hidden objects that show through.
     fn pixel(&self, x: u32, y: u32, front: &Samples, behind: Option<&Samples>, background: Vec3) -> Vec3 {
         let mut colours = self
             .shade_samples(x, y, front, background, false)
@@ -225,13 +225,13 @@ impl<'a> Painter<'a> {
         if let Some(behind) = behind {
             let hidden = |i: usize| behind[i].depth.is_finite() && behind[i].depth > front[i].depth;
             if (0..colours.len()).any(hidden) {
-                let ghosts = self.shade_samples(x, y, behind, background, true);
+                let shaded_hidden = self.shade_samples(x, y, behind, background, true);
                 for (i, colour) in colours.iter_mut().enumerate().filter(|(i, _)| hidden(*i)) {
-                    if let Some(ghost) = ghosts[i] {
+                    if let Some(shaded) = shaded_hidden[i] {
                         let look = &self.geometry.part(behind[i].triangle).look;
-                        let outline = (1.0 - ghost.facing).powi(2);
+                        let outline = (1.0 - shaded.facing).powi(2);
                         let strength = look.show_through.clamp(0.0, 1.0) * (0.3 + 0.7 * outline);
-                        *colour = colour.lerp(ghost.colour, strength);
+                        *colour = colour.lerp(shaded.colour, strength);
                     }
                 }
             }
@@ -239,7 +239,7 @@ impl<'a> Painter<'a> {
         colours.iter().sum::<Vec3>() / colours.len() as f32
     }
 
-    /// Shades a pixel's samples: together where they see one smooth surface, each on its own elsewhere.
+    /// Shades a pixel's samples: together if they are on one smooth surface, else separately.
     fn shade_samples(
         &self,
         x: u32,
@@ -247,25 +247,25 @@ impl<'a> Painter<'a> {
         samples: &Samples,
         background: Vec3,
         hidden: bool,
-    ) -> [Option<Shaded>; (FINE * FINE) as usize] {
+    ) -> [Option<Shaded>; (SUPERSAMPLING * SUPERSAMPLING) as usize] {
         let first = &samples[0];
-        let spread = self.view.metres_per_pixel(f64::from(first.depth)) as f32 * 12.0;
-        let alike = first.triangle != NOTHING
+        let spread = self.view.meters_per_pixel(f64::from(first.depth)) as f32 * 12.0;
+        let is_uniform = first.triangle != NOTHING
             && samples.iter().all(|sample| {
                 sample.triangle == first.triangle
                     || (sample.triangle != NOTHING
-                        && self.geometry.part_of[sample.triangle as usize]
-                            == self.geometry.part_of[first.triangle as usize]
+                        && self.geometry.part_index[sample.triangle as usize]
+                            == self.geometry.part_index[first.triangle as usize]
                         && (sample.depth - first.depth).abs() < spread)
             });
-        if alike {
-            let centre = [f64::from(x * FINE) + 1.0, f64::from(y * FINE) + 1.0];
+        if is_uniform {
+            let centre = [f64::from(x * SUPERSAMPLING) + 1.0, f64::from(y * SUPERSAMPLING) + 1.0];
             return [self.shade(centre, samples, background, hidden); 4];
         }
         let mut index = 0;
         samples.map(|sample| {
-            let column = f64::from(x * FINE + index % FINE) + 0.5;
-            let row = f64::from(y * FINE + index / FINE) + 0.5;
+            let column = f64::from(x * SUPERSAMPLING + index % SUPERSAMPLING) + 0.5;
+            let row = f64::from(y * SUPERSAMPLING + index / SUPERSAMPLING) + 0.5;
             index += 1;
             if sample.triangle == NOTHING {
                 return None;
@@ -274,7 +274,7 @@ impl<'a> Painter<'a> {
         })
     }
 
-    /// The colour at a place in the fine grid that these samples, all of one part, stand for; `hidden`: behind something.
+    /// The color at a position in the sample grid, for samples of one part. `hidden` is true behind another object.
     fn shade(&self, [x, y]: [f64; 2], samples: &[PixelSample], background: Vec3, hidden: bool) -> Option<Shaded> {
         let first = samples.first()?;
         let part = self.geometry.part(first.triangle);
@@ -282,35 +282,35 @@ impl<'a> Painter<'a> {
         let depth = samples.iter().map(|sample| sample.depth).sum::<f32>() / samples.len() as f32;
         let position = self.view.unproject(x, y, f64::from(depth));
         let to_eye = (self.view.origin().as_vec3() - position).normalize_or_zero();
-        // Normals change little within a pixel of one surface.
+        // Normals vary little within a pixel of one surface.
         let (normal, front) = self.geometry.normal(first.triangle, first.all_weights(), to_eye);
-        let footprint = self.view.metres_per_pixel(f64::from(depth)) as f32 * FINE as f32;
+        let footprint = self.view.meters_per_pixel(f64::from(depth)) as f32 * SUPERSAMPLING as f32;
         let mut colour = self.geometry.colour(first.triangle, first.all_weights());
-        let mut remaining = 1.0;
-        if let Kind::Ground(pattern) = &part.kind {
+        let mut opacity = 1.0;
+        if let PartKind::Ground(pattern) = &part.kind {
             let facing = normal.dot(to_eye).max(0.1);
-            let (tint, left) = shade::ground(pattern, position, footprint / facing);
+            let (tint, fade) = shade::ground(pattern, position, footprint / facing);
             colour *= tint;
-            remaining = left;
+            opacity = fade;
         }
-        // What is hidden is drawn as if in the open: inside tissue it would be black.
-        let (lit, open) = if hidden || part.kind == Kind::Thread {
+        // Hidden objects are shaded without shadows: inside tissue they would be black.
+        let (lit, sky) = if hidden || part.kind == PartKind::Thread {
             (1.0, 1.0)
         } else {
-            let scale = 1.0 / f64::from(FINE);
+            let scale = 1.0 / f64::from(SUPERSAMPLING);
             (
                 self.shadows.lit(position, normal),
-                self.occlusion.open(x * scale, y * scale, depth, self.reach),
+                self.occlusion.visibility(x * scale, y * scale, depth, self.reach),
             )
         };
-        let place = SurfacePlace {
+        let point = ShadingPoint {
             normal,
             to_eye,
             front,
             lit,
-            open,
+            sky,
         };
-        let mut shaded = self.lights.shade(look, colour, &place);
+        let mut shaded = self.lights.shade(look, colour, &point);
         if look.mesh_edges > 0.0 {
             let cover = samples
                 .iter()
@@ -320,13 +320,14 @@ impl<'a> Painter<'a> {
             shaded *= 1.0 - 0.75 * strength;
         }
         Some(Shaded {
-            colour: background.lerp(shaded, remaining),
+            colour: background.lerp(shaded, opacity),
             facing: normal.dot(to_eye).clamp(0.0, 1.0),
         })
     }
 
-    /// How much of a sample an edge of its triangle covers, 0 to 1; fades out where triangles are a few pixels.
-    fn edge_cover(&self, sample: &PixelSample, metres_per_pixel: f32) -> f32 {
+    /// The fraction of a sample that an edge of its triangle covers, 0 to 1. It fades out for triangles of a few
+    /// pixels.
+    fn edge_cover(&self, sample: &PixelSample, meters_per_pixel: f32) -> f32 {
         let corners = self.geometry.corners(sample.triangle);
         let [a, b, c] = corners;
         let area = (b - a).cross(c - a).length();
@@ -336,12 +337,12 @@ impl<'a> Painter<'a> {
         let mut smallest = f32::INFINITY;
         for i in 0..3 {
             let opposite = corners[(i + 1) % 3].distance(corners[(i + 2) % 3]);
-            let height = area / opposite.max(f32::MIN_POSITIVE) / metres_per_pixel;
+            let height = area / opposite.max(f32::MIN_POSITIVE) / meters_per_pixel;
             nearest = nearest.min(weights[i] * height);
             smallest = smallest.min(height);
         }
-        let room = shade::smoothstep(2.0, 8.0, smallest / half_width);
-        room * (1.0 - shade::smoothstep(half_width - 0.5, half_width + 0.5, nearest))
+        let fade = shade::smoothstep(2.0, 8.0, smallest / half_width);
+        fade * (1.0 - shade::smoothstep(half_width - 0.5, half_width + 0.5, nearest))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Pictures to PNG files.
+//! PNG output of images.
 
 use super::picture::Image;
 use crate::base::ensure;
@@ -6,13 +6,14 @@ use crate::{Error, Result};
 use std::path::Path;
 
 impl Image {
-    /// Writes the picture as a PNG file: eight bits per channel, sRGB.
+    /// Writes the image as a PNG file with eight bits per channel, sRGB.
     ///
-    /// It is written under another name beside `path` and then renamed, so that a write that fails leaves what was there.
+    /// The file is first written under another name in the same folder and then renamed. A failed write leaves an
+    /// existing file unchanged.
     ///
     /// # Errors
-    /// [`Error::Io`]: the file could not be written. [`Error::InvalidArgument`]: not `width` x `height` pixels.
-    /// [`Error::Unsupported`]: the crate was built without its feature `pictures`.
+    /// [`Error::Io`] if the file could not be written. [`Error::InvalidArgument`] if there are not `width` x `height`
+    /// pixels. [`Error::Unsupported`] if the crate was built without its feature `pictures`.
     pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
         let expected = u64::from(self.width) * u64::from(self.height);
         ensure!(
@@ -44,13 +45,13 @@ fn write(image: &Image, path: &Path) -> Result<()> {
     let written =
         encode(image, &temporary).and_then(|()| std::fs::rename(&temporary, path).map_err(png::EncodingError::from));
     written.map_err(|cause| {
-        // Whether there is anything left to remove changes nothing about the failure.
+        // The original error is reported, even if nothing can be removed.
         let _ = std::fs::remove_file(&temporary);
         failure(&cause)
     })
 }
 
-/// A number that no other write, here or in another process, uses at the same time.
+/// A string that no other write uses at the same time, in this or another process.
 #[cfg(feature = "pictures")]
 fn unique() -> String {
     use std::sync::atomic::{AtomicU32, Ordering};

@@ -1,13 +1,14 @@
-//! Colours for numbers.
+//! Color scales for values.
 //!
-//! They lie on straight lines in OKLab (Ottosson, "A perceptual color space for image processing", 2020), so that equal steps of a
-//! number look equally far apart, and lightness alone tells which of two is larger, in print and to those who see few colours.
+//! Scales are straight lines in OKLab (Ottosson, "A perceptual color space for image processing", 2020). Equal steps
+//! of a value look equally large. Lightness alone shows which of two values is larger, also in print and for
+//! color-blind readers.
 
 use glam::{Mat3, Vec3};
 
 use crate::base::{Result, all_finite, ensure};
 
-/// Which colours numbers have.
+/// The colors of a scale.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -24,14 +25,14 @@ use crate::base::{Result, all_finite, ensure};
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Colours {
-    /// From blue by a light grey, in the middle, to red: for what has a sign.
+    /// From blue over a light gray in the middle to red, for signed values.
     #[default]
     Diverging,
-    /// From a dark violet by green to a light yellow: for what has none.
+    /// From a dark violet over green to a light yellow, for unsigned values.
     Sequential,
 }
 
-/// The colours of numbers between two.
+/// A color scale over a range of values.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -43,22 +44,22 @@ pub enum Colours {
 /// #     scene.draw(&scene.camera(Vec3::Y, Vec3::NEG_Z, 0.6, 1.0)?, 32, 32)
 /// # };
 /// let scale = ColourScale { colours: Colours::Sequential, low: 0.0, high: 0.3 };
-/// // A value above the last one has its colour.
+/// A value above the range has the last color.
 /// assert_eq!(drawn(0.9, scale)?, drawn(0.3, scale)?);
 /// assert_ne!(drawn(0.1, scale)?, drawn(0.3, scale)?);
 /// # Ok::<(), sinew::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColourScale {
-    /// Which.
+    /// The colors.
     pub colours: Colours,
-    /// What has the first colour, as has what is below.
+    /// The value of the first color. Values below have it too.
     pub low: f32,
-    /// What has the last colour, as has what is above.
+    /// The value of the last color. Values above have it too.
     pub high: f32,
 }
 
-/// Numbers that a thing is coloured by.
+/// Values that color an object.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -75,34 +76,34 @@ pub struct ColourScale {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coloured<'a> {
-    /// One for each position; between them they are interpolated.
+    /// A value for each position, interpolated in between.
     pub values: &'a [f32],
-    /// What colours they have.
+    /// The color scale.
     pub scale: ColourScale,
 }
 
 impl ColourScale {
-    /// The colour of a number: red, green and blue as light, 0 to 1.
+    /// The color of a value in linear RGB, 0 to 1.
     pub(super) fn colour(&self, value: f32) -> Vec3 {
         let (low, high) = (f64::from(self.low), f64::from(self.high));
-        let part = ((f64::from(value) - low) / (high - low)).clamp(0.0, 1.0) as f32;
+        let t = ((f64::from(value) - low) / (high - low)).clamp(0.0, 1.0) as f32;
         match self.colours {
             Colours::Diverging => {
-                let side = 2.0 * part - 1.0;
-                let end = if side < 0.0 { BLUE } else { RED };
-                light(GREY.lerp(end, side.abs()))
+                let signed = 2.0 * t - 1.0;
+                let end = if signed < 0.0 { BLUE } else { RED };
+                oklab_to_linear(GREY.lerp(end, signed.abs()))
             }
             Colours::Sequential => {
-                let along = part * (STOPS.len() - 1) as f32;
-                let stop = (along as usize).min(STOPS.len() - 2);
-                light(STOPS[stop].lerp(STOPS[stop + 1], along - stop as f32))
+                let position = t * (STOPS.len() - 1) as f32;
+                let stop = (position as usize).min(STOPS.len() - 2);
+                oklab_to_linear(STOPS[stop].lerp(STOPS[stop + 1], position - stop as f32))
             }
         }
     }
 }
 
 impl Coloured<'_> {
-    /// Refuses what cannot be drawn.
+    /// Returns an error for an invalid scale or invalid values.
     pub(super) fn check(&self, count: usize) -> Result<()> {
         let ColourScale { low, high, .. } = self.scale;
         ensure!(
@@ -115,8 +116,8 @@ impl Coloured<'_> {
     }
 }
 
-/// Lightness, from green to red, from blue to yellow: all that lies between is a colour of screens, and not so dark that light and
-/// shadow are lost.
+/// OKLab lightness, and the axes from green to red and from blue to yellow. All colors in between are in the sRGB
+/// gamut, and light enough to leave shading visible.
 const GREY: Vec3 = Vec3::new(0.93, 0.0, 0.0);
 const BLUE: Vec3 = Vec3::new(0.45, -0.03, -0.16);
 const RED: Vec3 = Vec3::new(0.48, 0.17, 0.08);
@@ -127,18 +128,18 @@ const STOPS: [Vec3; 4] = [
     Vec3::new(0.94, -0.04, 0.16),
 ];
 
-/// A colour of OKLab as light.
-fn light(lab: Vec3) -> Vec3 {
-    const CONES: Mat3 = Mat3::from_cols(
+/// Converts an OKLab color to linear RGB.
+fn oklab_to_linear(lab: Vec3) -> Vec3 {
+    const LMS_FROM_OKLAB: Mat3 = Mat3::from_cols(
         Vec3::new(1.0, 1.0, 1.0),
         Vec3::new(0.396_337_78, -0.105_561_346, -0.089_484_18),
         Vec3::new(0.215_803_76, -0.063_854_17, -1.291_485_5),
     );
-    const LIGHT: Mat3 = Mat3::from_cols(
+    const RGB_FROM_LMS: Mat3 = Mat3::from_cols(
         Vec3::new(4.076_741_7, -1.268_438, -0.004_196_086_3),
         Vec3::new(-3.307_711_6, 2.609_757_4, -0.703_418_6),
         Vec3::new(0.230_969_94, -0.341_319_38, 1.707_614_7),
     );
-    let cones = CONES * lab;
-    (LIGHT * (cones * cones * cones)).clamp(Vec3::ZERO, Vec3::ONE)
+    let lms = LMS_FROM_OKLAB * lab;
+    (RGB_FROM_LMS * (lms * lms * lms)).clamp(Vec3::ZERO, Vec3::ONE)
 }

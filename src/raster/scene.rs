@@ -1,11 +1,11 @@
-//! What a picture shows.
+//! The contents of an image.
 
 use super::camera::Camera;
 use super::scale::Coloured;
 use crate::Result;
 use glam::Vec3;
 
-/// How a thing looks.
+/// The appearance of an object.
 ///
 /// ```
 /// use sinew::raster::Look;
@@ -14,21 +14,21 @@ use glam::Vec3;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// Red, green, blue as on a screen (sRGB), 0 to 1.
+    /// The color in sRGB, 0 to 1.
     pub colour: [f32; 3],
-    /// From 0, dull, to 1, wet.
+    /// The gloss, from 0 for dull to 1 for wet.
     pub gloss: f32,
-    /// Whether both sides are outsides, as of a cloth. Else the side away from the normals is drawn darker, as the
-    /// inside of something cut open.
+    /// True if both sides are outsides, as for a cloth. Otherwise the side away from the normals is drawn darker, like
+    /// the inside of something cut open.
     pub two_sided: bool,
-    /// How strongly the edges of the mesh are drawn, from 0, not at all, to 1.
+    /// The strength of the mesh edges, from 0 for invisible to 1.
     pub mesh_edges: f32,
-    /// How strongly it shows through what hides it, from 0, not at all, to 1; strongest at its outline.
+    /// The visibility through objects in front, from 0 for none to 1. It is highest at the silhouette.
     pub show_through: f32,
 }
 
 impl Look {
-    /// What the looks below have in common.
+    /// The common properties of the looks below.
     const MATT: Look = Look {
         colour: [0.0; 3],
         gloss: 0.0,
@@ -44,14 +44,14 @@ impl Look {
         ..Look::MATT
     };
 
-    /// What a cut has bared of it.
+    /// Liver tissue exposed by a cut.
     pub const INSIDE: Look = Look {
         colour: [0.46, 0.10, 0.11],
         gloss: 0.5,
         ..Look::MATT
     };
 
-    /// A light membrane with both sides alike and its mesh drawn faintly.
+    /// A light membrane with equal sides and a faint mesh.
     pub const CLOTH: Look = Look {
         colour: [0.80, 0.58, 0.52],
         gloss: 0.3,
@@ -60,7 +60,7 @@ impl Look {
         ..Look::MATT
     };
 
-    /// An instrument, visible through the tissue that hides it.
+    /// An instrument, visible through tissue.
     pub const INSTRUMENT: Look = Look {
         colour: [0.50, 0.57, 0.64],
         gloss: 0.9,
@@ -68,20 +68,20 @@ impl Look {
         ..Look::MATT
     };
 
-    /// Where an instrument presses, and how hard.
+    /// A contact and its force.
     pub const CONTACT: Look = Look {
         colour: [0.95, 0.80, 0.10],
         show_through: 0.9,
         ..Look::MATT
     };
 
-    /// A plane to stand on.
+    /// A ground plane.
     pub const GROUND: Look = Look {
         colour: [0.85, 0.86, 0.88],
         ..Look::MATT
     };
 
-    /// What is coloured by numbers: dull, so that light changes its colours little.
+    /// An object colored by values. It is dull, so that lighting changes its colors little.
     pub const CHART: Look = Look {
         colour: [0.8, 0.8, 0.8],
         gloss: 0.15,
@@ -89,7 +89,7 @@ impl Look {
         ..Look::MATT
     };
 
-    /// Springs of a body that has no surface.
+    /// The springs of a body without a surface.
     pub const SPRINGS: Look = Look {
         colour: [0.70, 0.33, 0.27],
         gloss: 0.2,
@@ -97,13 +97,13 @@ impl Look {
         ..Look::MATT
     };
 
-    /// The same in another colour (sRGB, 0 to 1).
+    /// The same look in another color (sRGB, 0 to 1).
     pub const fn coloured(self, colour: [f32; 3]) -> Look {
         Look { colour, ..self }
     }
 }
 
-/// Triangles between points.
+/// A surface of triangles.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -119,13 +119,13 @@ impl Look {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Surface<'a> {
-    /// Where the points are, in metres.
+    /// The positions of the points, m.
     pub positions: &'a [Vec3],
-    /// Three indices each, outward by the right-hand rule.
+    /// Three indices for each triangle, outward by the right-hand rule.
     pub triangles: &'a [[u32; 3]],
-    /// How it looks.
+    /// The appearance.
     pub look: Look,
-    /// Numbers that it is coloured by; `None`: as it looks.
+    /// The values that color the surface; `None` for the look's color.
     pub coloured: Option<Coloured<'a>>,
 }
 
@@ -145,19 +145,19 @@ pub struct Surface<'a> {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Lines<'a> {
-    /// Where the points are, in metres.
+    /// The positions of the points, m.
     pub positions: &'a [Vec3],
-    /// Two indices each.
+    /// Two indices for each line.
     pub pairs: &'a [[u32; 2]],
-    /// Thickness in the picture, in thousandths of its height.
+    /// The thickness in the image, in thousandths of its height.
     pub thickness: f32,
-    /// How they look.
+    /// The appearance.
     pub look: Look,
-    /// Numbers that they are coloured by; `None`: as they look.
+    /// The values that color the lines; `None` for the look's color.
     pub coloured: Option<Coloured<'a>>,
 }
 
-/// The shape of an instrument or of the surroundings, in world coordinates.
+/// A geometric shape, for an instrument or the environment, in world coordinates.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -170,33 +170,33 @@ pub struct Lines<'a> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// A ball.
+    /// A sphere.
     Sphere {
-        /// Its middle, in metres.
+        /// The center, m.
         centre: Vec3,
-        /// In metres.
+        /// The radius, m.
         radius: f32,
     },
     /// All points within `radius` of a segment.
     Capsule {
-        /// One end of the segment, in metres.
+        /// One end of the segment, m.
         start: Vec3,
-        /// Its other end, in metres.
+        /// The other end, m.
         end: Vec3,
-        /// In metres.
+        /// The radius, m.
         radius: f32,
     },
-    /// The boundary of a half-space, drawn as a faint checkerboard that fades out around the scene; invisible from
-    /// behind.
+    /// The boundary of a half-space, drawn as a faint checkerboard that fades out around the scene. It is invisible
+    /// from behind.
     Plane {
-        /// Any point of it, in metres.
+        /// A point of the plane, m.
         point: Vec3,
-        /// Towards the free side, of any length.
+        /// The normal toward the free side, of any length.
         normal: Vec3,
     },
 }
 
-/// Everything that a picture shows; borrows the bodies' arrays.
+/// The contents of an image. It borrows the bodies' arrays.
 ///
 /// ```
 /// use glam::Vec3;
@@ -218,33 +218,35 @@ pub struct Scene<'a> {
     pub surfaces: Vec<Surface<'a>>,
     /// Bodies without triangles.
     pub lines: Vec<Lines<'a>>,
-    /// Instruments and surroundings.
+    /// Instruments and environment.
     pub shapes: Vec<(Shape, Look)>,
 }
 
 impl Scene<'_> {
-    /// A camera that has the bodies in the frame, and of the instruments what is near them.
+    /// A camera with the bodies in the frame, and the parts of instruments near them.
     ///
-    /// The arguments are those of [`Camera::fitted`]. An instrument counts as far as a quarter of the bodies' size around their
-    /// box, so that a long shaft leaves the frame instead of making the tissue small.
+    /// The arguments are those of [`Camera::fitted`]. The bodies' bounding box, extended by a quarter of its diagonal,
+    /// limits the parts of instruments that count. So a long shaft leaves the frame and does not make the tissue
+    /// small.
     ///
     /// # Errors
     /// Those of [`Camera::fitted`].
     pub fn camera(&self, direction: Vec3, up: Vec3, field_of_view: f32, aspect: f32) -> Result<Camera> {
         let (low, high) = bounds(self.body_points());
-        let room = Vec3::splat((high - low).length() / 4.0);
-        let no_bodies = low.x > high.x;
-        let near_bodies = |point: &Vec3| no_bodies || (point.cmpge(low - room).all() && point.cmple(high + room).all());
+        let margin = Vec3::splat((high - low).length() / 4.0);
+        let has_no_bodies = low.x > high.x;
+        let is_near_bodies =
+            |point: &Vec3| has_no_bodies || (point.cmpge(low - margin).all() && point.cmple(high + margin).all());
         let instruments = self
             .shapes
             .iter()
             .flat_map(|(shape, _)| shape.outline())
-            .filter(near_bodies);
+            .filter(is_near_bodies);
         let points = self.body_points().chain(instruments);
         Camera::fitted(points, direction, up, field_of_view, aspect)
     }
 
-    /// The box around the bodies; around the instruments where there are none.
+    /// The bounding box of the bodies, or of the instruments if there are no bodies.
     pub(crate) fn extent(&self) -> Option<(Vec3, Vec3)> {
         let instruments = self.shapes.iter().flat_map(|(shape, _)| shape.outline());
         let finite = instruments.filter(|point| point.is_finite());
@@ -273,7 +275,7 @@ impl Shape {
             Shape::Capsule { start, end, radius } => (start, end, radius),
             Shape::Plane { .. } => return Vec::new(),
         };
-        // Along the segment too: the part near the bodies counts where the ends may be far.
+        // Points along the segment too: the part near the bodies counts even if the ends are far away.
         const STOPS: u8 = 16;
         let directions = super::tessellate::directions();
         let stops = if start == end { 0 } else { STOPS };
@@ -284,7 +286,7 @@ impl Shape {
     }
 }
 
-/// The box around points; without any, low is above high.
+/// The bounding box of points. Without points, the lower corner is above the upper one.
 pub(crate) fn bounds(points: impl Iterator<Item = Vec3>) -> (Vec3, Vec3) {
     points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), point| {
         (low.min(point), high.max(point))

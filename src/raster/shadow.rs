@@ -1,22 +1,22 @@
-//! Shadows of the key light: the scene's depth as the light sees it.
+//! Shadows of the key light by a depth map from the light.
 
 use super::fragment::Window;
-use super::geometry::{Geometry, Kind};
+use super::geometry::{Geometry, PartKind};
 use super::scene::bounds;
 use super::view::View;
 use crate::Result;
 use crate::base::memory;
 use glam::Vec3;
 
-/// Texels along each side.
+/// The texels along each side.
 const SIZE: u32 = 1024;
-/// Texels across the filter, which softens the edges of shadows.
+/// The texels across the filter, which softens the edges of shadows.
 const TAPS: usize = 8;
-/// Columns and rows of the filter that are looked at first.
+/// The columns and rows of the filter that are tested first.
 const PROBES: [usize; 3] = [0, 4, 7];
 
-/// A shadow map (Williams, "Casting curved shadows on curved surfaces", 1978), softened
-/// by percentage-closer filtering (Reeves et al., "Rendering antialiased shadows with depth maps", 1987).
+/// A shadow map (Williams, "Casting curved shadows on curved surfaces", 1978) with percentage-closer filtering (Reeves
+/// et al., "Rendering antialiased shadows with depth maps", 1987).
 pub(crate) struct ShadowMap {
     view: View,
     depths: Vec<f32>,
@@ -24,10 +24,10 @@ pub(crate) struct ShadowMap {
 }
 
 impl ShadowMap {
-    /// The shadows of everything solid in light from `direction` (towards the light, length one).
+    /// Renders the depths of all solid parts for light from `direction`, a unit vector toward the light.
     pub fn new(geometry: &Geometry, direction: Vec3) -> Result<Self> {
         let solid =
-            || (0..geometry.triangles.len() as u32).filter(|&triangle| geometry.part(triangle).kind == Kind::Solid);
+            || (0..geometry.triangles.len() as u32).filter(|&triangle| geometry.part(triangle).kind == PartKind::Solid);
         let points = || {
             solid()
                 .flat_map(|triangle| geometry.corners(triangle))
@@ -55,8 +55,8 @@ impl ShadowMap {
         let window = Window::new(SIZE, SIZE);
         for triangle in solid() {
             view.triangle(&window, geometry.corners(triangle), |fragment| {
-                let place = fragment.y as usize * SIZE as usize + fragment.x as usize;
-                if let Some(depth) = depths.get_mut(place) {
+                let texel_index = fragment.y as usize * SIZE as usize + fragment.x as usize;
+                if let Some(depth) = depths.get_mut(texel_index) {
                     *depth = depth.min(fragment.depth);
                 }
             });
@@ -68,14 +68,14 @@ impl ShadowMap {
         })
     }
 
-    /// How much of the light reaches a point of a surface, 0 to 1.
+    /// The fraction of the light that reaches a point of a surface, 0 to 1.
     pub fn lit(&self, position: Vec3, normal: Vec3) -> f32 {
-        // Off the surface, so that it does not shade itself.
-        let Some(place) = self.view.project(position + normal * (3.0 * self.texel)) else {
+        // Offset from the surface, so that it does not shadow itself.
+        let Some(projected) = self.view.project(position + normal * (3.0 * self.texel)) else {
             return 1.0;
         };
-        let depth = place.depth as f32 - self.texel;
-        let (x, y) = (place.x as f32 - 0.5, place.y as f32 - 0.5);
+        let depth = projected.depth as f32 - self.texel;
+        let (x, y) = (projected.x as f32 - 0.5, projected.y as f32 - 0.5);
         let (low, high) = (TAPS as f32 / 2.0, (SIZE - TAPS as u32 / 2) as f32 - 1.0);
         if !(x >= low && y >= low && x < high && y < high) {
             return 1.0;
@@ -86,27 +86,27 @@ impl ShadowMap {
             let texel = self.depths.get((top + row) * SIZE as usize + left + column);
             texel.is_none_or(|&texel| texel >= depth)
         };
-        // Nearly everywhere the whole filter agrees.
+        // Nearly everywhere, all texels of the filter agree.
         let probes = PROBES.map(|row| PROBES.map(|column| in_light(column, row)));
         let count = probes.as_flattened().iter().filter(|&&lit| lit).count();
         if count == 0 || count == PROBES.len() * PROBES.len() {
             return if count == 0 { 0.0 } else { 1.0 };
         }
-        let (across, down) = (weights(x.fract()), weights(y.fract()));
+        let (column_weights, row_weights) = (weights(x.fract()), weights(y.fract()));
         let mut light = 0.0;
-        for (i, weight) in down.iter().enumerate() {
+        for (i, weight) in row_weights.iter().enumerate() {
             let start = (top + i) * SIZE as usize + left;
             let texels = self.depths.get(start..start + TAPS).unwrap_or(&[]);
-            for (texel, share) in texels.iter().zip(across) {
-                light += if *texel >= depth { weight * share } else { 0.0 };
+            for (texel, column_weight) in texels.iter().zip(column_weights) {
+                light += if *texel >= depth { weight * column_weight } else { 0.0 };
             }
         }
         light
     }
 }
 
-/// Weights of the texels around a place, `t` past the middle of the inner left one: a smooth bump, (1 - d^2)^2 in the
-/// distance d over half the filter's width, whose sum is 1.
+/// The filter weights of the texels around a position that is `t` past the center of the inner left one. They are the
+/// bump (1 - d^2)^2 in the distance d relative to half the filter's width, normalized to sum 1.
 fn weights(t: f32) -> [f32; TAPS] {
     let half = TAPS as f32 / 2.0;
     let bump = std::array::from_fn(|i| {

@@ -1,24 +1,24 @@
-//! Shapes to triangles.
+//! Tessellation of shapes.
 
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
-/// Around the axis of a sphere or capsule; the picture of a sphere misses less than 0.1 % of its area.
+/// The segments around the axis of a sphere or capsule. The image of a sphere misses less than 0.1 % of its area.
 const SEGMENTS: u32 = 96;
-/// From one pole to the other; even, so that a capsule can be cut at the equator.
+/// The rings from one pole to the other. The number is even, so that a capsule can be split at the equator.
 const RINGS: u32 = 48;
-/// Around the disc that stands for a plane.
+/// The segments around the disc of a plane.
 const RIM: u32 = 64;
 
 /// Positions, normals and triangles.
 pub(crate) type Tessellation = (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>);
 
-/// A capsule; a sphere where both ends are the same.
+/// A capsule, or a sphere if both ends are equal.
 pub(crate) fn capsule(start: Vec3, end: Vec3, radius: f32) -> Tessellation {
     let axis = (end - start).try_normalize().unwrap_or(Vec3::Y);
     let (side, other) = axis.any_orthonormal_pair();
     let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
-    // The equator twice: once at each end of the segment.
+    // The equator occurs twice: once at each end of the segment.
     for ring in 0..=RINGS + 1 {
         let (centre, step) = if ring <= RINGS / 2 {
             (end, ring)
@@ -44,7 +44,7 @@ pub(crate) fn capsule(start: Vec3, end: Vec3, radius: f32) -> Tessellation {
     (positions, normals, triangles)
 }
 
-/// A disc, seen from the side that `normal` (of length one) points to.
+/// A disc, visible from the side of the unit vector `normal`.
 pub(crate) fn disc(centre: Vec3, normal: Vec3, radius: f32) -> Tessellation {
     let (side, other) = normal.any_orthonormal_pair();
     let mut positions = vec![centre];
@@ -56,32 +56,33 @@ pub(crate) fn disc(centre: Vec3, normal: Vec3, radius: f32) -> Tessellation {
     (positions, vec![normal; RIM as usize + 1], triangles)
 }
 
-/// A strip along a segment that faces the eye, with the normals of a thin rod; nothing where they are in line.
+/// A strip along a segment, facing the eye, with the normals of a thin rod. `None` if the eye is in line with it.
 pub(crate) fn ribbon(ends: [Vec3; 2], half_widths: [f32; 2], eye: Vec3) -> Option<Tessellation> {
     let [a, b] = ends;
-    let towards_eye = (eye - (a + b) / 2.0).try_normalize()?;
-    let side = (b - a).cross(towards_eye).try_normalize()?;
+    let to_eye = (eye - (a + b) / 2.0).try_normalize()?;
+    let side = (b - a).cross(to_eye).try_normalize()?;
     let at = |end: usize, sign: f32| ends[end] + side * (sign * half_widths[end]);
     let positions = vec![at(0, 1.0), at(1, 1.0), at(1, -1.0), at(0, -1.0)];
-    let bent = |sign: f32| side * (0.8 * sign) + towards_eye * 0.6;
-    let normals = vec![bent(1.0), bent(1.0), bent(-1.0), bent(-1.0)];
+    let rod_normal = |sign: f32| side * (0.8 * sign) + to_eye * 0.6;
+    let normals = vec![rod_normal(1.0), rod_normal(1.0), rod_normal(-1.0), rod_normal(-1.0)];
     Some((positions, normals, vec![[0, 1, 2], [0, 2, 3]]))
 }
 
-/// The 26 directions from the middle of a cube to its faces, edges and corners, of length one.
+/// The 26 unit vectors from the center of a cube to its faces, edges and corners.
 pub(crate) fn directions() -> [Vec3; 26] {
     std::array::from_fn(|index| {
-        // 27 places in a 3 x 3 x 3 block without its middle.
-        let place = if index < 13 { index } else { index + 1 } as i32;
-        let part = |divisor: i32| (place / divisor % 3 - 1) as f32;
-        Vec3::new(part(9), part(3), part(1)).normalize_or_zero()
+        // 27 positions in a block of 3 x 3 x 3 without the center.
+        let cell = if index < 13 { index } else { index + 1 } as i32;
+        let coordinate = |divisor: i32| (cell / divisor % 3 - 1) as f32;
+        Vec3::new(coordinate(9), coordinate(3), coordinate(1)).normalize_or_zero()
     })
 }
 
-/// Vertex normals of a surface as it is deformed now: the mean of its triangles' normals, weighted by the angle at the
-/// vertex (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", 1998). Zero where there is none.
+/// Adds vertex normals of the deformed surface: the mean of the triangles' normals, weighted by the angle at the
+/// vertex (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", 1998). 0 for a vertex without
+/// triangles.
 ///
-/// `normals` has one place per position, all zero; indices have been checked.
+/// `normals` has one entry per position, all zero; indices must be valid.
 pub(crate) fn add_vertex_normals(positions: &[Vec3], triangles: impl Iterator<Item = [u32; 3]>, normals: &mut [Vec3]) {
     for triangle in triangles {
         let corners = triangle.map(|index| positions[index as usize]);
@@ -91,8 +92,8 @@ pub(crate) fn add_vertex_normals(positions: &[Vec3], triangles: impl Iterator<It
             continue;
         }
         for i in 0..3 {
-            let [here, next, last] = [0, 1, 2].map(|k| corners[(i + k) % 3]);
-            let angle = (next - here).angle_between(last - here);
+            let [corner, next, previous] = [0, 1, 2].map(|k| corners[(i + k) % 3]);
+            let angle = (next - corner).angle_between(previous - corner);
             if angle.is_finite() {
                 normals[triangle[i] as usize] += face * angle;
             }

@@ -1,8 +1,8 @@
-//! Triangles to fragments.
+//! Rasterization of triangles.
 //!
-//! Coverage is decided in integers: vertices are snapped to 1/4096 of a pixel and the edge functions (Pineda, "A parallel
-//! algorithm for polygon rasterization", 1988) are evaluated exactly, with the top-left rule where a pixel's centre lies
-//! on an edge. Two triangles that share an edge therefore cover each pixel along it once, whatever their shape.
+//! Coverage is exact: vertices are snapped to 1/4096 of a pixel, and edge functions (Pineda, "A parallel algorithm for
+//! polygon rasterization", 1988) are evaluated in integers. The top-left rule decides for pixel centers on an edge.
+//! Two triangles that share an edge therefore cover each pixel along it exactly once.
 
 use super::fragment::{Fragment, GUARD, PixelVertex, Window};
 
@@ -10,11 +10,11 @@ const SUBPIXEL_BITS: u32 = 12;
 const ONE: i64 = 1 << SUBPIXEL_BITS;
 const HALF: i64 = ONE / 2;
 
-/// Calls `sink` for each pixel of `window` whose centre lies inside the triangle, row by row, left to right.
+/// Calls `sink` for each pixel of `window` whose center is inside the triangle, row by row, left to right.
 ///
-/// Pixel (x, y) has its centre at (x + 0.5, y + 0.5), y growing downwards. `Fragment::front` is true where the vertices
-/// appear counter-clockwise to the viewer. A triangle without area, with a coordinate that is not finite or one farther
-/// than [`GUARD`] from the origin has no fragments; [`View::triangle`](super::View::triangle) clips before it comes here.
+/// Pixel (x, y) has its center at (x + 0.5, y + 0.5); y points down. `Fragment::front` is true if the vertices are
+/// counter-clockwise in the image. A triangle has no fragments if it has no area, or a coordinate is not finite or
+/// further than [`GUARD`] from the origin. [`View::triangle`](super::View::triangle) clips triangles first.
 pub fn rasterise_triangle(window: &Window, vertices: &[PixelVertex; 3], mut sink: impl FnMut(Fragment)) {
     let [Some(a), Some(b), Some(c)] = [snap(&vertices[0]), snap(&vertices[1]), snap(&vertices[2])] else {
         return;
@@ -23,7 +23,8 @@ pub fn rasterise_triangle(window: &Window, vertices: &[PixelVertex; 3], mut sink
     if signed_area == 0 {
         return;
     }
-    // Downwards y turns counter-clockwise into negative. Both orientations are walked as positive ones.
+    // With y down, counter-clockwise triangles have negative areas. Their corners are swapped to make the area
+    // positive.
     let front = signed_area < 0;
     let (b, c) = if front { (c, b) } else { (b, c) };
     let order = if front { [0, 2, 1] } else { [0, 1, 2] };
@@ -31,15 +32,15 @@ pub fn rasterise_triangle(window: &Window, vertices: &[PixelVertex; 3], mut sink
     let area = signed_area.unsigned_abs() as f64;
 
     let limit = GUARD as i64;
-    let top = first_centre(a.1.min(b.1).min(c.1)).max(i64::from(window.top));
-    let bottom = last_centre(a.1.max(b.1).max(c.1)).min(i64::from(window.bottom).min(limit) - 1);
-    let left = first_centre(a.0.min(b.0).min(c.0)).max(i64::from(window.left));
-    let right = last_centre(a.0.max(b.0).max(c.0)).min(i64::from(window.right).min(limit) - 1);
+    let top = first_center(a.1.min(b.1).min(c.1)).max(i64::from(window.top));
+    let bottom = last_center(a.1.max(b.1).max(c.1)).min(i64::from(window.bottom).min(limit) - 1);
+    let left = first_center(a.0.min(b.0).min(c.0)).max(i64::from(window.left));
+    let right = last_center(a.0.max(b.0).max(c.0)).min(i64::from(window.right).min(limit) - 1);
     if top > bottom || left > right {
         return;
     }
 
-    // Each edge faces the vertex whose weight it gives.
+    // Each edge function is proportional to the weight of the opposite vertex.
     let mut edges = [
         EdgeFunction::new(b, c, left, top),
         EdgeFunction::new(c, a, left, top),
@@ -57,7 +58,7 @@ pub fn rasterise_triangle(window: &Window, vertices: &[PixelVertex; 3], mut sink
             (first.max(from), last.min(to))
         });
         if first <= last {
-            // Weight over depth is linear on the screen, also in perspective.
+            // Weight over depth is linear in the image, also in perspective.
             let starts = [0, 1, 2].map(|i| edges[i].value as f64 / area * reciprocals[i]);
             let total = starts[0] + starts[1] + starts[2];
             let moment = dot(starts, depths);
@@ -81,9 +82,9 @@ pub fn rasterise_triangle(window: &Window, vertices: &[PixelVertex; 3], mut sink
     }
 }
 
-/// One edge function along the rows: positive inside.
+/// An edge function along the rows, positive inside.
 struct EdgeFunction {
-    /// At the leftmost pixel's centre of the current row.
+    /// The value at the leftmost pixel center of the current row.
     value: i64,
     step_x: i64,
     step_y: i64,
@@ -103,19 +104,19 @@ impl EdgeFunction {
         }
     }
 
-    /// The pixels of the current row that are inside, first and last, counted from the leftmost; empty: first > last.
+    /// The range of pixels of the current row that are inside, relative to the leftmost; first > last if it is empty.
     fn span(&self) -> (i64, i64) {
-        let missing = self.least - self.value;
+        let deficit = self.least - self.value;
         match self.step_x {
-            0 if missing <= 0 => (i64::MIN, i64::MAX),
+            0 if deficit <= 0 => (i64::MIN, i64::MAX),
             0 => (i64::MAX, i64::MIN),
-            step if step > 0 => (-(-missing).div_euclid(step), i64::MAX),
-            step => (i64::MIN, (-missing).div_euclid(-step)),
+            step if step > 0 => (-(-deficit).div_euclid(step), i64::MAX),
+            step => (i64::MIN, (-deficit).div_euclid(-step)),
         }
     }
 }
 
-/// To fixed point, or nothing where it is not finite or beyond the guard band.
+/// Converts to fixed point; `None` if a coordinate is not finite or beyond the guard band.
 fn snap(vertex: &PixelVertex) -> Option<(i64, i64)> {
     let inside = vertex.x.abs() <= GUARD && vertex.y.abs() <= GUARD;
     let usable = inside && vertex.depth.is_finite() && vertex.reciprocal.is_finite();
@@ -132,13 +133,13 @@ fn cross(a: (i64, i64), b: (i64, i64), c: (i64, i64)) -> i64 {
     (b.0 - a.0) * (c.1 - a.1) - (b.1 - a.1) * (c.0 - a.0)
 }
 
-/// The first pixel whose centre is not before `fixed`.
-fn first_centre(fixed: i64) -> i64 {
+/// The first pixel whose center is not before `fixed`.
+fn first_center(fixed: i64) -> i64 {
     -(HALF - fixed).div_euclid(ONE)
 }
 
-/// The last pixel whose centre is not after `fixed`.
-fn last_centre(fixed: i64) -> i64 {
+/// The last pixel whose center is not after `fixed`.
+fn last_center(fixed: i64) -> i64 {
     (fixed - HALF).div_euclid(ONE)
 }
 
@@ -157,7 +158,7 @@ mod tests {
 
     #[test]
     fn centres_on_top_and_left_edges_are_inside_the_others_are_not() {
-        // The legs run through pixel centres: top and left ones count, the hypotenuse's centres do not.
+        // The legs pass through pixel centers. Top and left ones count; those on the hypotenuse do not.
         let pixels = covered(8, [vertex(0.5, 0.5), vertex(3.5, 0.5), vertex(0.5, 3.5)]);
         assert_eq!(pixels, [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (0, 2)]);
     }
@@ -196,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_cuts_out_its_own_pixels() {
+    fn a_window_clips_to_its_own_pixels() {
         let triangle = [vertex(-50.0, -3.0), vertex(90.0, 10.0), vertex(5.0, 70.0)];
         let all = covered(64, triangle);
         let window = Window {
@@ -216,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_comes_of_a_triangle_that_is_none() {
+    fn an_invalid_triangle_has_no_fragments() {
         let good = vertex(1.0, 1.0);
         for bad in [
             vertex(f64::NAN, 0.0),

@@ -1,11 +1,11 @@
-//! From space to pixels.
+//! Projection from space to pixels.
 
 use super::fragment::{Fragment, GUARD, PixelVertex, Window};
 use super::line::rasterise_line;
 use super::triangle::rasterise_triangle;
 use glam::{DVec3, Vec3};
 
-/// A camera or a parallel projection bound to a grid of pixels: where each point of space falls, and how deep.
+/// A perspective or orthographic projection to a grid of pixels, with depth.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -22,13 +22,13 @@ pub struct View {
     up: DVec3,
     forward: DVec3,
     centre: [f64; 2],
-    /// Pixels per metre: at depth 1 in perspective, everywhere else.
+    /// Pixels per meter: at depth 1 in perspective, at any depth otherwise.
     scale: f64,
     near: f64,
     perspective: bool,
 }
 
-/// A point before the division by `w`; every clipping plane is linear in it.
+/// A point in homogeneous pixel coordinates. All clipping planes are linear in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Homogeneous {
     x: f64,
@@ -37,27 +37,27 @@ pub(crate) struct Homogeneous {
     depth: f64,
 }
 
-/// A corner of a clipped polygon, with the weights of the triangle or line that it was cut from.
+/// A corner of a clipped polygon, with the barycentric weights of the original triangle or line.
 #[derive(Clone, Copy, Default)]
 struct ClippedCorner {
     point: Homogeneous,
     weights: [f64; 3],
 }
 
-/// A triangle cut by five planes has at most eight corners.
+/// A triangle clipped by five planes has at most eight corners.
 const MAX_CORNERS: usize = 8;
 
 impl View {
-    /// A parallel projection of `width` x `height` pixels.
+    /// An orthographic projection with `width` x `height` pixels.
     ///
-    /// `origin` falls on the middle of the picture and has depth 0; what lies behind it is clipped. `forward` is the
-    /// viewing direction, `up` what points upwards in the picture (an `up` along `forward` is replaced),
-    /// `pixels_per_metre` the scale. A direction or scale that is zero or not finite gives a view that shows nothing.
+    /// `origin` is projected to the center of the image and has depth 0; points behind it are clipped. `forward` is
+    /// the view direction and `up` the direction that points up in the image; an `up` parallel to `forward` is
+    /// replaced. `pixels_per_metre` is the scale. With a zero or non-finite direction or scale, nothing is visible.
     pub fn orthographic(origin: Vec3, forward: Vec3, up: Vec3, pixels_per_metre: f64, width: u32, height: u32) -> Self {
         View::new(origin, forward, up, pixels_per_metre, [width, height], 0.0, false)
     }
 
-    /// A perspective view; `focal_length` in pixels, `near` in metres.
+    /// A perspective view; `focal_length` is in pixels, `near` in meters.
     pub(crate) fn perspective(
         origin: Vec3,
         forward: Vec3,
@@ -83,29 +83,29 @@ impl View {
         }
     }
 
-    /// Where a point falls, or nothing if it lies in front of the near plane or is not finite.
+    /// The pixel coordinates of a point; `None` if it is in front of the near plane or not finite.
     pub fn project(&self, point: Vec3) -> Option<PixelVertex> {
         let point = self.transform(point);
         (point.depth >= self.near && point.is_finite()).then(|| point.divide(self.perspective))
     }
 
-    /// The point of space at this depth behind these pixel coordinates.
+    /// The point of space with these pixel coordinates and depth.
     pub fn unproject(&self, x: f64, y: f64, depth: f64) -> Vec3 {
-        let reach = if self.perspective { depth } else { 1.0 } / self.scale;
-        let along = self.right * ((x - self.centre[0]) * reach);
-        let upwards = self.up * ((self.centre[1] - y) * reach);
-        (self.origin + along + upwards + self.forward * depth).as_vec3()
+        let meters_per_unit = if self.perspective { depth } else { 1.0 } / self.scale;
+        let rightward = self.right * ((x - self.centre[0]) * meters_per_unit);
+        let upwards = self.up * ((self.centre[1] - y) * meters_per_unit);
+        (self.origin + rightward + upwards + self.forward * depth).as_vec3()
     }
 
-    /// Calls `sink` for each pixel that a triangle covers, as [`rasterise_triangle`] does, clipped by the near plane.
+    /// Calls `sink` for each pixel that a triangle covers, like [`rasterise_triangle`], after clipping.
     ///
-    /// [`Fragment::weights`] belong to `points`, also where the triangle was clipped. A point that is not finite: no
-    /// fragments.
+    /// [`Fragment::weights`] refer to `points`, even for a clipped triangle. A triangle with a point that is not
+    /// finite has no fragments.
     pub fn triangle(&self, window: &Window, points: [Vec3; 3], sink: impl FnMut(Fragment)) {
         self.transformed_triangle(window, points.map(|point| self.transform(point)), sink);
     }
 
-    /// Calls `sink` for each pixel of a line, as [`rasterise_line`] does, clipped by the near plane.
+    /// Calls `sink` for each pixel of a line, like [`rasterise_line`], after clipping at the near plane.
     pub fn line(&self, window: &Window, points: [Vec3; 2], mut sink: impl FnMut(Fragment)) {
         let [a, b] = points.map(|point| self.transform(point));
         if !a.is_finite() || !b.is_finite() {
@@ -123,11 +123,11 @@ impl View {
         }
         let ends = [a, b].map(|corner| corner.point.divide(self.perspective));
         rasterise_line(window, &ends, |fragment| {
-            sink(reweighted(fragment, [&a, &b, &ClippedCorner::default()]));
+            sink(with_original_weights(fragment, [&a, &b, &ClippedCorner::default()]));
         });
     }
 
-    /// What [`View::triangle`] does first, for callers that draw a vertex many times.
+    /// The first step of [`View::triangle`], for callers that draw a vertex several times.
     pub(crate) fn transform(&self, point: Vec3) -> Homogeneous {
         let offset = point.as_dvec3() - self.origin;
         let depth = offset.dot(self.forward);
@@ -140,14 +140,14 @@ impl View {
         }
     }
 
-    /// [`View::triangle`] for points that [`View::transform`] has seen.
+    /// [`View::triangle`] for points transformed by [`View::transform`].
     pub(crate) fn transformed_triangle(
         &self,
         window: &Window,
         points: [Homogeneous; 3],
         mut sink: impl FnMut(Fragment),
     ) {
-        if beyond(window, &points) {
+        if is_outside(window, &points) {
             return;
         }
         if points.iter().all(|point| self.planes(point).iter().all(|&d| d >= 0.0)) {
@@ -165,11 +165,11 @@ impl View {
         }
         let mut count = 3;
         for plane in 0..5 {
-            (polygon, count) = cut(&polygon[..count], |corner| self.planes(&corner.point)[plane]);
+            (polygon, count) = clip(&polygon[..count], |corner| self.planes(&corner.point)[plane]);
         }
         for i in 2..count {
             let corners = [&polygon[0], &polygon[i - 1], &polygon[i]];
-            // What was cut lies on the guard band but for rounding.
+            // Clipped corners are on the guard band except for rounding.
             let vertices = corners.map(|corner| {
                 let vertex = corner.point.divide(self.perspective);
                 PixelVertex {
@@ -179,12 +179,12 @@ impl View {
                 }
             });
             rasterise_triangle(window, &vertices, |fragment| {
-                sink(reweighted(fragment, corners));
+                sink(with_original_weights(fragment, corners));
             });
         }
     }
 
-    /// Signed distances, to scale, from the near plane and the four sides of the guard band; negative outside.
+    /// Scaled signed distances from the near plane and the four sides of the guard band, negative outside.
     fn planes(&self, point: &Homogeneous) -> [f64; 5] {
         let guard = GUARD * point.w;
         [
@@ -196,17 +196,17 @@ impl View {
         ]
     }
 
-    /// Metres across one pixel at this depth.
-    pub(crate) fn metres_per_pixel(&self, depth: f64) -> f64 {
+    /// The size of a pixel at this depth, m.
+    pub(crate) fn meters_per_pixel(&self, depth: f64) -> f64 {
         if self.perspective { depth } else { 1.0 }.abs() / self.scale
     }
 
-    /// Where the view is from.
+    /// The position of the camera, or the origin of an orthographic view, m.
     pub(crate) fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    /// Right, up and forward, of length one.
+    /// The unit vectors right, up and forward.
     pub(crate) fn axes(&self) -> [DVec3; 3] {
         [self.right, self.up, self.forward]
     }
@@ -228,11 +228,12 @@ impl Homogeneous {
 }
 
 impl ClippedCorner {
-    /// Where the way from here, inside by `inside`, to `other`, outside by `outside` < 0, meets the plane. Always from
-    /// inside out, so that two triangles cut their common edge at the same point.
+    /// The intersection of a plane with the segment from here, at the distance `inside`, to `other`, at the distance
+    /// `outside` < 0. It is always computed from the inside, so that two triangles clip their common edge at the same
+    /// point.
     fn towards(&self, other: &ClippedCorner, inside: f64, outside: f64) -> ClippedCorner {
-        let share = inside / (inside - outside);
-        let mix = |from: f64, to: f64| from + share * (to - from);
+        let t = inside / (inside - outside);
+        let mix = |from: f64, to: f64| from + t * (to - from);
         let (a, b) = (&self.point, &other.point);
         ClippedCorner {
             point: Homogeneous {
@@ -246,8 +247,9 @@ impl ClippedCorner {
     }
 }
 
-/// Whether all points lie beyond the same side of a window; linear like clipping, and so right on both sides of the eye.
-fn beyond(window: &Window, points: &[Homogeneous; 3]) -> bool {
+/// True if all points are outside of the same side of a window. The test is linear, like clipping, so it also holds
+/// behind the eye.
+fn is_outside(window: &Window, points: &[Homogeneous; 3]) -> bool {
     let all = |outside: &dyn Fn(&Homogeneous) -> bool| points.iter().all(outside);
     let [left, top] = [window.left, window.top].map(f64::from);
     let [right, bottom] = [window.right, window.bottom].map(f64::from);
@@ -257,24 +259,24 @@ fn beyond(window: &Window, points: &[Homogeneous; 3]) -> bool {
         || all(&|point| point.x > right * point.w)
 }
 
-/// The part of a convex polygon on the positive side of a plane (Sutherland and Hodgman, 1974).
-fn cut(polygon: &[ClippedCorner], distance: impl Fn(&ClippedCorner) -> f64) -> ([ClippedCorner; MAX_CORNERS], usize) {
+/// Clips a convex polygon at a plane (Sutherland and Hodgman, 1974).
+fn clip(polygon: &[ClippedCorner], distance: impl Fn(&ClippedCorner) -> f64) -> ([ClippedCorner; MAX_CORNERS], usize) {
     let mut result = [ClippedCorner::default(); MAX_CORNERS];
     let mut count = 0;
     let mut push = |corner: ClippedCorner| {
-        if let Some(place) = result.get_mut(count) {
-            *place = corner;
+        if let Some(slot) = result.get_mut(count) {
+            *slot = corner;
             count += 1;
         }
     };
     for (i, current) in polygon.iter().enumerate() {
         let previous = &polygon[(i + polygon.len() - 1) % polygon.len()];
-        let (here, before) = (distance(current), distance(previous));
-        match (before >= 0.0, here >= 0.0) {
+        let (current_distance, previous_distance) = (distance(current), distance(previous));
+        match (previous_distance >= 0.0, current_distance >= 0.0) {
             (true, true) => push(*current),
-            (true, false) => push(previous.towards(current, before, here)),
+            (true, false) => push(previous.towards(current, previous_distance, current_distance)),
             (false, true) => {
-                push(current.towards(previous, here, before));
+                push(current.towards(previous, current_distance, previous_distance));
                 push(*current);
             }
             (false, false) => {}
@@ -283,8 +285,8 @@ fn cut(polygon: &[ClippedCorner], distance: impl Fn(&ClippedCorner) -> f64) -> (
     (result, count)
 }
 
-/// A fragment of a clipped piece, with weights of the whole.
-fn reweighted(fragment: Fragment, corners: [&ClippedCorner; 3]) -> Fragment {
+/// A fragment of a clipped piece, with the weights of the original.
+fn with_original_weights(fragment: Fragment, corners: [&ClippedCorner; 3]) -> Fragment {
     let weight = |i: usize| -> f32 {
         (0..3)
             .map(|k| f64::from(fragment.weights[k]) * corners[k].weights[i])
@@ -296,8 +298,8 @@ fn reweighted(fragment: Fragment, corners: [&ClippedCorner; 3]) -> Fragment {
     }
 }
 
-/// Right, up and forward of a viewer, orthonormal; an `up` along the viewing direction gives way to the axis of space
-/// that is farthest from it.
+/// The orthonormal vectors right, up and forward of a viewer. If `up` is parallel to the view direction, it is
+/// replaced by the axis most perpendicular to it.
 pub(crate) fn axes(forward: Vec3, up: Vec3) -> [DVec3; 3] {
     let forward = forward.as_dvec3().normalize_or_zero();
     let up = up.as_dvec3().normalize_or_zero();
@@ -311,7 +313,7 @@ pub(crate) fn axes(forward: Vec3, up: Vec3) -> [DVec3; 3] {
         } else {
             DVec3::Y
         };
-        // Seen from straight above, what is far is up: -z before +z, as a right-handed floor plan has it.
+        // Seen from above, far is up: -z before +z, like a right-handed floor plan.
         right = forward.cross(-replacement);
     }
     let right = right.normalize_or_zero();

@@ -1,33 +1,27 @@
-//! Vectors and matrices of which each lane has one.
-// SAFETY of every function here: the processor has the instructions of `L`.
+//! Vectors and matrices with one value per lane.
+// SAFETY of every function: the processor must have the instructions of `L`.
 #![allow(clippy::undocumented_unsafe_blocks)]
-// No closures: one may be compiled on its own, without the kernel's instructions.
+// No closures: they may be compiled separately, without the kernel's instructions.
 
 use super::Lanes;
 
-/// A vector per lane.
+/// One vector per lane.
 pub type Vector<L> = [L; 3];
 
-/// The columns of a matrix.
+/// Columns of a matrix.
 pub type Matrix3<L> = [Vector<L>; 3];
 
-/// The entries 00, 01, 02, 11, 12, 22 of a triangular or symmetric matrix.
+/// Entries 00, 01, 02, 11, 12, 22 of a triangular or symmetric matrix.
 pub type Six<L> = [L; 6];
 
 #[inline(always)]
 pub unsafe fn dot<L: Lanes>([ax, ay, az]: Vector<L>, [bx, by, bz]: Vector<L>) -> L {
-    unsafe { az.multiply_add(bz, ay.multiply_add(by, ax.multiply(bx))) }
+    unsafe { az.mul_add(bz, ay.mul_add(by, ax.mul(bx))) }
 }
 
 #[inline(always)]
 pub unsafe fn scaled<L: Lanes>(vector: Vector<L>, factor: L) -> Vector<L> {
-    unsafe {
-        [
-            vector[0].multiply(factor),
-            vector[1].multiply(factor),
-            vector[2].multiply(factor),
-        ]
-    }
+    unsafe { [vector[0].mul(factor), vector[1].mul(factor), vector[2].mul(factor)] }
 }
 
 /// `sum + vector * factor`
@@ -35,16 +29,16 @@ pub unsafe fn scaled<L: Lanes>(vector: Vector<L>, factor: L) -> Vector<L> {
 pub unsafe fn add_scaled<L: Lanes>(sum: Vector<L>, vector: Vector<L>, factor: L) -> Vector<L> {
     unsafe {
         [
-            vector[0].multiply_add(factor, sum[0]),
-            vector[1].multiply_add(factor, sum[1]),
-            vector[2].multiply_add(factor, sum[2]),
+            vector[0].mul_add(factor, sum[0]),
+            vector[1].mul_add(factor, sum[1]),
+            vector[2].mul_add(factor, sum[2]),
         ]
     }
 }
 
 #[inline(always)]
 pub unsafe fn difference<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
-    unsafe { [a[0].subtract(b[0]), a[1].subtract(b[1]), a[2].subtract(b[2])] }
+    unsafe { [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])] }
 }
 
 #[inline(always)]
@@ -56,14 +50,14 @@ pub unsafe fn sum<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
 pub unsafe fn cross<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
     unsafe {
         [
-            a[1].multiply_subtract(b[2], a[2].multiply(b[1])),
-            a[2].multiply_subtract(b[0], a[0].multiply(b[2])),
-            a[0].multiply_subtract(b[1], a[1].multiply(b[0])),
+            a[1].mul_sub(b[2], a[2].mul(b[1])),
+            a[2].mul_sub(b[0], a[0].mul(b[2])),
+            a[0].mul_sub(b[1], a[1].mul(b[0])),
         ]
     }
 }
 
-/// A matrix times an upper triangular one.
+/// Product of a matrix and an upper triangular matrix.
 #[inline(always)]
 pub unsafe fn times_upper<L: Lanes>([a, b, c]: Matrix3<L>, upper: Six<L>) -> Matrix3<L> {
     unsafe {
@@ -75,7 +69,7 @@ pub unsafe fn times_upper<L: Lanes>([a, b, c]: Matrix3<L>, upper: Six<L>) -> Mat
     }
 }
 
-/// A matrix times the transposed of an upper triangular one.
+/// Product of a matrix and the transpose of an upper triangular matrix.
 #[inline(always)]
 pub unsafe fn times_lower<L: Lanes>([a, b, c]: Matrix3<L>, upper: Six<L>) -> Matrix3<L> {
     unsafe {
@@ -87,7 +81,7 @@ pub unsafe fn times_lower<L: Lanes>([a, b, c]: Matrix3<L>, upper: Six<L>) -> Mat
     }
 }
 
-/// `sum` and a matrix times a symmetric one.
+/// `sum` plus the product of a matrix and a symmetric matrix.
 #[inline(always)]
 pub unsafe fn add_times<L: Lanes>(sum: Matrix3<L>, [a, b, c]: Matrix3<L>, s: Six<L>) -> Matrix3<L> {
     unsafe {
@@ -108,12 +102,12 @@ pub unsafe fn scaled_matrix<L: Lanes>([a, b, c]: Matrix3<L>, factor: L) -> Matri
 pub unsafe fn scaled_six<L: Lanes>([a, b, c, d, e, f]: Six<L>, factor: L) -> Six<L> {
     unsafe {
         [
-            a.multiply(factor),
-            b.multiply(factor),
-            c.multiply(factor),
-            d.multiply(factor),
-            e.multiply(factor),
-            f.multiply(factor),
+            a.mul(factor),
+            b.mul(factor),
+            c.mul(factor),
+            d.mul(factor),
+            e.mul(factor),
+            f.mul(factor),
         ]
     }
 }
@@ -132,16 +126,16 @@ pub unsafe fn sum_six<L: Lanes>(a: Six<L>, b: Six<L>) -> Six<L> {
     }
 }
 
-/// No less than the largest eigenvalue of a symmetric matrix, without its sign (Gershgorin).
+/// Upper bound of the eigenvalue magnitudes of a symmetric matrix (Gershgorin).
 #[inline(always)]
 pub unsafe fn largest<L: Lanes>([xx, xy, xz, yy, yz, zz]: Six<L>) -> L {
     unsafe {
-        let (xy, xz, yz) = (xy.size(), xz.size(), yz.size());
+        let (xy, xz, yz) = (xy.abs(), xz.abs(), yz.abs());
         let rows = [
-            xx.size().add(xy).add(xz),
-            yy.size().add(xy).add(yz),
-            zz.size().add(xz).add(yz),
+            xx.abs().add(xy).add(xz),
+            yy.abs().add(xy).add(yz),
+            zz.abs().add(xz).add(yz),
         ];
-        rows[0].greater(rows[1]).greater(rows[2])
+        rows[0].max(rows[1]).max(rows[2])
     }
 }

@@ -6,16 +6,16 @@ use glam::Vec3;
 
 use super::Lanes;
 use super::Record;
-use super::lanes::{Index, common_instructions, instructions, twice};
-use super::link_batches::{EightLinks, Sight};
+use super::lanes::{Index, common_instructions, instructions, record_at};
+use super::link_batches::{BatchInput, LinkBatch};
 
 #[derive(Clone, Copy)]
 pub(super) struct Avx2Lanes(__m256);
 
-/// All bits of the lanes whose bit in `mask` is set.
+/// Sets all bits of the lanes whose bit in `mask` is set.
 #[inline(always)]
-unsafe fn spread(mask: u32) -> __m256 {
-    // SAFETY: the caller promises the instructions.
+unsafe fn lane_mask(mask: u32) -> __m256 {
+    // SAFETY: the caller guarantees the instructions.
     unsafe {
         let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
         let set = _mm256_and_si256(_mm256_set1_epi32(mask as i32), bits);
@@ -23,14 +23,14 @@ unsafe fn spread(mask: u32) -> __m256 {
     }
 }
 
-/// `Lanes::pulls` from a guess of 1 over a root, with one step of Newton's.
+/// `Lanes::force_over_length` from an approximate inverse square root and one Newton step.
 ///
-/// One stage after the other for all: each is a long chain of operations. No closures: one may be compiled on its own, without the kernel's
-/// instructions.
-macro_rules! pulls_by_newton {
+/// Each stage is done for all `N` before the next one, because each is a long chain of operations. No closures: they
+/// may be compiled separately, without the kernel's instructions.
+macro_rules! force_over_length_by_newton {
     ($guess:ident, $multiply:ident, $subtract_product:ident, $splat:ident) => {
         #[inline(always)]
-        unsafe fn pulls<const N: usize>(
+        unsafe fn force_over_length<const N: usize>(
             squares: [Self; N],
             stiffnesses: [Self; N],
             half_tensions: [Self; N],
@@ -40,7 +40,7 @@ macro_rules! pulls_by_newton {
                 for guess in &mut guesses {
                     guess.0 = $guess(guess.0);
                 }
-                // Newton's step: 1 / length = guess * correction / 2.
+                // Newton step: 1 / length = guess * correction / 2.
                 let mut corrections = squares;
                 for (root, guess) in corrections.iter_mut().zip(&guesses) {
                     root.0 = $multiply(root.0, guess.0);
@@ -65,10 +65,10 @@ macro_rules! pulls_by_newton {
     };
 }
 
-pub(super) use pulls_by_newton;
+pub(super) use force_over_length_by_newton;
 
-// SAFETY of every block: the caller promises the instructions, and that what pointers lead to is there; no load or store
-// here asks for more than the alignment of a number.
+// SAFETY of every block: the caller guarantees the instructions and valid pointers. Loads and stores need only the
+// alignment of a number.
 #[allow(clippy::undocumented_unsafe_blocks)]
 impl Lanes for Avx2Lanes {
     const COUNT: usize = 8;
@@ -87,8 +87,8 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
-        // Four of them at a time in each half.
+    unsafe fn load_transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
+        // Transposes four records at a time in each half.
         unsafe {
             let a = eight(record(at(0)), record(at(4)));
             let b = eight(record(at(1)), record(at(5)));
@@ -106,7 +106,7 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    unsafe fn add_to_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
+    unsafe fn scatter_add_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
         unsafe {
             let [Self(x), Self(y), Self(z)] = vectors;
             let none = _mm256_setzero_ps();
@@ -126,46 +126,47 @@ impl Lanes for Avx2Lanes {
     }
 
     instructions! {
-        multiply_subtract(factor, subtrahend) = _mm256_fmsub_ps;
+        mul_sub(factor, subtrahend) = _mm256_fmsub_ps;
         add(other) = _mm256_add_ps;
-        subtract(other) = _mm256_sub_ps;
-        multiply(other) = _mm256_mul_ps;
-        divide(other) = _mm256_div_ps;
-        multiply_add(factor, summand) = _mm256_fmadd_ps;
+        sub(other) = _mm256_sub_ps;
+        mul(other) = _mm256_mul_ps;
+        div(other) = _mm256_div_ps;
+        mul_add(factor, summand) = _mm256_fmadd_ps;
     }
 
     #[inline(always)]
-    unsafe fn size(self) -> Self {
+    unsafe fn abs(self) -> Self {
         Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
     }
 
-    pulls_by_newton!(_mm256_rsqrt_ps, _mm256_mul_ps, _mm256_fnmadd_ps, _mm256_set1_ps);
+    force_over_length_by_newton!(_mm256_rsqrt_ps, _mm256_mul_ps, _mm256_fnmadd_ps, _mm256_set1_ps);
 
     #[inline(always)]
-    unsafe fn pull_eight(sight: Sight, links: &EightLinks) -> Option<Vec3> {
-        let count = sight.positions[0].len();
-        assert!(sight.positions.iter().all(|axis| axis.len() == count) && count <= i32::MAX as usize);
+    unsafe fn pull_batch(input: BatchInput, links: &LinkBatch) -> Option<Vec3> {
+        let count = input.positions[0].len();
+        assert!(input.positions.iter().all(|axis| axis.len() == count) && count <= i32::MAX as usize);
         let first = links.as_ptr().cast::<f32>();
         unsafe {
-            // Neighbour, stiffness, rest length, and so on: no place is taken twice where the three loads are blended.
+            // Numbers alternate between neighbor, stiffness and rest length. Blending the three loads keeps each
+            // number's position free of conflicts.
             let [a, b, c] = [
                 _mm256_loadu_ps(first),
                 _mm256_loadu_ps(first.add(8)),
                 _mm256_loadu_ps(first.add(16)),
             ];
-            let neighbours = _mm256_blend_ps::<0b0010_0100>(_mm256_blend_ps::<0b1001_0010>(a, b), c);
+            let neighbors = _mm256_blend_ps::<0b0010_0100>(_mm256_blend_ps::<0b1001_0010>(a, b), c);
             let stiffnesses = _mm256_blend_ps::<0b0100_1001>(_mm256_blend_ps::<0b0010_0100>(a, b), c);
             let rest_lengths = _mm256_blend_ps::<0b1001_0010>(_mm256_blend_ps::<0b0100_1001>(a, b), c);
             let stiffnesses = _mm256_permutevar8x32_ps(stiffnesses, _mm256_setr_epi32(1, 4, 7, 2, 5, 0, 3, 6));
             let rest_lengths = _mm256_permutevar8x32_ps(rest_lengths, _mm256_setr_epi32(2, 5, 0, 3, 6, 1, 4, 7));
-            let (neighbours, last) = (_mm256_castps_si256(neighbours), _mm256_set1_epi32(count as i32 - 1));
-            let within = _mm256_cmpeq_epi32(_mm256_max_epu32(neighbours, last), last);
+            let (neighbors, last) = (_mm256_castps_si256(neighbors), _mm256_set1_epi32(count as i32 - 1));
+            let within = _mm256_cmpeq_epi32(_mm256_max_epu32(neighbors, last), last);
             assert!(_mm256_movemask_epi8(within) == -1, "a link leads to a node");
-            let [px, py, pz] = sight.positions;
-            let x = _mm256_sub_ps(at_neighbours(px, links), _mm256_set1_ps(sight.here.x));
-            let y = _mm256_sub_ps(at_neighbours(py, links), _mm256_set1_ps(sight.here.y));
-            let z = _mm256_sub_ps(at_neighbours(pz, links), _mm256_set1_ps(sight.here.z));
-            // Rounded as one link alone is, so that both ends of a spring pull alike wherever they are kept.
+            let [px, py, pz] = input.positions;
+            let x = _mm256_sub_ps(load_neighbors(px, links), _mm256_set1_ps(input.here.x));
+            let y = _mm256_sub_ps(load_neighbors(py, links), _mm256_set1_ps(input.here.y));
+            let z = _mm256_sub_ps(load_neighbors(pz, links), _mm256_set1_ps(input.here.z));
+            // Rounded like a single link, so that both ends of a spring compute equal forces in any storage.
             let [xx, yy, zz] = [_mm256_mul_ps(x, x), _mm256_mul_ps(y, y), _mm256_mul_ps(z, z)];
             let square = _mm256_add_ps(_mm256_add_ps(xx, yy), zz);
             let length = _mm256_sqrt_ps(square);
@@ -178,8 +179,8 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    unsafe fn where_set(self, mask: u32) -> Self {
-        Self(unsafe { _mm256_and_ps(self.0, spread(mask)) })
+    unsafe fn mask(self, mask: u32) -> Self {
+        Self(unsafe { _mm256_and_ps(self.0, lane_mask(mask)) })
     }
 
     #[inline(always)]
@@ -188,35 +189,35 @@ impl Lanes for Avx2Lanes {
     }
 }
 
-/// A record, which is aligned.
+/// Loads a record, which must be aligned.
 #[inline(always)]
-pub(super) unsafe fn record(place: *const Record) -> __m128 {
-    // SAFETY: the caller promises the instructions and the record.
-    unsafe { _mm_load_ps(place.cast()) }
+pub(super) unsafe fn record(address: *const Record) -> __m128 {
+    // SAFETY: the caller guarantees the instructions and the record.
+    unsafe { _mm_load_ps(address.cast()) }
 }
 
-/// Adds to the record of half an even index.
+/// Adds to the record at half of an even index.
 #[inline(always)]
 pub(super) unsafe fn add_record(sums: *mut Record, index: *const u16, record: __m128) {
-    // SAFETY: the caller promises the instructions, a readable index and a writable record.
+    // SAFETY: the caller guarantees the instructions, a readable index and a writable record.
     unsafe {
-        let place: *mut f32 = twice(sums, index).cast_mut().cast();
-        _mm_store_ps(place, _mm_add_ps(_mm_load_ps(place), record));
+        let address: *mut f32 = record_at(sums, index).cast_mut().cast();
+        _mm_store_ps(address, _mm_add_ps(_mm_load_ps(address), record));
     }
 }
 
-/// The coordinates of eight neighbours.
+/// Loads the coordinates of eight neighbors.
 #[inline(always)]
-unsafe fn at_neighbours(axis: &[f32], [a, b, c, d, e, f, g, h]: &EightLinks) -> __m256 {
+unsafe fn load_neighbors(axis: &[f32], [a, b, c, d, e, f, g, h]: &LinkBatch) -> __m256 {
     let at = |link: &[u32; 3]| axis.as_ptr().wrapping_add(link[0] as usize);
-    // SAFETY: the caller promises the instructions, and that the neighbours are there.
+    // SAFETY: the caller guarantees the instructions and readable neighbors.
     unsafe { eight(four(at(a), at(b), at(c), at(d)), four(at(e), at(f), at(g), at(h))) }
 }
 
-/// The sum of eight lanes.
+/// Sum of eight lanes.
 #[inline(always)]
 unsafe fn sum(lanes: __m256) -> f32 {
-    // SAFETY: the caller promises the instructions.
+    // SAFETY: the caller guarantees the instructions.
     unsafe {
         let four = _mm_add_ps(_mm256_castps256_ps128(lanes), _mm256_extractf128_ps::<1>(lanes));
         let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
@@ -224,10 +225,10 @@ unsafe fn sum(lanes: __m256) -> f32 {
     }
 }
 
-/// Four numbers from four places: on many processors in less time than their own instruction for it takes.
+/// Loads four numbers from four addresses. On many processors this is faster than the gather instruction.
 #[inline(always)]
 unsafe fn four(a: *const f32, b: *const f32, c: *const f32, d: *const f32) -> __m128 {
-    // SAFETY: the caller promises the instructions and the places.
+    // SAFETY: the caller guarantees the instructions and readable addresses.
     unsafe {
         let lanes = _mm_load_ss(a);
         let lanes = _mm_insert_ps::<0x10>(lanes, _mm_load_ss(b));
@@ -236,22 +237,22 @@ unsafe fn four(a: *const f32, b: *const f32, c: *const f32, d: *const f32) -> __
     }
 }
 
-/// The numbers at four indices.
+/// Loads the numbers at four indices.
 #[inline(always)]
 pub(super) unsafe fn four_at<I: Index>(base: *const f32, indices: *const I) -> __m128 {
-    // SAFETY: the same contract; the indices may be read.
+    // SAFETY: the same contract; the indices are readable.
     unsafe {
         let [a, b, c, d] = indices.cast::<[I; 4]>().read();
         four(
-            base.wrapping_add(a.place()),
-            base.wrapping_add(b.place()),
-            base.wrapping_add(c.place()),
-            base.wrapping_add(d.place()),
+            base.wrapping_add(a.to_usize()),
+            base.wrapping_add(b.to_usize()),
+            base.wrapping_add(c.to_usize()),
+            base.wrapping_add(d.to_usize()),
         )
     }
 }
 
-/// Four lanes and four more.
+/// Joins two groups of four lanes.
 #[inline(always)]
 unsafe fn eight(low: __m128, high: __m128) -> __m256 {
     // SAFETY: the same contract.

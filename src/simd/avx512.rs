@@ -6,15 +6,15 @@ use glam::Vec3;
 
 use super::Lanes;
 use super::Record;
-use super::avx2::{Avx2Lanes, add_record, four_at, pulls_by_newton, record};
+use super::avx2::{Avx2Lanes, add_record, force_over_length_by_newton, four_at, record};
 use super::lanes::{Index, common_instructions, instructions};
-use super::link_batches::{EightLinks, Sight};
+use super::link_batches::{BatchInput, LinkBatch};
 
 #[derive(Clone, Copy)]
 pub(super) struct Avx512Lanes(__m512);
 
-// SAFETY of every block: the caller promises the instructions, and that what pointers lead to is there; no load or store
-// here asks for more than the alignment of a number.
+// SAFETY of every block: the caller guarantees the instructions and valid pointers. Loads and stores need only the
+// alignment of a number.
 #[allow(clippy::undocumented_unsafe_blocks)]
 impl Lanes for Avx512Lanes {
     const COUNT: usize = 16;
@@ -40,8 +40,8 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
-    unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
-        // Four of them at a time in each quarter.
+    unsafe fn load_transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
+        // Transposes four records at a time in each quarter.
         unsafe {
             let a = sixteen(record(at(0)), record(at(4)), record(at(8)), record(at(12)));
             let b = sixteen(record(at(1)), record(at(5)), record(at(9)), record(at(13)));
@@ -59,7 +59,7 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
-    unsafe fn add_to_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
+    unsafe fn scatter_add_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
         unsafe {
             let [Self(x), Self(y), Self(z)] = vectors;
             let none = _mm512_setzero_ps();
@@ -81,25 +81,25 @@ impl Lanes for Avx512Lanes {
     }
 
     instructions! {
-        multiply_subtract(factor, subtrahend) = _mm512_fmsub_ps;
-        size() = _mm512_abs_ps;
+        mul_sub(factor, subtrahend) = _mm512_fmsub_ps;
+        abs() = _mm512_abs_ps;
         add(other) = _mm512_add_ps;
-        subtract(other) = _mm512_sub_ps;
-        multiply(other) = _mm512_mul_ps;
-        divide(other) = _mm512_div_ps;
-        multiply_add(factor, summand) = _mm512_fmadd_ps;
+        sub(other) = _mm512_sub_ps;
+        mul(other) = _mm512_mul_ps;
+        div(other) = _mm512_div_ps;
+        mul_add(factor, summand) = _mm512_fmadd_ps;
     }
 
-    pulls_by_newton!(_mm512_rsqrt14_ps, _mm512_mul_ps, _mm512_fnmadd_ps, _mm512_set1_ps);
+    force_over_length_by_newton!(_mm512_rsqrt14_ps, _mm512_mul_ps, _mm512_fnmadd_ps, _mm512_set1_ps);
 
     #[inline(always)]
-    unsafe fn pull_eight(sight: Sight, links: &EightLinks) -> Option<Vec3> {
-        // Part of what a processor with AVX-512 has.
-        unsafe { Avx2Lanes::pull_eight(sight, links) }
+    unsafe fn pull_batch(input: BatchInput, links: &LinkBatch) -> Option<Vec3> {
+        // AVX-512 includes AVX2.
+        unsafe { Avx2Lanes::pull_batch(input, links) }
     }
 
     #[inline(always)]
-    unsafe fn where_set(self, mask: u32) -> Self {
+    unsafe fn mask(self, mask: u32) -> Self {
         Self(unsafe { _mm512_maskz_mov_ps(mask as __mmask16, self.0) })
     }
 
@@ -111,7 +111,7 @@ impl Lanes for Avx512Lanes {
 
 #[inline(always)]
 unsafe fn sixteen(a: __m128, b: __m128, c: __m128, d: __m128) -> __m512 {
-    // SAFETY: the caller promises the instructions.
+    // SAFETY: the caller guarantees the instructions.
     unsafe {
         let lanes = _mm512_castps128_ps512(a);
         let lanes = _mm512_insertf32x4::<1>(lanes, b);

@@ -1,81 +1,85 @@
-//! What the spring kernel asks of a processor: some numbers side by side.
+//! SIMD operations that the kernels need.
 
 use glam::Vec3;
 
 use super::Record;
 
-use super::link_batches::{EightLinks, Sight, pull_one_by_one};
+use super::link_batches::{BatchInput, LinkBatch, pull_sequentially};
 
-/// What an index is kept as.
+/// Integer type of stored indices.
 pub(crate) trait Index: Copy {
-    fn place(self) -> usize;
+    fn to_usize(self) -> usize;
 }
 
 impl Index for u32 {
     #[inline(always)]
-    fn place(self) -> usize {
+    fn to_usize(self) -> usize {
         self as usize
     }
 }
 
 impl Index for u16 {
     #[inline(always)]
-    fn place(self) -> usize {
+    fn to_usize(self) -> usize {
         self.into()
     }
 }
 
-/// A few `f32` side by side, and what the spring kernel does with them.
+/// A SIMD register of `f32` lanes.
 ///
 /// # Safety
-/// Every function is called only where the processor has the implementation's instructions; functions that take a pointer
-/// also ask for what they say.
+/// The processor must have the implementation's instructions. Functions that take a pointer have additional
+/// requirements.
 pub(crate) trait Lanes: Copy {
-    /// How many; divides 16.
+    /// Number of lanes, a divisor of 16.
     const COUNT: usize;
 
-    /// The same number in all.
+    /// Copies a number to all lanes.
     unsafe fn splat(value: f32) -> Self;
 
-    /// `COUNT` numbers from `from`, readable and aligned to 4 bytes.
+    /// Loads `COUNT` numbers from `from`, which must be readable and aligned to 4 bytes.
     unsafe fn load(from: *const f32) -> Self;
 
-    /// To `COUNT` numbers at `to`, writable and aligned to 4 bytes.
+    /// Stores `COUNT` numbers at `to`, which must be writable and aligned to 4 bytes.
     unsafe fn store(self, to: *mut f32);
 
-    /// `base[indices[lane]]` for `COUNT` readable indices that are all less than 2^31 and lead to readable numbers.
+    /// Loads `base[indices[lane]]`. The `COUNT` indices must be readable, less than 2^31, and refer to readable
+    /// numbers.
     unsafe fn gather<I: Index>(base: *const f32, indices: *const I) -> Self;
 
-    /// The four numbers of the readable record at `at(lane)`, for each of `COUNT` lanes.
-    unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4];
+    /// Loads the four numbers of the record at `at(lane)`, which must be readable, for each of `COUNT` lanes.
+    unsafe fn load_transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4];
 
-    /// The three numbers of `base[indices[lane]]` for `COUNT` readable indices that lead to readable records.
+    /// Loads the three numbers of `base[indices[lane]]`. The `COUNT` indices must be readable and refer to readable
+    /// records.
     #[inline(always)]
-    unsafe fn records<I: Index>(base: *const Record, indices: *const I) -> [Self; 3] {
-        // SAFETY: the caller's promise.
-        let [x, y, z, _] = unsafe { Self::transposed(|lane| base.wrapping_add(indices.add(lane).read().place())) };
+    unsafe fn gather_records<I: Index>(base: *const Record, indices: *const I) -> [Self; 3] {
+        // SAFETY: guaranteed by the caller.
+        let [x, y, z, _] =
+            unsafe { Self::load_transposed(|lane| base.wrapping_add(indices.add(lane).read().to_usize())) };
         [x, y, z]
     }
 
-    /// The four numbers of `base[indices[lane] / 2]` for `COUNT` readable even indices that lead to readable records.
+    /// Loads the four numbers of `base[indices[lane] / 2]`. The `COUNT` indices must be readable, even, and refer to
+    /// readable records.
     #[inline(always)]
-    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
-        // SAFETY: the caller's promise.
-        unsafe { Self::transposed(|lane| twice(base, indices.add(lane))) }
+    unsafe fn gather_records_scaled(base: *const Record, indices: *const u16) -> [Self; 4] {
+        // SAFETY: guaranteed by the caller.
+        unsafe { Self::load_transposed(|lane| record_at(base, indices.add(lane))) }
     }
 
-    /// Adds a vector of each lane to the three numbers of `sums[indices[lane] / 2]`, lane by lane, for `COUNT` readable even indices
-    /// that lead to writable records; indices may be equal.
+    /// Adds one vector per lane to the three numbers of `sums[indices[lane] / 2]`, lane by lane. The `COUNT` indices
+    /// must be readable, even, and refer to writable records. They may be equal.
     #[inline(always)]
-    unsafe fn add_to_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
+    unsafe fn scatter_add_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
         let mut axes = [[0.0_f32; 16]; 3];
         for (axis, vector) in axes.iter_mut().zip(vectors) {
-            // SAFETY: there are no more than sixteen lanes.
+            // SAFETY: there are at most sixteen lanes.
             unsafe { vector.store(axis.as_mut_ptr()) };
         }
         for lane in 0..Self::COUNT {
-            // SAFETY: the caller's promise.
-            let Record(sum) = unsafe { &mut *twice(sums, indices.add(lane)).cast_mut() };
+            // SAFETY: guaranteed by the caller.
+            let Record(sum) = unsafe { &mut *record_at(sums, indices.add(lane)).cast_mut() };
             for (sum, axis) in sum.iter_mut().zip(&axes) {
                 *sum += axis[lane];
             }
@@ -85,48 +89,48 @@ pub(crate) trait Lanes: Copy {
     unsafe fn add(self, other: Self) -> Self;
 
     /// `self * factor - subtrahend`
-    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self;
+    unsafe fn mul_sub(self, factor: Self, subtrahend: Self) -> Self;
 
-    /// Without their signs.
-    unsafe fn size(self) -> Self;
+    /// Absolute values.
+    unsafe fn abs(self) -> Self;
 
-    unsafe fn subtract(self, other: Self) -> Self;
+    unsafe fn sub(self, other: Self) -> Self;
 
-    unsafe fn multiply(self, other: Self) -> Self;
+    unsafe fn mul(self, other: Self) -> Self;
 
-    unsafe fn divide(self, other: Self) -> Self;
+    unsafe fn div(self, other: Self) -> Self;
 
     /// `self * factor + summand`
-    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self;
+    unsafe fn mul_add(self, factor: Self, summand: Self) -> Self;
 
-    /// The forces of springs over their lengths, `stiffness - 2 half_tension / length`, and 1 over their lengths, within
-    /// 2^-22 of `2 half_tension / length` and of themselves, from the squares of the lengths; for normal numbers.
-    unsafe fn pulls<const N: usize>(
+    /// Computes spring forces over lengths, `stiffness - 2 half_tension / length`, and inverse lengths, from squared
+    /// lengths. The errors are below 2^-22 of `2 half_tension / length` and of the inverse lengths, for normal numbers.
+    unsafe fn force_over_length<const N: usize>(
         squares: [Self; N],
         stiffnesses: [Self; N],
         half_tensions: [Self; N],
     ) -> ([Self; N], [Self; N]);
 
-    /// As [`Eights::pull`](super::Eights::pull).
+    /// Computes [`BatchKernel::pull`](super::BatchKernel::pull).
     #[inline(always)]
-    unsafe fn pull_eight(sight: Sight, links: &EightLinks) -> Option<Vec3> {
-        pull_one_by_one(sight, links)
+    unsafe fn pull_batch(input: BatchInput, links: &LinkBatch) -> Option<Vec3> {
+        pull_sequentially(input, links)
     }
 
-    /// 0 in the lanes whose bit in `mask` is not set.
-    unsafe fn where_set(self, mask: u32) -> Self;
+    /// Sets the lanes whose bit in `mask` is not set to 0.
+    unsafe fn mask(self, mask: u32) -> Self;
 
-    /// The lesser of each lane of both; that of `self` where `other` has no number.
-    unsafe fn lesser(self, other: Self) -> Self;
+    /// Minimum per lane. If `other` is NaN, the result is `self`.
+    unsafe fn min(self, other: Self) -> Self;
 
-    /// The greater of each lane of both; that of `self` where `other` has no number.
-    unsafe fn greater(self, other: Self) -> Self;
+    /// Maximum per lane. If `other` is NaN, the result is `self`.
+    unsafe fn max(self, other: Self) -> Self;
 
-    /// Whether any lane is NaN.
+    /// True if any lane is NaN.
     unsafe fn any_nan(self) -> bool;
 }
 
-/// Functions of lanes that are one instruction each.
+/// Defines functions that are one instruction each.
 macro_rules! instructions {
     ($($name:ident($($operand:ident),*) = $instruction:ident;)*) => {$(
         #[inline(always)]
@@ -138,9 +142,9 @@ macro_rules! instructions {
 
 pub(super) use instructions;
 
-/// Functions of lanes for which every processor has an instruction, alike but for its name.
+/// Defines functions that differ only in the name of the instruction.
 macro_rules! common_instructions {
-    ($splat:ident, $load:ident, $store:ident, $lesser:ident, $greater:ident) => {
+    ($splat:ident, $load:ident, $store:ident, $min:ident, $max:ident) => {
         #[inline(always)]
         unsafe fn splat(value: f32) -> Self {
             Self(unsafe { $splat(value) })
@@ -157,23 +161,23 @@ macro_rules! common_instructions {
         }
 
         #[inline(always)]
-        unsafe fn lesser(self, other: Self) -> Self {
-            Self(unsafe { $lesser(other.0, self.0) })
+        unsafe fn min(self, other: Self) -> Self {
+            Self(unsafe { $min(other.0, self.0) })
         }
 
         #[inline(always)]
-        unsafe fn greater(self, other: Self) -> Self {
-            Self(unsafe { $greater(other.0, self.0) })
+        unsafe fn max(self, other: Self) -> Self {
+            Self(unsafe { $max(other.0, self.0) })
         }
     };
 }
 
 pub(super) use common_instructions;
 
-/// The record of half an even index: half a record is as much as an address can be scaled by.
+/// Address of the record at half of an even index. Half a record is the largest scale that an address supports.
 #[inline(always)]
-pub(super) unsafe fn twice(base: *const Record, index: *const u16) -> *const Record {
-    // SAFETY: the caller promises a readable index.
+pub(super) unsafe fn record_at(base: *const Record, index: *const u16) -> *const Record {
+    // SAFETY: the caller guarantees a readable index.
     let halves = unsafe { usize::from(index.read()) };
     base.cast::<[f32; 2]>().wrapping_add(halves).cast()
 }

@@ -1,4 +1,4 @@
-//! Eight links of one node at a time, for storages that keep the links of a node side by side.
+//! Batches of eight links of one node, for storages that keep a node's links contiguously.
 
 use std::marker::PhantomData;
 
@@ -7,77 +7,78 @@ use glam::Vec3;
 use super::Lanes;
 use super::{ChosenKernel, WithLanes};
 
-/// Links: the neighbour, and the bits of the stiffness and the rest length.
-pub(crate) type EightLinks = [[u32; 3]; 8];
+/// Links: the neighbor, and the bits of the stiffness and the rest length.
+pub(crate) type LinkBatch = [[u32; 3]; 8];
 
-/// Where the coordinates of all nodes are, and those of the node whose links they are.
+/// Coordinates of all nodes, and of the node that the links belong to.
 #[derive(Clone, Copy)]
-pub(crate) struct Sight<'a> {
+pub(crate) struct BatchInput<'a> {
     pub positions: [&'a [f32]; 3],
     pub here: Vec3,
 }
 
-/// A kernel's way to work out eight links together.
-pub(crate) trait Eights: Copy {
-    /// The force of the links on their node; `None` where an end of one coincides with it. All lead to nodes.
-    fn pull(self, sight: Sight, links: &EightLinks) -> Option<Vec3>;
+/// SIMD implementation of batches.
+pub(crate) trait BatchKernel: Copy {
+    /// Computes the force of the links on their node. Returns `None` if an end coincides with the node. All neighbors
+    /// must exist.
+    fn pull(self, input: BatchInput, links: &LinkBatch) -> Option<Vec3>;
 }
 
-/// Work that takes links eight at a time.
-pub(crate) trait WithEights {
-    /// To be marked `#[inline(always)]`: it is compiled as part of its caller, with that one's instructions.
-    fn run<E: Eights>(self, eights: E);
+/// Work that processes links in batches.
+pub(crate) trait WithBatches {
+    /// Must be `#[inline(always)]`: it is compiled as part of its caller, with the caller's instructions.
+    fn run<E: BatchKernel>(self, kernel: E);
 }
 
-/// Made only where the processor has the instructions of `L`.
-struct Offered<L>(PhantomData<L>);
+/// Created only if the processor has the instructions of `L`.
+struct SupportedKernel<L>(PhantomData<L>);
 
-impl<L> Clone for Offered<L> {
+impl<L> Clone for SupportedKernel<L> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<L> Copy for Offered<L> {}
+impl<L> Copy for SupportedKernel<L> {}
 
-impl<L: Lanes> Eights for Offered<L> {
+impl<L: Lanes> BatchKernel for SupportedKernel<L> {
     #[inline(always)]
-    fn pull(self, sight: Sight, links: &EightLinks) -> Option<Vec3> {
-        // SAFETY: there would be none without the instructions.
-        unsafe { L::pull_eight(sight, links) }
+    fn pull(self, input: BatchInput, links: &LinkBatch) -> Option<Vec3> {
+        // SAFETY: this type exists only if the processor has the instructions.
+        unsafe { L::pull_batch(input, links) }
     }
 }
 
-struct Work<W>(W);
+struct BatchWork<W>(W);
 
-impl<W: WithEights> WithLanes for Work<W> {
+impl<W: WithBatches> WithLanes for BatchWork<W> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
-        self.0.run(Offered::<L>(PhantomData));
+        self.0.run(SupportedKernel::<L>(PhantomData));
     }
 }
 
 impl ChosenKernel {
-    /// Runs `work` with the kernel's way to work out eight links together.
+    /// Runs `work` with the kernel's implementation of batches.
     #[inline]
-    pub(crate) fn run_with_eights(self, work: impl WithEights) {
-        self.run_with_lanes(Work(work));
+    pub(crate) fn run_with_batches(self, work: impl WithBatches) {
+        self.run_with_lanes(BatchWork(work));
     }
 }
 
-/// One link after the other: the same bits on every processor.
+/// Processes the links sequentially. The result is bitwise identical on every processor.
 #[inline(always)]
-pub(super) fn pull_one_by_one(sight: Sight, links: &EightLinks) -> Option<Vec3> {
-    let [x, y, z] = sight.positions;
+pub(super) fn pull_sequentially(input: BatchInput, links: &LinkBatch) -> Option<Vec3> {
+    let [x, y, z] = input.positions;
     let mut sum = Vec3::ZERO;
-    for &[neighbour, stiffness, rest_length] in links {
-        let neighbour = neighbour as usize;
-        let way = Vec3::new(x[neighbour], y[neighbour], z[neighbour]) - sight.here;
-        let length = way.length_squared().sqrt();
+    for &[neighbor, stiffness, rest_length] in links {
+        let neighbor = neighbor as usize;
+        let edge = Vec3::new(x[neighbor], y[neighbor], z[neighbor]) - input.here;
+        let length = edge.length_squared().sqrt();
         let [stiffness, rest_length] = [stiffness, rest_length].map(f32::from_bits);
-        sum += way * (stiffness * (length - rest_length) / length);
+        sum += edge * (stiffness * (length - rest_length) / length);
     }
     (!sum.is_nan()).then_some(sum)
 }

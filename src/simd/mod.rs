@@ -1,4 +1,4 @@
-//! Single instruction, multiple data: numbers side by side, written once and compiled for each kind of processor, chosen at run time.
+//! SIMD: kernels are written once, compiled for each instruction set, and selected at run time.
 #![allow(unsafe_code)]
 
 pub(crate) mod algebra;
@@ -16,7 +16,7 @@ mod range;
 mod real;
 
 pub(crate) use lanes::{Index, Lanes};
-pub(crate) use link_batches::{EightLinks, Eights, Sight, WithEights};
+pub(crate) use link_batches::{BatchInput, BatchKernel, LinkBatch, WithBatches};
 pub(crate) use prefetch::prefetch;
 pub(crate) use range::Range;
 use range::Ranges;
@@ -24,12 +24,12 @@ pub(crate) use real::{InLanes, Real};
 
 use crate::base::{Error, Result};
 
-/// A vector, and a number to spare, so that it never lies across two cache lines.
+/// A vector with one number of padding, so that it never crosses a cache line.
 #[repr(C, align(16))]
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Record(pub [f32; 4]);
 
-/// The widest instructions that kernels use.
+/// The SIMD level: the widest instructions that kernels use.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -44,7 +44,7 @@ pub(crate) struct Record(pub [f32; 4]);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kernel {
-    /// What the processor offers, the widest first.
+    /// The widest instructions that the processor supports.
     #[default]
     Best,
     /// Sixteen lanes of x86-64's AVX-512 (F, BW, DQ, VL).
@@ -53,15 +53,15 @@ pub enum Kernel {
     Avx2,
     /// Four lanes of AArch64's NEON.
     Neon,
-    /// The same bits on every processor.
+    /// Plain code; the results are bitwise identical on every processor.
     Portable,
 }
 
 impl Kernel {
-    /// The kernel to be used on this processor.
+    /// Selects the kernel for this processor.
     ///
     /// # Errors
-    /// [`Error::Unsupported`]: the processor does not offer it.
+    /// [`Error::Unsupported`]: the processor does not support it.
     pub(crate) fn choose(self) -> Result<ChosenKernel> {
         let best = [Self::Avx512, Self::Avx2, Self::Neon];
         let chosen = match self {
@@ -93,7 +93,7 @@ impl Kernel {
             }
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
-            // Part of every processor of its kind.
+            // Every AArch64 processor has NEON.
             Self::Neon => cfg!(all(target_arch = "aarch64", target_endian = "little")),
             #[cfg(not(target_arch = "x86_64"))]
             Self::Avx512 | Self::Avx2 => false,
@@ -101,7 +101,7 @@ impl Kernel {
     }
 }
 
-/// A kernel whose instructions the processor has: [`Kernel::choose`] alone makes one.
+/// A kernel that the processor supports. Only [`Kernel::choose`] creates one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ChosenKernel(Kernel);
 
@@ -111,29 +111,29 @@ impl ChosenKernel {
     }
 }
 
-/// Plain loops that the compiler turns into the instructions of a kernel.
+/// Plain loops that the compiler vectorizes for a kernel.
 pub(crate) trait Loops {
     type Output;
 
-    /// To be marked `#[inline(always)]`: it is compiled as part of its caller, with that one's instructions.
+    /// Must be `#[inline(always)]`: it is compiled as part of its caller, with the caller's instructions.
     fn run(self) -> Self::Output;
 }
 
-/// Work that is written for any kernel's lanes.
+/// Work that is generic over lanes.
 pub(crate) trait WithLanes {
     type Output;
 
-    /// To be marked `#[inline(always)]`, as [`Loops::run`].
+    /// Must be `#[inline(always)]`, like [`Loops::run`].
     ///
     /// # Safety
-    /// The processor has the instructions of `L`.
+    /// The processor must have the instructions of `L`.
     unsafe fn run<L: Lanes>(self) -> Self::Output;
 }
 
-/// Plain loops have no need of lanes.
-struct Plain<L>(L);
+/// Adapter for plain loops, which do not use lanes.
+struct PlainLoops<L>(L);
 
-impl<L: Loops> WithLanes for Plain<L> {
+impl<L: Loops> WithLanes for PlainLoops<L> {
     type Output = L::Output;
 
     #[inline(always)]
@@ -146,10 +146,10 @@ impl ChosenKernel {
     /// Runs `loops` with the kernel's instructions.
     #[inline]
     pub(crate) fn run<L: Loops>(self, loops: L) -> L::Output {
-        self.run_with_lanes(Plain(loops))
+        self.run_with_lanes(PlainLoops(loops))
     }
 
-    /// The ranges of some numbers along each axis.
+    /// Ranges of numbers along each axis.
     pub(crate) fn ranges(self, axes: [&[f32]; 3]) -> [Range; 3] {
         self.run_with_lanes(Ranges(axes))
     }
@@ -159,13 +159,13 @@ impl ChosenKernel {
     pub(crate) fn run_with_lanes<W: WithLanes>(self, work: W) -> W::Output {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: a kernel is chosen only where the processor has its instructions.
+            // SAFETY: a kernel is selected only if the processor has its instructions.
             Kernel::Avx512 => unsafe { run_avx512(work) },
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: the same.
+            // SAFETY: a kernel is selected only if the processor has its instructions.
             Kernel::Avx2 => unsafe { run_avx2(work) },
             #[cfg(all(target_arch = "aarch64", target_endian = "little"))]
-            // SAFETY: every processor of this kind has them.
+            // SAFETY: every AArch64 processor has them.
             Kernel::Neon => unsafe { work.run::<neon::NeonLanes>() },
             // SAFETY: no special instructions.
             _ => unsafe { work.run::<portable::PortableLanes>() },
@@ -176,13 +176,13 @@ impl ChosenKernel {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
 fn run_avx512<W: WithLanes>(work: W) -> W::Output {
-    // SAFETY: these are the instructions.
+    // SAFETY: these instructions are enabled.
     unsafe { work.run::<avx512::Avx512Lanes>() }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn run_avx2<W: WithLanes>(work: W) -> W::Output {
-    // SAFETY: these are the instructions.
+    // SAFETY: these instructions are enabled.
     unsafe { work.run::<avx2::Avx2Lanes>() }
 }

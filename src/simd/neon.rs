@@ -9,16 +9,16 @@ use super::lanes::{Index, common_instructions, instructions};
 #[derive(Clone, Copy)]
 pub(super) struct NeonLanes(float32x4_t);
 
-/// All bits of the lanes whose bit in `mask` is set.
+/// Sets all bits of the lanes whose bit in `mask` is set.
 #[inline(always)]
-unsafe fn spread(mask: u32) -> uint32x4_t {
+unsafe fn lane_mask(mask: u32) -> uint32x4_t {
     const BITS: [u32; 4] = [1, 2, 4, 8];
-    // SAFETY: every processor of this kind has the instructions; four numbers are read.
+    // SAFETY: every AArch64 processor has the instructions; four numbers are read.
     unsafe { vtstq_u32(vdupq_n_u32(mask), vld1q_u32(BITS.as_ptr())) }
 }
 
-// SAFETY of every block: every processor of this kind has the instructions, and the caller promises that what pointers lead
-// to is there; no load or store here asks for more than the alignment of a number.
+// SAFETY of every block: every AArch64 processor has the instructions, and the caller guarantees valid pointers. Loads
+// and stores need only the alignment of a number.
 #[allow(clippy::undocumented_unsafe_blocks)]
 impl Lanes for NeonLanes {
     const COUNT: usize = 4;
@@ -27,12 +27,13 @@ impl Lanes for NeonLanes {
 
     #[inline(always)]
     unsafe fn gather<I: Index>(base: *const f32, indices: *const I) -> Self {
-        let values: [f32; 4] = std::array::from_fn(|lane| unsafe { *base.wrapping_add((*indices.add(lane)).place()) });
+        let values: [f32; 4] =
+            std::array::from_fn(|lane| unsafe { *base.wrapping_add((*indices.add(lane)).to_usize()) });
         Self(unsafe { vld1q_f32(values.as_ptr()) })
     }
 
     #[inline(always)]
-    unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
+    unsafe fn load_transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
         unsafe {
             let [a, b, c, d] = [0, 1, 2, 3].map(|lane| vld1q_f32(at(lane).cast()));
             let (low_ac, high_ac) = (vzip1q_f32(a, c), vzip2q_f32(a, c));
@@ -47,25 +48,25 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
-    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+    unsafe fn mul_sub(self, factor: Self, subtrahend: Self) -> Self {
         Self(unsafe { vnegq_f32(vfmsq_f32(subtrahend.0, self.0, factor.0)) })
     }
 
     instructions! {
-        size() = vabsq_f32;
+        abs() = vabsq_f32;
         add(other) = vaddq_f32;
-        subtract(other) = vsubq_f32;
-        multiply(other) = vmulq_f32;
-        divide(other) = vdivq_f32;
+        sub(other) = vsubq_f32;
+        mul(other) = vmulq_f32;
+        div(other) = vdivq_f32;
     }
 
     #[inline(always)]
-    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
+    unsafe fn mul_add(self, factor: Self, summand: Self) -> Self {
         Self(unsafe { vfmaq_f32(summand.0, self.0, factor.0) })
     }
 
     #[inline(always)]
-    unsafe fn pulls<const N: usize>(
+    unsafe fn force_over_length<const N: usize>(
         squares: [Self; N],
         stiffnesses: [Self; N],
         half_tensions: [Self; N],
@@ -81,8 +82,8 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
-    unsafe fn where_set(self, mask: u32) -> Self {
-        Self(unsafe { vreinterpretq_f32_u32(vandq_u32(vreinterpretq_u32_f32(self.0), spread(mask))) })
+    unsafe fn mask(self, mask: u32) -> Self {
+        Self(unsafe { vreinterpretq_f32_u32(vandq_u32(vreinterpretq_u32_f32(self.0), lane_mask(mask))) })
     }
 
     #[inline(always)]

@@ -1,4 +1,5 @@
-//! Four lanes in plain Rust, with the same bits on every processor: exact roots and quotients, no fused operations.
+//! Four lanes in plain Rust. Results are bitwise identical on every processor: roots and quotients are exact, and no
+//! operations are fused.
 
 use std::array::from_fn;
 
@@ -19,37 +20,37 @@ impl Lanes for PortableLanes {
 
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         Self(unsafe { from.cast::<[f32; 4]>().read() })
     }
 
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { to.cast::<[f32; 4]>().write(self.0) }
     }
 
     #[inline(always)]
     unsafe fn gather<I: Index>(base: *const f32, indices: *const I) -> Self {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         Self(from_fn(|lane| unsafe {
-            *base.wrapping_add((*indices.add(lane)).place())
+            *base.wrapping_add((*indices.add(lane)).to_usize())
         }))
     }
 
     #[inline(always)]
-    unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
-        // SAFETY: the caller's promise.
+    unsafe fn load_transposed(at: impl Fn(usize) -> *const Record) -> [Self; 4] {
+        // SAFETY: guaranteed by the caller.
         from_fn(|axis| Self(from_fn(|lane| unsafe { (*at(lane)).0[axis] })))
     }
 
     #[inline(always)]
-    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+    unsafe fn mul_sub(self, factor: Self, subtrahend: Self) -> Self {
         Self(from_fn(|lane| self.0[lane] * factor.0[lane] - subtrahend.0[lane]))
     }
 
     #[inline(always)]
-    unsafe fn size(self) -> Self {
+    unsafe fn abs(self) -> Self {
         Self(self.0.map(f32::abs))
     }
 
@@ -59,27 +60,27 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    unsafe fn subtract(self, other: Self) -> Self {
+    unsafe fn sub(self, other: Self) -> Self {
         Self(from_fn(|lane| self.0[lane] - other.0[lane]))
     }
 
     #[inline(always)]
-    unsafe fn multiply(self, other: Self) -> Self {
+    unsafe fn mul(self, other: Self) -> Self {
         Self(from_fn(|lane| self.0[lane] * other.0[lane]))
     }
 
     #[inline(always)]
-    unsafe fn divide(self, other: Self) -> Self {
+    unsafe fn div(self, other: Self) -> Self {
         Self(from_fn(|lane| self.0[lane] / other.0[lane]))
     }
 
     #[inline(always)]
-    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
+    unsafe fn mul_add(self, factor: Self, summand: Self) -> Self {
         Self(from_fn(|lane| self.0[lane] * factor.0[lane] + summand.0[lane]))
     }
 
     #[inline(always)]
-    unsafe fn pulls<const N: usize>(
+    unsafe fn force_over_length<const N: usize>(
         squares: [Self; N],
         stiffnesses: [Self; N],
         half_tensions: [Self; N],
@@ -93,32 +94,32 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    unsafe fn where_set(self, mask: u32) -> Self {
+    unsafe fn mask(self, mask: u32) -> Self {
         Self(from_fn(|lane| if mask >> lane & 1 == 1 { self.0[lane] } else { 0.0 }))
     }
 
     #[inline(always)]
-    unsafe fn lesser(self, other: Self) -> Self {
-        let lesser = |lane: usize| {
+    unsafe fn min(self, other: Self) -> Self {
+        let min = |lane: usize| {
             if other.0[lane] < self.0[lane] {
                 other.0[lane]
             } else {
                 self.0[lane]
             }
         };
-        Self(from_fn(lesser))
+        Self(from_fn(min))
     }
 
     #[inline(always)]
-    unsafe fn greater(self, other: Self) -> Self {
-        let greater = |lane: usize| {
+    unsafe fn max(self, other: Self) -> Self {
+        let max = |lane: usize| {
             if other.0[lane] > self.0[lane] {
                 other.0[lane]
             } else {
                 self.0[lane]
             }
         };
-        Self(from_fn(greater))
+        Self(from_fn(max))
     }
 
     #[inline(always)]

@@ -1,9 +1,9 @@
-//! The least and the greatest of many numbers.
+//! Minimum and maximum of many numbers.
 
 use super::Lanes;
 use super::WithLanes;
 
-/// The least and the greatest of some numbers; of what is NaN nothing is said.
+/// Minimum and maximum. The result is unspecified if a number is NaN.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Range {
     pub least: f32,
@@ -24,7 +24,7 @@ impl Range {
     }
 }
 
-/// The ranges of some numbers along each axis, for a kernel to find.
+/// Numbers along each axis, whose ranges a kernel computes.
 pub(super) struct Ranges<'a>(pub [&'a [f32]; 3]);
 
 impl WithLanes for Ranges<'_> {
@@ -38,34 +38,34 @@ impl WithLanes for Ranges<'_> {
     }
 }
 
-/// The range of `values`.
+/// Range of `values`.
 ///
 /// # Safety
-/// The processor has the instructions of `L`.
+/// The processor must have the instructions of `L`.
 #[inline(always)]
 unsafe fn range<L: Lanes>(values: &[f32]) -> Range {
-    // Two chains, because each step of one waits for the one before.
+    // Two accumulators shorten the dependency chain.
     let (pairs, rest) = values.split_at(values.len() / (2 * L::COUNT) * (2 * L::COUNT));
     let mut lanes = [f32::INFINITY; 16];
-    let mut found = Range::EMPTY;
-    // SAFETY: the same contract; every pair lies within the slice, and every lane within the array.
+    let mut range = Range::EMPTY;
+    // SAFETY: the same contract. Every pair is within the slice, and every lane within the array.
     unsafe {
         let (mut least, mut greatest) = ([L::splat(f32::INFINITY); 2], [L::splat(f32::NEG_INFINITY); 2]);
         for pair in pairs.chunks_exact(2 * L::COUNT) {
             for half in 0..2 {
                 let values = L::load(pair.as_ptr().add(half * L::COUNT));
-                least[half] = least[half].lesser(values);
-                greatest[half] = greatest[half].greater(values);
+                least[half] = least[half].min(values);
+                greatest[half] = greatest[half].max(values);
             }
         }
-        least[0].lesser(least[1]).store(lanes.as_mut_ptr());
+        least[0].min(least[1]).store(lanes.as_mut_ptr());
         for &lane in &lanes[..L::COUNT] {
-            found.least = if lane < found.least { lane } else { found.least };
+            range.least = if lane < range.least { lane } else { range.least };
         }
-        greatest[0].greater(greatest[1]).store(lanes.as_mut_ptr());
+        greatest[0].max(greatest[1]).store(lanes.as_mut_ptr());
         for &lane in &lanes[..L::COUNT] {
-            found.greatest = if lane > found.greatest { lane } else { found.greatest };
+            range.greatest = if lane > range.greatest { lane } else { range.greatest };
         }
     }
-    rest.iter().fold(found, |found, &value| found.with(value))
+    rest.iter().fold(range, |range, &value| range.with(value))
 }

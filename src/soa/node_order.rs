@@ -1,4 +1,4 @@
-//! The order in which a body keeps its nodes, and the caller's.
+//! Mapping between the caller's node order and the internal one.
 
 use super::PerNode;
 use std::ops::Range;
@@ -6,14 +6,15 @@ use std::ops::Range;
 use crate::base::{Result, memory};
 use crate::codec::saved;
 
-/// Where each node is kept, for bodies that do not keep them in the caller's order.
+/// Permutation of nodes, for bodies that reorder them.
 ///
-/// A node is called by the caller's number at the door, and by its own number, its place in every list of the body, inside.
+/// The interface uses the caller's number of a node. Internally a node has the body's own number, its index in every
+/// list.
 #[derive(Debug, Default)]
 pub(crate) struct NodeOrder {
-    /// For each of the caller's numbers the body's own; empty where they are the same.
+    /// The body's own number for each of the caller's; empty if they are equal.
     own: Vec<u32>,
-    /// The reverse.
+    /// The inverse permutation.
     caller: Vec<u32>,
 }
 
@@ -21,7 +22,7 @@ saved! { NodeOrder { own, caller } }
 
 impl PerNode for NodeOrder {
     fn reserve_nodes(&mut self, node_count: usize) -> Result<()> {
-        if self.is_callers() {
+        if self.is_identity() {
             return Ok(());
         }
         memory::reserve(&mut self.own, node_count)?;
@@ -29,54 +30,54 @@ impl PerNode for NodeOrder {
     }
 
     fn grow(&mut self, node_count: usize) {
-        if !self.is_callers() {
-            let more = self.own.len() as u32..node_count as u32;
-            self.own.extend(more.clone());
-            self.caller.extend(more);
+        if !self.is_identity() {
+            let added = self.own.len() as u32..node_count as u32;
+            self.own.extend(added.clone());
+            self.caller.extend(added);
         }
     }
 }
 
 impl NodeOrder {
-    /// Whether nodes are kept in the caller's order.
-    pub fn is_callers(&self) -> bool {
+    /// True if nodes are in the caller's order.
+    pub fn is_identity(&self) -> bool {
         self.own.is_empty()
     }
 
-    /// The order in which the caller's number `caller[i]` is kept at place i.
+    /// Creates the order in which node i has the caller's number `caller[i]`.
     pub fn new(caller: Vec<u32>) -> Result<Self> {
         let mut own = memory::filled(0, caller.len())?;
-        for (place, &number) in (0..).zip(&caller) {
-            own[number as usize] = place;
+        for (index, &number) in (0..).zip(&caller) {
+            own[number as usize] = index;
         }
         Ok(Self { own, caller })
     }
 
-    /// Whether each number of so many nodes has its place.
+    /// True if the permutation is valid for this number of nodes.
     pub fn is_sound(&self, count: usize) -> bool {
-        let is_back = |(place, &number): (usize, &u32)| self.own.get(number as usize) == Some(&(place as u32));
+        let is_inverse = |(index, &number): (usize, &u32)| self.own.get(number as usize) == Some(&(index as u32));
         self.own.len() == self.caller.len()
-            && (self.is_callers() || self.own.len() == count && self.caller.iter().enumerate().all(is_back))
+            && (self.is_identity() || self.own.len() == count && self.caller.iter().enumerate().all(is_inverse))
     }
 
-    /// The body's own number of one of the caller's.
+    /// Converts the caller's number to the body's own.
     #[inline]
     pub fn own(&self, caller: u32) -> u32 {
         self.own.get(caller as usize).map_or(caller, |&own| own)
     }
 
-    /// The body's own numbers of some of the caller's, where they are not the same.
-    pub fn owns(&self, callers: Range<usize>) -> &[u32] {
+    /// Own numbers of a range of the caller's, if they differ.
+    pub fn own_range(&self, callers: Range<usize>) -> &[u32] {
         &self.own[callers]
     }
 
-    /// The caller's number of one of the body's own.
+    /// Converts the body's own number to the caller's.
     #[inline]
     pub fn caller(&self, own: u32) -> u32 {
         self.caller.get(own as usize).map_or(own, |&caller| caller)
     }
 
-    /// The body's own numbers of the corners of triangles.
+    /// Converts the corners of triangles to the body's own numbers.
     pub fn own_triangles(&self, triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>> {
         memory::collected(triangles.iter().map(|corners| corners.map(|corner| self.own(corner))))
     }

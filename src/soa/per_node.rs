@@ -1,13 +1,13 @@
-//! What a body has for each of its nodes: one list of it says what is made room for and what grows as nodes come.
+//! Arrays with one entry per node: a common interface to reserve capacity and to grow.
 
 use crate::base::{Result, memory};
 
-/// What there is for each node of a body. First there is room for nodes, which can fail; then they come, which cannot.
+/// Data with one entry per node. Reserving capacity can fail; growing within it cannot.
 pub(crate) trait PerNode {
-    /// Makes room for so many nodes in all.
+    /// Reserves capacity for `count` nodes in all.
     fn reserve_nodes(&mut self, count: usize) -> Result<()>;
 
-    /// Adds nodes, for which there is room, up to so many in all.
+    /// Adds nodes within the capacity, up to `count` in all.
     fn grow(&mut self, count: usize);
 }
 
@@ -51,7 +51,8 @@ impl<T: PerNode + ?Sized> PerNode for Box<T> {
     }
 }
 
-/// Lists the fields that a structure has for each node, and those that it has for each tile: `per_node! { Name { of, nodes } tiles { of, tiles } }`.
+/// Implements [`PerNode`] from lists of per-node and per-tile fields:
+/// `per_node! { Name { of, nodes } tiles { of, tiles } }`.
 macro_rules! per_node {
     ($name:ty { $($field:tt),* $(,)? } $(tiles { $($tiles:ident),* })?) => {
         impl $crate::soa::PerNode for $name {

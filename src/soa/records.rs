@@ -1,4 +1,4 @@
-//! Vectors of nodes a second time, as records: three numbers that lie together are one load, not three.
+//! Vectors of nodes as records: three adjacent numbers need one load instead of three.
 
 use super::TILE;
 use super::per_node;
@@ -18,7 +18,7 @@ saved! { Records { 0 } }
 per_node! { Records { 0 } }
 
 impl Records {
-    /// `count` of them, all zero.
+    /// Creates `count` zero records.
     pub fn zeros(count: usize) -> Result<Self> {
         Ok(Self(memory::filled(Record::default(), count)?))
     }
@@ -36,7 +36,7 @@ impl Records {
     }
 }
 
-/// Makes records of vectors.
+/// Copies vectors to records.
 pub(crate) struct WriteRecords<'a> {
     pub axes: [&'a [f32]; 3],
     pub records: &'a mut [Record],

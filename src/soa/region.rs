@@ -1,31 +1,31 @@
-//! Some nodes of a body, and what is to be done with what lies between them.
+//! Subsets of a body's nodes, and scale factors for the springs and elements between them.
 
 use super::TILE;
 use crate::base::memory;
 
-/// Some nodes, in the body's own numbers.
+/// Set of nodes, by the body's own numbers.
 #[derive(Debug)]
 pub(crate) struct Region {
-    /// In order, each once.
+    /// Sorted, without duplicates.
     nodes: Vec<u32>,
 }
 
-/// By what a region is scaled.
+/// Scale factors of a region.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scale {
     /// At least 0.
     pub stiffness: f32,
-    /// Above 0.
+    /// Greater than 0.
     pub length: f32,
 }
 
 impl Region {
-    pub fn of(mut nodes: Vec<u32>) -> Self {
+    pub fn from_nodes(mut nodes: Vec<u32>) -> Self {
         memory::sort_once(&mut nodes);
         Self { nodes }
     }
 
-    /// In order.
+    /// The nodes, sorted.
     pub fn nodes(&self) -> &[u32] {
         &self.nodes
     }
@@ -38,7 +38,7 @@ impl Region {
         nodes.iter().all(|&node| self.has(node))
     }
 
-    /// The tiles that have one of its nodes, in order.
+    /// Tiles that contain nodes of the region, sorted.
     pub fn tiles(&self) -> impl Iterator<Item = usize> {
         let same_tile = |a: &u32, b: &u32| *a as usize / TILE == *b as usize / TILE;
         self.nodes.chunk_by(same_tile).map(|nodes| nodes[0] as usize / TILE)

@@ -1,24 +1,24 @@
-//! Tiles: ranges of nodes that are worked on together, small enough that what they share stays in the nearest cache.
+//! Tiles: ranges of nodes that are processed together and fit into the nearest cache.
 
 use std::ops::Range;
 
 use glam::Vec3;
 
-/// Nodes of a tile; the last of a body has fewer.
+/// Nodes per tile. The last tile of a body has fewer.
 pub(crate) const TILE: usize = 512;
 
-/// How many tiles `node_count` nodes make.
+/// Number of tiles for `node_count` nodes.
 pub(crate) fn tile_count(node_count: usize) -> usize {
     node_count.div_ceil(TILE)
 }
 
-/// The nodes of a tile.
+/// Nodes of a tile.
 #[inline(always)]
 pub(crate) fn tile_nodes(tile: usize, node_count: usize) -> Range<usize> {
     tile * TILE..node_count.min((tile + 1) * TILE)
 }
 
-/// The forces on the nodes of one tile, N.
+/// Forces on the nodes of one tile, N.
 #[repr(C, align(64))]
 #[derive(Debug)]
 pub(crate) struct TileForces {
@@ -39,14 +39,14 @@ impl TileForces {
     }
 
     #[inline(always)]
-    pub fn get(&self, place: usize) -> Vec3 {
-        Vec3::from(self.axes().map(|axis| axis[place]))
+    pub fn get(&self, index: usize) -> Vec3 {
+        Vec3::from(self.axes().map(|axis| axis[index]))
     }
 
     #[inline(always)]
-    pub fn set(&mut self, place: usize, force: Vec3) {
+    pub fn set(&mut self, index: usize, force: Vec3) {
         for (axis, value) in self.axes.iter_mut().zip(force.to_array()) {
-            axis[place] = value;
+            axis[index] = value;
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Vectors of all nodes as structure of arrays, laid out for kernels that take sixteen nodes at a time.
+//! Structure-of-arrays vectors, laid out for kernels that process sixteen nodes at a time.
 
 use super::PerNode;
 use std::ops::Range;
@@ -12,39 +12,39 @@ use crate::codec::{Reader, Saved, Writer, floats_into};
 use crate::simd::Record;
 use crate::threads::{Ragged, Tiles};
 
-/// How many numbers there are to spare on either side: a kernel that takes the neighbours of sixteen nodes in one load may
-/// read so far beyond the ends.
+/// Padding before and after each axis. A kernel that loads the neighbors of sixteen nodes at once may read this far
+/// beyond the ends.
 pub(crate) const MARGIN: usize = 16;
 
-/// Numbers in a cache line.
+/// Numbers per cache line.
 const LINE: usize = 16;
 
-/// Numbers in a memory page. Arrays that begin at the same place of a page get in each other's way: a load waits for the store before it where their
-/// addresses agree in the last twelve bits.
+/// Numbers per memory page. Arrays at equal page offsets conflict: a load waits for an earlier store whose address has
+/// the same lowest twelve bits.
 const PAGE: usize = 1024;
 
-/// An axis that is longer than a page begins so many numbers further into its page than the one before it.
+/// Offset between the page offsets of consecutive axes, for axes longer than a page.
 const SKEW: usize = 21 * LINE;
 
-/// Vectors of some nodes in a row, to be read; at the ends of a body also the numbers to spare beyond them.
+/// Read-only vectors of consecutive nodes. At the ends of a body they include the padding.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View<'a> {
     axes: [&'a [f32]; 3],
-    /// What would be the number of the node that the first belongs to.
+    /// Node number of the first entry, negative in the padding.
     start: isize,
-    /// The same vectors from node 0 on, where they are there as records.
+    /// The same vectors as records, from node 0 on, if available.
     records: Option<&'a [Record]>,
 }
 
-/// Where the vectors of node 0 would be, whether or not they are there.
+/// Addresses of node 0, which may lie outside the view.
 #[derive(Clone, Copy)]
-pub(crate) struct Places {
+pub(crate) struct BasePointers {
     pub axes: [*const f32; 3],
     pub records: Option<*const Record>,
 }
 
 impl<'a> View<'a> {
-    /// Vectors along each axis from the node of this number on.
+    /// Creates a view of vectors along each axis. The first belongs to node `start`.
     pub fn new(axes: [&'a [f32]; 3], start: isize) -> Self {
         Self {
             axes,
@@ -53,7 +53,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// With the same vectors as records.
+    /// Adds the same vectors as records.
     pub fn with_records(self, records: Option<&'a Records>) -> Self {
         Self {
             records: records.map(Records::as_slice),
@@ -61,7 +61,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Whether all of these may be read, and all nodes of the body where they are records.
+    /// True if all these nodes may be read, and if records cover all nodes of the body.
     pub fn covers(&self, nodes: &Range<isize>, node_count: usize) -> bool {
         self.start <= nodes.start
             && self
@@ -76,7 +76,7 @@ impl<'a> View<'a> {
         Vec3::from(self.axes.map(|axis| axis[(node as isize - self.start) as usize]))
     }
 
-    /// The same vectors from node 0 on as records, none where there are none.
+    /// The records from node 0 on; empty if there are none.
     #[inline(always)]
     pub fn records(&self) -> &'a [Record] {
         self.records.unwrap_or(&[])
@@ -86,54 +86,54 @@ impl<'a> View<'a> {
         self.records.is_some()
     }
 
-    /// Those of some nodes along each axis.
+    /// Coordinates of these nodes along each axis.
     #[inline(always)]
     pub fn slices(&self, nodes: Range<usize>) -> [&'a [f32]; 3] {
-        let place = |node: usize| (node as isize - self.start) as usize;
-        self.axes.map(|axis| &axis[place(nodes.start)..place(nodes.end)])
+        let index = |node: usize| (node as isize - self.start) as usize;
+        self.axes.map(|axis| &axis[index(nodes.start)..index(nodes.end)])
     }
 
-    /// Where node 0 would be.
+    /// Addresses of node 0.
     #[inline(always)]
-    pub fn places(&self) -> Places {
-        Places {
+    pub fn base_pointers(&self) -> BasePointers {
+        BasePointers {
             axes: self.axes.map(|axis| axis.as_ptr().wrapping_offset(-self.start)),
             records: self.records.map(<[Record]>::as_ptr),
         }
     }
 }
 
-/// One vector per node: a number per node along each axis, the first aligned to a cache line, with zeros on both sides that may be read.
+/// One vector per node: an array per axis, with zero padding on both sides. The first axis is aligned to a cache line.
 #[derive(Debug)]
 pub(crate) struct Vectors {
     values: Vec<f32>,
-    /// The place of node 0 along the first axis, and how far it is from there to the next axis.
+    /// Index of node 0 along the first axis, and distance between axes.
     first: usize,
     stride: usize,
     count: usize,
 }
 
-/// Where they lie in memory is not kept, but how much room there is.
+/// Saves the capacity, but not the memory layout.
 impl Saved for Vectors {
     const SHAPE: u64 = Vec::<Vec3>::SHAPE;
     const LEAST: usize = 16;
 
     fn save(&self, to: &mut Writer) {
         self.len().save(to);
-        self.room().save(to);
-        to.needs(3 * size_of::<f32>() * self.room());
+        self.capacity().save(to);
+        to.needs(3 * size_of::<f32>() * self.capacity());
         for axis in self.axes() {
             f32::save_all(axis, to);
         }
     }
 
     fn load(from: &mut Reader) -> Result<Self> {
-        let (count, room) = (usize::load(from)?, usize::load(from)?);
-        if room < count || !room.is_multiple_of(LINE) {
+        let (count, capacity) = (usize::load(from)?, usize::load(from)?);
+        if capacity < count || !capacity.is_multiple_of(LINE) {
             return Err(from.refusal("vectors have not the room that they take"));
         }
-        from.will_take(room.checked_mul(3 * size_of::<f32>()))?;
-        let mut vectors = Self::with_room(count, room)?;
+        from.reserve_memory(capacity.checked_mul(3 * size_of::<f32>()))?;
+        let mut vectors = Self::with_capacity(count, capacity)?;
         for axis in vectors.axes_mut() {
             floats_into(axis, from)?;
         }
@@ -152,21 +152,21 @@ impl PerNode for Vectors {
 }
 
 impl Vectors {
-    /// `count` zero vectors.
+    /// Creates `count` zero vectors.
     pub fn zeros(count: usize) -> Result<Self> {
-        Self::with_room(count, count)
+        Self::with_capacity(count, count)
     }
 
-    /// The same with room for `room` vectors, at least as many, to be grown into.
-    fn with_room(count: usize, room: usize) -> Result<Self> {
-        let least = room.next_multiple_of(LINE) + 2 * MARGIN;
-        let stride = if least < PAGE {
-            least
+    /// Creates `count` zero vectors with this capacity.
+    fn with_capacity(count: usize, capacity: usize) -> Result<Self> {
+        let padded = capacity.next_multiple_of(LINE) + 2 * MARGIN;
+        let stride = if padded < PAGE {
+            padded
         } else {
-            (least - SKEW).next_multiple_of(PAGE) + SKEW
+            (padded - SKEW).next_multiple_of(PAGE) + SKEW
         };
         let values = memory::filled(0.0_f32, LINE + 3 * stride)?;
-        // What cannot be aligned is not, and only slower.
+        // Misaligned data are only slower.
         let aligned = values.as_ptr().align_offset(LINE * size_of::<f32>()).min(LINE);
         Ok(Self {
             values,
@@ -176,38 +176,38 @@ impl Vectors {
         })
     }
 
-    /// Makes room for so many vectors in all.
+    /// Reserves capacity for `count` vectors in all.
     pub fn reserve(&mut self, count: usize) -> Result<()> {
-        if count > self.room() {
-            let mut roomier = Self::with_room(self.count, count)?;
-            roomier.copy_from(self);
-            *self = roomier;
+        if count > self.capacity() {
+            let mut enlarged = Self::with_capacity(self.count, count)?;
+            enlarged.copy_from(self);
+            *self = enlarged;
         }
         Ok(())
     }
 
-    /// Adds zero vectors, for which there is room, up to so many in all.
+    /// Adds zero vectors within the capacity, up to `count` in all.
     pub fn grow(&mut self, count: usize) {
-        assert!(count <= self.room());
+        assert!(count <= self.capacity());
         self.count = self.count.max(count);
     }
 
-    /// So many vectors may there be, a multiple of a line's.
-    fn room(&self) -> usize {
+    /// Maximum number of vectors, a multiple of a cache line.
+    fn capacity(&self) -> usize {
         self.stride - 2 * MARGIN
     }
 
-    /// The places of the numbers along an axis, with a margin before the first and one after the last block of sixteen.
+    /// Indices along an axis, with padding before the first number and after the last block of sixteen.
     #[inline(always)]
-    fn padded_places(&self, axis: usize) -> Range<usize> {
+    fn padded_range(&self, axis: usize) -> Range<usize> {
         let start = self.first - MARGIN + axis * self.stride;
         start..start + self.count.next_multiple_of(LINE) + 2 * MARGIN
     }
 
-    /// The numbers along each axis with those margins.
+    /// Numbers along each axis, with padding.
     #[inline(always)]
     fn padded_mut(&mut self) -> [&mut [f32]; 3] {
-        let all = self.padded_places(0);
+        let all = self.padded_range(0);
         let (x, rest) = self.values[all.start..].split_at_mut(self.stride);
         let (y, z) = rest.split_at_mut(self.stride);
         [x, y, z].map(|axis| &mut axis[..all.len()])
@@ -233,7 +233,7 @@ impl Vectors {
         self.count
     }
 
-    /// The coordinates along each axis.
+    /// Coordinates along each axis.
     #[inline(always)]
     pub fn axes(&self) -> [&[f32]; 3] {
         [0, 1, 2].map(|axis| {
@@ -248,75 +248,75 @@ impl Vectors {
         self.padded_mut().map(|axis| &mut axis[MARGIN..MARGIN + count])
     }
 
-    /// The coordinates of some nodes along each axis.
+    /// Coordinates of these nodes along each axis.
     #[inline(always)]
     pub fn slices(&self, nodes: Range<usize>) -> [&[f32]; 3] {
         self.axes().map(|axis| &axis[nodes.clone()])
     }
 
-    /// The coordinates along each axis, tile by tile.
+    /// Coordinates along each axis, in tiles.
     pub fn tiles_mut(&mut self) -> [Tiles<'_, f32>; 3] {
         self.axes_mut().map(|axis| Tiles::new(axis, TILE))
     }
 
-    /// All of them, to be read, with the margins on both sides.
+    /// View of all vectors, with padding.
     #[inline(always)]
     pub fn view(&self) -> View<'_> {
         View {
-            axes: [0, 1, 2].map(|axis| &self.values[self.padded_places(axis)]),
+            axes: [0, 1, 2].map(|axis| &self.values[self.padded_range(axis)]),
             start: -(MARGIN as isize),
             records: None,
         }
     }
 
-    /// The coordinates along each axis cut into pieces, each from the first node of a tile on; the first piece has the margin
-    /// before it and the last the margin after it. `starts` are to be those of [`Vectors::piece_start`].
+    /// Splits the coordinates along each axis at tile boundaries, `starts`, which must come from
+    /// [`Vectors::piece_start`]. The first piece includes the padding before it, the last one the padding after it.
     pub fn pieces_mut<'a>(&'a mut self, starts: &'a [usize]) -> [Ragged<'a, f32>; 3] {
         self.padded_mut().map(|axis| Ragged::new(axis, starts))
     }
 
-    /// Where a piece begins that begins with this tile.
+    /// Start of the piece whose first tile is `tile`.
     pub fn piece_start(tile: usize) -> usize {
         if tile == 0 { 0 } else { MARGIN + tile * TILE }
     }
 
-    /// What would be the number of the node that such a piece begins with.
+    /// Node number of the first entry of such a piece, negative in the padding.
     pub fn piece_node(tile: usize) -> isize {
         Self::piece_start(tile) as isize - MARGIN as isize
     }
 
-    /// All of them, in order.
+    /// All vectors, in order.
     pub fn iter(&self) -> impl Iterator<Item = Vec3> + '_ {
         let [x, y, z] = self.axes();
         x.iter().zip(y).zip(z).map(|((&x, &y), &z)| Vec3::new(x, y, z))
     }
 
-    /// Copies all of `other`, which has as many.
+    /// Copies all vectors of `other`, which must have the same number.
     pub fn copy_from(&mut self, other: &Self) {
         copy_axes(&mut self.axes_mut(), other.axes());
     }
 
-    /// Sets every vector to zero.
+    /// Sets all vectors to zero.
     pub fn clear(&mut self) {
         for axis in self.axes_mut() {
             axis.fill(0.0);
         }
     }
 
-    /// The length of the longest of them; infinite where one is not finite.
+    /// Largest length; infinite if a vector is not finite.
     pub fn largest_length(&self) -> f32 {
         largest(self.iter().map(|vector| vector.length_squared()))
     }
 
-    /// The longest way between a vector and that of `other` at its place; infinite where one is not finite.
+    /// Largest distance between corresponding vectors; infinite if one is not finite.
     pub fn largest_distance(&self, other: &Self) -> f32 {
         largest(self.iter().zip(other.iter()).map(|(a, b)| a.distance_squared(b)))
     }
 }
 
-/// The root of the largest of `squares`; infinite where one is not finite.
+/// Square root of the largest of `squares`; infinite if one is not finite.
 fn largest(squares: impl Iterator<Item = f32>) -> f32 {
-    // Bits of numbers not below 0 are in their order, what is infinite and what is not a number above all others.
+    // The bit patterns of nonnegative numbers are in numerical order, with infinity and NaN above all others.
     let bits = squares.map(|square| (square.to_bits() & (u32::MAX >> 1)) as i32);
     let largest = f32::from_bits(bits.fold(0, i32::max) as u32);
     if largest.is_finite() {
@@ -338,7 +338,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_finite_is_seen_wherever_it_is() {
+    fn the_largest_length_detects_non_finite_vectors() {
         for spoilt in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             for node in 0..3 {
                 let mut vectors = Vectors::zeros(3).expect("memory");
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn kernels_may_read_beyond_both_ends() {
+    fn padding_is_readable_and_zero() {
         for count in [1, 15, 16, 17, 1000] {
             let mut vectors = Vectors::zeros(count).expect("memory");
             for node in 0..count {

@@ -1,102 +1,111 @@
-//! What a change between steps makes invalid. Callers name the change, and the table here says what it concerns.
+//! Maps each kind of change between steps to the cached data that it invalidates.
 
 use super::{EnergyAccount, Stability, System};
 
 /// A change of a body between steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Changed {
-    /// Nodes were put elsewhere.
+    /// Node positions were set.
     Positions,
-    /// A node has another velocity.
+    /// The velocity of a node was set.
     Velocity,
-    /// The last step does not tell how nodes go on.
-    Course,
-    /// The coordinates begin elsewhere.
+    /// The last step no longer predicts the motion of the nodes.
+    Trajectory,
+    /// The origin of the coordinates has moved.
     Origin,
-    /// A pin has come or gone, and what is about its node has been woken.
+    /// A pin was added or removed. The region around its node is already awake.
     Pin,
-    /// Nodes have other masses, or other nodes are held.
+    /// Masses or attached nodes have changed.
     Masses,
-    /// Nodes have other damping.
+    /// The damping of nodes has changed.
     Damping,
-    /// Springs, elements or terms have come, gone or changed.
+    /// Springs, elements or terms were added, removed or changed.
     Stiffness,
-    /// Springs that may have set the longest stable substep are softer or gone.
-    Softer,
-    /// Cavities have another pressure.
+    /// Springs that may have set the longest stable substep were softened or removed.
+    SpringsSoftened,
+    /// The pressure of cavities has changed.
     Pressure,
-    /// Elements have another shape at rest.
+    /// The rest shape of elements has changed.
     RestShape,
-    /// A cut has parted nodes. Rates and the stability are updated for these nodes alone.
+    /// A cut has split nodes. Rates and stability are updated for these nodes alone.
     Topology,
 }
 
-/// What is known from the state or from earlier steps.
+/// Data derived from the state or from earlier steps.
 #[derive(Clone, Copy)]
 pub(crate) enum Cached {
-    /// Which parts sleep.
+    /// The set of sleeping tiles.
     Sleep,
-    /// The forces at the positions.
+    /// The forces at the current positions.
     Forces,
-    /// The forces, where springs have damping.
+    /// The forces, if springs have damping.
     DampingForces,
     /// The longest stable substep of springs.
     Stability,
-    /// The bounds on frequencies of all but springs.
+    /// The frequency bounds of all forces except springs.
     Rates,
-    /// The energy account, and how many substeps the last steps took.
+    /// The energy account and the substep history.
     Energy,
-    /// How much shorter the energy account made substeps.
+    /// The refinement of substeps by the energy account.
     Refinement,
-    /// The energy that equations took the last step to end with.
+    /// The energy that the equation solver expects at the end of the last step.
     EquationEnergy,
-    /// What positions lack of where the nodes are.
+    /// The rounding remainders of positions.
     Remainders,
-    /// What equations take from the last step.
+    /// The history that the equation solver uses from the last step.
     History,
-    /// The preconditioner of equations.
-    Matrix,
-    /// The list of what is near tools.
+    /// The preconditioner of the equation solver.
+    Preconditioner,
+    /// The broad-phase list of features near tools.
     Candidates,
-    /// What contacts within equations did.
-    Holds,
+    /// The multipliers of contacts within equations.
+    ContactMultipliers,
 }
 
 impl Changed {
-    /// What it makes invalid.
-    const fn concerns(self) -> &'static [Cached] {
+    /// Lists the cached data that the change invalidates.
+    const fn invalidates(self) -> &'static [Cached] {
         use Cached::*;
         match self {
             Self::Positions => &[
-                Sleep, Forces, Stability, Energy, Refinement, Remainders, History, Matrix, Candidates, Holds,
+                Sleep,
+                Forces,
+                Stability,
+                Energy,
+                Refinement,
+                Remainders,
+                History,
+                Preconditioner,
+                Candidates,
+                ContactMultipliers,
             ],
-            // The energy account is told what the change puts in.
+            // `EnergyAccount::gain` accounts for the energy of the change.
             Self::Velocity => &[DampingForces, EquationEnergy],
-            Self::Course => &[History],
+            Self::Trajectory => &[History],
             Self::Origin => &[Sleep, Candidates],
-            Self::Pin => &[Stability, Rates, Energy, Matrix],
-            Self::Masses => &[Sleep, Stability, Rates, Energy, Matrix],
-            Self::Damping => &[Sleep, Stability, Rates, EquationEnergy, Matrix],
-            Self::Stiffness => &[Sleep, Forces, Rates, Energy, Matrix],
-            Self::Softer => &[Stability],
+            Self::Pin => &[Stability, Rates, Energy, Preconditioner],
+            Self::Masses => &[Sleep, Stability, Rates, Energy, Preconditioner],
+            Self::Damping => &[Sleep, Stability, Rates, EquationEnergy, Preconditioner],
+            Self::Stiffness => &[Sleep, Forces, Rates, Energy, Preconditioner],
+            Self::SpringsSoftened => &[Stability],
             Self::Pressure => &[Sleep, Forces, Energy],
             Self::RestShape => &[Forces, Energy],
-            Self::Topology => &[Sleep, Forces, Energy, Matrix],
+            Self::Topology => &[Sleep, Forces, Energy, Preconditioner],
         }
     }
 }
 
 impl System {
-    /// Forgets what a change has made invalid.
+    /// Invalidates the cached data that depends on the change.
     pub fn changed(&mut self, changed: Changed) {
-        for &known in changed.concerns() {
-            self.forget(known);
+        for &cached in changed.invalidates() {
+            self.forget(cached);
         }
     }
 
-    fn forget(&mut self, known: Cached) {
-        self.integrator.forget(known);
-        match known {
+    fn forget(&mut self, cached: Cached) {
+        self.integrator.forget(cached);
+        match cached {
             Cached::Sleep => self.wake(),
             Cached::Forces => self.forces_current = false,
             Cached::DampingForces => {
@@ -108,12 +117,18 @@ impl System {
             Cached::Stability => self.carry.stability = Stability::UNKNOWN,
             Cached::Rates => self.forces.forget_rates(),
             Cached::Energy => self.carry.forget(),
-            // Another motion begins, which may need no shorter substeps.
+            // The new motion may need no refined substeps.
             Cached::Refinement => self.carry.energy = EnergyAccount::UNKNOWN,
             Cached::Remainders => self.state.forget_remainders(),
-            Cached::Candidates => self.contacts.iter_mut().for_each(|contacts| contacts.look_again()),
-            Cached::Holds => self.contacts.iter_mut().for_each(|contacts| contacts.holds.forget()),
-            Cached::EquationEnergy | Cached::History | Cached::Matrix => {}
+            Cached::Candidates => self
+                .contacts
+                .iter_mut()
+                .for_each(|contacts| contacts.invalidate_candidates()),
+            Cached::ContactMultipliers => self
+                .contacts
+                .iter_mut()
+                .for_each(|contacts| contacts.multipliers.reset_warm_starts()),
+            Cached::EquationEnergy | Cached::History | Cached::Preconditioner => {}
         }
     }
 }

@@ -1,18 +1,18 @@
-//! A step taken with fewer substeps, kept to be compared with the same step taken with more.
+//! The result of a step with fewer substeps, for step doubling.
 
 use crate::base::Result;
 use crate::codec::saved;
 use crate::soa::{Vectors, per_node};
 
-/// Positions within and at the end of a coarser step, and velocities at its end; kept only in worlds with a tolerance.
+/// Positions within and at the end of a coarser step, and velocities at its end. Only worlds with a tolerance keep it.
 ///
-/// The end alone would not do: an oscillation of which both steps have lost the phase may agree there by chance.
+/// The end alone is not enough: an oscillation whose phase both steps have lost may agree there by chance.
 #[derive(Debug)]
 pub(crate) struct CoarseStep {
     middle: Vectors,
     positions: Vectors,
     velocities: Vectors,
-    /// The longest way between a node's last two places within the step, m.
+    /// The largest distance between the last two positions of a node within the step (m).
     middle_difference: f32,
 }
 
@@ -30,15 +30,16 @@ impl CoarseStep {
         })
     }
 
-    /// Compares the positions within the step with those kept, and keeps them instead.
-    pub fn pass_middle(&mut self, positions: &Vectors) {
+    /// Compares the positions within the step with the stored ones, then stores them.
+    pub fn compare_middle(&mut self, positions: &Vectors) {
         self.middle_difference = self.middle.largest_distance(positions);
         self.middle.copy_from(positions);
     }
 
-    /// Compares the end of the step with the end kept, and keeps it instead: how far the two steps lie apart, m, where a
-    /// difference of velocities counts as what it becomes in `time` seconds; infinite where one is not finite.
-    pub fn pass_end(&mut self, positions: &Vectors, velocities: &Vectors, time: f32) -> f32 {
+    /// Compares the end of the step with the stored one, then stores it. Returns the distance between the two steps
+    /// (m). A velocity difference counts as its displacement in `time` seconds. The distance is infinite if a value is
+    /// not finite.
+    pub fn compare_end(&mut self, positions: &Vectors, velocities: &Vectors, time: f32) -> f32 {
         let apart = self.positions.largest_distance(positions);
         let drifting = self.velocities.largest_distance(velocities) * time;
         self.positions.copy_from(positions);

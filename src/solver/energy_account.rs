@@ -1,4 +1,4 @@
-//! The energy that a body, or bodies that take their substeps together, may have.
+//! The energy budget of a body, or of bodies that take their substeps together.
 
 use glam::Vec3;
 
@@ -6,59 +6,59 @@ use super::energy_sums::Energies;
 use crate::base::StateHasher;
 use crate::codec::saved;
 
-/// Substeps between two comparisons, at least, and how many more there may be: at even intervals, comparisons might meet a mode in its
-/// turning points alone. A comparison takes about as long as two substeps.
-const PERIOD: [u32; 2] = [66, 25];
+/// The minimum number of substeps between two comparisons, and the range of its variation. At even intervals,
+/// comparisons could sample a mode at its turning points only. A comparison costs about as much as two substeps.
+const INTERVAL: [u32; 2] = [66, 25];
 
-/// The number of comparisons after which the kinetic energy is known. Nothing is taken off before.
-const LEARNED: u32 = 3;
+/// The number of comparisons after which the kinetic energy is known. No energy is removed before.
+const MIN_COMPARISONS: u32 = 3;
 
-/// Excess that is tolerated, as a part of the kinetic energy: the shadow energy of nonlinear motion fluctuates.
-const BAND: f64 = 5e-4;
+/// The tolerated excess as a fraction of the kinetic energy: the shadow energy of nonlinear motion fluctuates.
+const TOLERANCE: f64 = 5e-4;
 
-/// The time in which older comparisons lose half their weight, s.
+/// The decay time of older comparisons (s).
 const MEMORY: f64 = 5.0;
 
-/// Substeps are halved when more than this part of the kinetic energy has been taken off of late.
-const TOO_MUCH: f64 = 5e-3;
+/// Substeps are halved when more than this fraction of the kinetic energy was removed recently.
+const MAX_REMOVED: f64 = 5e-3;
 
-/// Substeps are doubled again when the kinetic energy is less than this part of that with which they were halved. A body that moves as
-/// fast as before would gain energy again.
-const SLOWER: f64 = 0.5;
+/// Substeps are doubled again when the kinetic energy drops below this fraction of its value at the halving. A body
+/// that still moves as fast would gain energy again.
+const COARSEN_FRACTION: f64 = 0.5;
 
-/// The same of the kinetic energy of the last second: a blow that set a body in motion, once it is over.
-const STILLER: f64 = 1.0 / 16.0;
+/// The same fraction for the kinetic energy of the last second. It detects the end of a blow that set a body in motion.
+const COARSEN_RECENT_FRACTION: f64 = 1.0 / 16.0;
 
-/// The time in which that loses half its weight, s: longer than tissue takes from one swing to the next.
-const SWING: f64 = 1.0;
+/// The decay time of the recent kinetic energy (s). It is longer than the oscillation period of tissue.
+const RECENT: f64 = 1.0;
 
-/// How many times shorter substeps may be than stability asks for.
-const FINEST: u32 = 8;
+/// The maximum refinement of substeps relative to the stability limit.
+const MAX_REFINEMENT: u32 = 8;
 
-/// What is known of the energy that a body may have.
+/// The energy budget and its history.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EnergyAccount {
-    /// The energy that the body had when it was compared last, or might have had, J; `None` after a change from outside.
+    /// The energy budget at the last comparison (J). `None` after a change from outside.
     reference: Option<f64>,
-    /// The work since the last comparison, J.
+    /// The work since the last comparison (J).
     work: f64,
-    /// The gravity of the last step, m/s².
+    /// The gravity of the last step (m/s²).
     gravity: Vec3,
     /// Substeps and seconds since the last comparison.
     substeps: u32,
     time: f64,
-    /// How often the energy was compared since a change from outside.
+    /// The number of comparisons since a change from outside.
     comparisons: u32,
-    /// The most kinetic energy of late, and of the last second, J.
+    /// The decaying maximum of the kinetic energy with decay times `MEMORY` and `RECENT` (J).
     kinetic: f64,
     recent: f64,
-    /// How much was taken off of late, as a part of that.
+    /// The recently removed energy as a fraction of `kinetic`.
     removed: f64,
-    /// How many times shorter substeps are than stability asks for.
+    /// The refinement factor of substeps relative to the stability limit.
     refinement: u32,
-    /// The most kinetic energy of late when that changed, J.
+    /// The value of `kinetic` when `refinement` last changed (J).
     refined_at: f64,
-    /// The bodies whose energy it is; 0: one alone.
+    /// The group of bodies that share the account; 0 for a single body.
     group: u64,
 }
 
@@ -82,29 +82,29 @@ impl EnergyAccount {
         group: 0,
     };
 
-    /// The energy is not what it was when the last step ended.
+    /// Discards the reference after a change from outside.
     pub fn forget(&mut self) {
         (self.reference, self.comparisons) = (None, 0);
-        self.start_over();
+        self.reset_interval();
     }
 
-    /// The next step is one of these bodies together; 0: of one alone.
-    pub fn share(&mut self, group: u64) {
+    /// Assigns the account to a group of coupled bodies; 0 for a single body.
+    pub fn set_group(&mut self, group: u64) {
         if self.group != group {
             self.forget();
             self.group = group;
         }
     }
 
-    /// Goes on with the account of bodies that took a step together, the same for each.
-    pub fn go_on_with(&mut self, common: &Self) {
+    /// Adopts the common account of bodies that took a step together.
+    pub fn adopt_common(&mut self, common: &Self) {
         *self = Self {
             gravity: self.gravity,
             ..*common
         };
     }
 
-    /// Takes in what another of the same bodies has put in.
+    /// Adds the work of another body of the same group.
     pub fn join(&mut self, other: &Self) {
         self.work += other.work;
         self.refinement = self.refinement.max(other.refinement);
@@ -113,22 +113,22 @@ impl EnergyAccount {
         }
     }
 
-    /// Whether the next step is the first after a change from outside, of a body by itself.
+    /// True if the next step is the first after a change from outside, and the body is not coupled.
     pub(super) fn is_new(&self) -> bool {
         self.reference.is_none() && self.substeps == 0 && self.group == 0
     }
 
-    /// A step begins in which gravity is this, m/s², of a body by itself that has so much kinetic and potential energy, J.
-    pub(super) fn open(&mut self, gravity: Vec3, energy: f64) {
+    /// Starts the account of an uncoupled body with a kinetic and potential energy of `energy` (J).
+    pub(super) fn start(&mut self, gravity: Vec3, energy: f64) {
         self.gravity = gravity;
         self.reference = energy.is_finite().then_some(energy);
-        self.comparisons = LEARNED - 1;
+        self.comparisons = MIN_COMPARISONS - 1;
         (self.kinetic, self.recent) = (0.0, 0.0);
-        self.start_over();
+        self.reset_interval();
     }
 
-    /// Takes in a step in so many substeps, of so many seconds, in which so much work was done, J.
-    pub(super) fn take_step(&mut self, gravity: Vec3, substeps: u32, dt: f32, work: f64) {
+    /// Records a step of `dt` seconds in which `work` was done (J).
+    pub(super) fn record_step(&mut self, gravity: Vec3, substeps: u32, dt: f32, work: f64) {
         if self.gravity != gravity {
             self.forget();
             self.gravity = gravity;
@@ -138,12 +138,12 @@ impl EnergyAccount {
         self.work += work;
     }
 
-    /// So much energy was put in from outside, J; what is not finite is not known.
+    /// Records `energy` that was added from outside (J). A value that is not finite discards the reference.
     pub fn gain(&mut self, energy: f64) {
         self.lose(energy.is_finite().then_some(-energy));
     }
 
-    /// So much energy is gone with mass that was taken away, J, or unknown.
+    /// Records `energy` that was removed with mass (J). `None` discards the reference.
     pub(super) fn lose(&mut self, energy: Option<f64>) {
         match energy {
             Some(energy) => self.work -= energy,
@@ -151,62 +151,63 @@ impl EnergyAccount {
         }
     }
 
-    fn start_over(&mut self) {
+    fn reset_interval(&mut self) {
         (self.work, self.substeps, self.time) = (0.0, 0, 0.0);
     }
 
-    /// Whether a step of so many substeps ends with a comparison.
+    /// True if a step of `substeps` substeps ends with a comparison.
     pub(super) fn is_due(&self, substeps: u32) -> bool {
-        let [least, more] = PERIOD;
-        self.substeps.saturating_add(substeps) >= least + self.comparisons.wrapping_mul(11) % more
+        let [min_interval, variation] = INTERVAL;
+        self.substeps.saturating_add(substeps) >= min_interval + self.comparisons.wrapping_mul(11) % variation
     }
 
     pub(super) fn gravity(&self) -> Vec3 {
         self.gravity
     }
 
-    /// How many times as many substeps are to be taken as stability asks for.
+    /// The factor by which a step takes more substeps than stability requires.
     pub fn refinement(&self) -> u32 {
         self.refinement
     }
 
-    /// What is to be taken off the kinetic energy, J, given what there is.
-    pub fn compare(&mut self, found: &Energies) -> f64 {
+    /// Compares the energies with the reference. Returns the kinetic energy to remove (J).
+    pub fn compare(&mut self, energies: &Energies) -> f64 {
         let Energies {
             all: energy,
-            own: kinetic,
+            internal_kinetic: kinetic,
             rounding,
-            still,
-        } = *found;
+            rest_energy,
+        } = *energies;
         if !(energy.is_finite() && rounding.is_finite()) {
             self.forget();
             return 0.0;
         }
         let fading = 1.0 / (1.0 + self.time / MEMORY);
         self.kinetic = kinetic.max(self.kinetic * fading);
-        self.recent = kinetic.max(self.recent / (1.0 + self.time / SWING));
+        self.recent = kinetic.max(self.recent / (1.0 + self.time / RECENT));
         self.removed *= fading;
-        // Lost energy may come back, up to the kinetic energy of late: a body that has come to rest stays so.
+        // Lost energy may come back, up to the recent kinetic energy. A body at rest stays at rest.
         let allowed = self.reference.map_or(energy, |reference| reference + self.work);
         let allowed = allowed.min(energy + self.kinetic);
         self.reference = Some(allowed);
-        self.start_over();
+        self.reset_interval();
         self.comparisons = self.comparisons.saturating_add(1);
-        if self.comparisons < LEARNED || kinetic <= still {
+        if self.comparisons < MIN_COMPARISONS || kinetic <= rest_energy {
             return 0.0;
         }
-        (energy - allowed - BAND * self.kinetic - rounding).max(0.0)
+        (energy - allowed - TOLERANCE * self.kinetic - rounding).max(0.0)
     }
 
-    /// Decides how short substeps are, after so much kinetic energy was taken off, J.
+    /// Updates the refinement after `removed` kinetic energy was taken off (J).
     pub fn refine(&mut self, removed: f64) {
         if removed > 0.0 {
             self.removed += removed / self.kinetic;
         }
-        if self.removed > TOO_MUCH && self.refinement < FINEST {
+        if self.removed > MAX_REMOVED && self.refinement < MAX_REFINEMENT {
             self.refinement *= 2;
         } else if self.refinement > 1
-            && (self.kinetic < SLOWER * self.refined_at || self.recent < STILLER * self.refined_at)
+            && (self.kinetic < COARSEN_FRACTION * self.refined_at
+                || self.recent < COARSEN_RECENT_FRACTION * self.refined_at)
         {
             self.refinement /= 2;
         } else {

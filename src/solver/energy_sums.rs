@@ -1,61 +1,63 @@
-//! The sums over nodes that the energy monitor needs.
+//! Sums over nodes for the energy monitor.
 
 use glam::{BVec3, DVec3, Vec3};
 
 use super::System;
-use super::closing::Closed;
+use super::deferred_half_kick::HalfKickFlush;
 use super::kick::Inertia;
-use super::step_request::Carry;
-use super::substep::{Part, VelocityTime};
+use super::step_request::IntegratorState;
+use super::substep::{SubstepKick, VelocityTime};
 use crate::codec::saved;
 use crate::simd::Loops;
 use crate::soa::{TILE, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
-/// A body whose mean speed is lower is at rest but for rounding, m/s.
-const STILL: f64 = 1e-4;
+/// A body with a lower mean speed is at rest up to rounding (m/s).
+const REST_SPEED: f64 = 1e-4;
 
-/// So is one whose nodes move by less than this part of its extent in a substep: coordinates are rounded by about as much, and forces with them.
-const UNSEEN: f64 = 4.0 * f32::EPSILON as f64;
+/// A body whose nodes move by less than this fraction of its extent per substep is at rest too. Rounding of
+/// coordinates, and of the forces, is about as large.
+const REST_DISPLACEMENT: f64 = 4.0 * f32::EPSILON as f64;
 
-/// Rounding errors, as parts of the energy and of the kinetic energy of the motion as a whole.
+/// Rounding errors, as fractions of the total energy and of the kinetic energy of rigid motion.
 const ROUNDING: [f64; 2] = [1e-6, 1e-4];
 
-/// What the energy monitor compares, J, of a body or of several.
+/// The energies that the monitor compares, of one body or several (J).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Energies {
     pub all: f64,
-    /// Of motion, but that as a whole of bodies that nothing holds.
-    pub own: f64,
-    /// By how much rounding may be off.
+    /// Kinetic energy, without the rigid motion of unconstrained bodies.
+    pub internal_kinetic: f64,
+    /// The bound of the rounding error.
     pub rounding: f64,
-    /// What is no more of `own` than this is rest.
-    pub still: f64,
+    /// The body is at rest if `internal_kinetic` does not exceed this.
+    pub rest_energy: f64,
 }
 
 impl Energies {
     pub fn plus(self, other: &Self) -> Self {
         Self {
             all: self.all + other.all,
-            own: self.own + other.own,
+            internal_kinetic: self.internal_kinetic + other.internal_kinetic,
             rounding: self.rounding + other.rounding,
-            still: self.still + other.still,
+            rest_energy: self.rest_energy + other.rest_energy,
         }
     }
 }
 
-/// What the nodes of a tile, or of a body, add up to.
+/// Sums over the nodes of a tile or a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TileSums {
-    /// Of what is free to move, J.
+    /// Kinetic energy of free nodes (J).
     kinetic: f64,
-    /// Of what is free to move, kg m/s.
+    /// Momentum of free nodes (kg m/s).
     momentum: DVec3,
-    /// The sum of `m x` of the mass that gravity pulls at, kg m.
+    /// Sum of `m x` over the mass that gravity acts on (kg m).
     moment: DVec3,
     mass: f64,
     free_mass: f64,
-    /// The kinetic part of the shadow energy: what open velocities give, then what closed ones add to it, J.
+    /// Kinetic part of the shadow energy. It contains first the part of the velocities before the closing half kick,
+    /// then the part of those after it (J).
     shadow: f64,
     elastic: f64,
 }
@@ -75,32 +77,33 @@ impl TileSums {
         }
     }
 
-    /// Those of the newest positions and open velocities, after the kick `last`; the moment is about the origin of the world.
+    /// Sums for the newest positions and the velocities after the kick `last`, before the closing half kick. The moment
+    /// is about the world origin.
     ///
-    /// With `v` the closed velocities, `v⁺` is `2 v - v⁻`, and the kinetic part of the shadow energy is
-    /// `Σ m (v·u + v⁻·v⁻ / 12 - v⁻·u / 2)` with `u = v⁻ - v⁻⁻ / 6`. Here `u` goes to where the next positions will be.
-    pub fn of_open(body: &mut System, last: &Part, team: &Team) -> Self {
+    /// With `v` the velocities after the closing half kick, `v⁺` is `2 v - v⁻`. The kinetic part of the shadow energy
+    /// is `Σ m (v·u + v⁻·v⁻ / 12 - v⁻·u / 2)` with `u = v⁻ - v⁻⁻ / 6`. The buffer of the next positions stores `u`.
+    pub fn before_flush(body: &mut System, last: &SubstepKick, team: &Team) -> Self {
         let (kernel, masses, inverse_masses, pins) = (body.kernel, &body.masses, &body.inverse_masses, &body.pins);
         let weighs_all = body.weight_share().is_some();
         let state = body.state.substep();
         let (positions, before, velocities) = (state.positions, &*state.forces, &*state.velocities);
-        let kicks = last.duration / last.substep;
+        let kick_substeps = last.duration / last.substep;
         let count = masses.len();
         let written = (state.next_positions.tiles_mut(), Items::new(&mut body.tile_sums));
-        team.pass(tile_count(count), written, |tile, (mut changes, sums)| {
+        team.pass(tile_count(count), written, |tile, (mut buffer, sums)| {
             let nodes = tile_nodes(tile, count);
             *sums = TileSums::default();
-            for (axis, changes) in changes.iter_mut().enumerate() {
-                kernel.run(OfAxis {
+            for (axis, buffer) in buffer.iter_mut().enumerate() {
+                kernel.run(AxisSums {
                     axis,
-                    kicks,
+                    kick_substeps,
                     weighs_all,
                     positions: &positions.axes()[axis][nodes.clone()],
-                    before: &before.axes()[axis][nodes.clone()],
+                    previous_velocities: &before.axes()[axis][nodes.clone()],
                     velocities: &velocities.axes()[axis][nodes.clone()],
                     masses: &masses[nodes.clone()],
                     inverse_masses: &inverse_masses[nodes.clone()],
-                    shares: changes,
+                    shadow_terms: buffer,
                     sums,
                 });
             }
@@ -108,13 +111,13 @@ impl TileSums {
                 let node = pin.node as usize;
                 let inverse_mass = f64::from(inverse_masses[node]);
                 if inverse_mass > 0.0 {
-                    let place = node - nodes.start;
+                    let index = node - nodes.start;
                     let velocity = pin.held(velocities.get(node)).as_dvec3();
-                    let share = DVec3::from(changes.each_ref().map(|axis| f64::from(axis[place])));
+                    let shadow_term = DVec3::from(buffer.each_ref().map(|axis| f64::from(axis[index])));
                     sums.kinetic -= 0.5 * velocity.length_squared() / inverse_mass;
                     sums.momentum -= velocity / inverse_mass;
-                    sums.shadow -= (velocity.length_squared() / 12.0 - 0.5 * velocity.dot(share)) / inverse_mass;
-                    pin.put(&mut changes, place, Vec3::ZERO);
+                    sums.shadow -= (velocity.length_squared() / 12.0 - 0.5 * velocity.dot(shadow_term)) / inverse_mass;
+                    pin.write_held(&mut buffer, index, Vec3::ZERO);
                 }
             }
         });
@@ -126,65 +129,73 @@ impl TileSums {
         sums
     }
 
-    /// The kinetic and potential energy as a step begins, with velocities at the time of the positions, J; `None` where less than half of it is of
-    /// motion.
-    pub(super) fn at_start(body: &mut System, part: &Part, carry: &Carry, gravity: Vec3, team: &Team) -> Option<f64> {
-        if part.before == VelocityTime::Current {
+    /// The kinetic plus potential energy at the beginning of a step, with velocities at the time of the positions (J).
+    /// `None` if less than half of it is kinetic.
+    pub(super) fn at_start(
+        body: &mut System,
+        substep_kick: &SubstepKick,
+        carry: &IntegratorState,
+        gravity: Vec3,
+        team: &Team,
+    ) -> Option<f64> {
+        if substep_kick.velocity_time == VelocityTime::Current {
             let state = body.state.substep();
             state.velocities.copy_from(state.first_velocities);
         }
-        let sums = Self::of_open(body, part, team);
-        let own = sums.own(body.held_axes())[0];
-        if own == 0.0 {
+        let sums = Self::before_flush(body, substep_kick, team);
+        let internal_kinetic = sums.kinetic_parts(body.held_axes())[0];
+        if internal_kinetic == 0.0 {
             return None;
         }
-        let [_, elastic] = close(body, carry, team);
-        (own > elastic.abs()).then(|| sums.kinetic + elastic - sums.moment.dot(gravity.as_dvec3()))
+        let [_, elastic] = flush_contribution(body, carry, team);
+        (internal_kinetic > elastic.abs()).then(|| sums.kinetic + elastic - sums.moment.dot(gravity.as_dvec3()))
     }
 
-    /// The kinetic energy of its own, and that of the motion as a whole of a body that nothing holds, J.
-    fn own(&self, held: BVec3) -> [f64; 2] {
-        let common = DVec3::select(held, DVec3::ZERO, self.momentum).length_squared() / (2.0 * self.free_mass);
-        [(self.kinetic - common).max(0.0), common]
+    /// The kinetic energy without rigid motion, and the kinetic energy of the rigid translation of an unconstrained
+    /// body (J).
+    fn kinetic_parts(&self, constrained: BVec3) -> [f64; 2] {
+        let translation =
+            DVec3::select(constrained, DVec3::ZERO, self.momentum).length_squared() / (2.0 * self.free_mass);
+        [(self.kinetic - translation).max(0.0), translation]
     }
 
-    /// The energies at the end of a step in substeps of `substep` seconds.
-    pub(super) fn close(self, body: &mut System, carry: &Carry, substep: f64, team: &Team) -> Energies {
-        let held = body.held_axes();
-        let [closing, elastic] = close(body, carry, team);
-        // The motion as a whole is left as it is.
-        let [own, common] = self.own(held);
-        let still = STILL.max(UNSEEN * f64::from(body.extent()) / substep);
+    /// The energies at the end of a step with substeps of `substep` seconds.
+    pub(super) fn after_flush(self, body: &mut System, carry: &IntegratorState, substep: f64, team: &Team) -> Energies {
+        let constrained = body.held_axes();
+        let [flushed, elastic] = flush_contribution(body, carry, team);
+        // Rigid motion is not changed.
+        let [internal_kinetic, translation] = self.kinetic_parts(constrained);
+        let rest_energy = REST_SPEED.max(REST_DISPLACEMENT * f64::from(body.extent()) / substep);
         Energies {
-            all: self.shadow + closing + elastic - self.moment.dot(carry.energy.gravity().as_dvec3()),
-            own,
-            rounding: ROUNDING[0] * (own + elastic.abs()) + ROUNDING[1] * common,
-            still: 0.5 * self.free_mass * still * still,
+            all: self.shadow + flushed + elastic - self.moment.dot(carry.energy.gravity().as_dvec3()),
+            internal_kinetic,
+            rounding: ROUNDING[0] * (internal_kinetic + elastic.abs()) + ROUNDING[1] * translation,
+            rest_energy: 0.5 * self.free_mass * rest_energy * rest_energy,
         }
     }
 }
 
-/// What the nodes of a tile add to its sums along one axis.
-struct OfAxis<'a> {
+/// Adds the nodes of a tile to its sums along one axis.
+struct AxisSums<'a> {
     axis: usize,
-    /// Whether gravity pulls at all mass, or at that before some was added.
+    /// True if gravity acts on all mass, false if it acts on the unscaled mass.
     weighs_all: bool,
-    /// How long the last kick was, in substeps.
-    kicks: f32,
+    /// The duration of the last kick in substeps.
+    kick_substeps: f32,
     positions: &'a [f32],
-    /// The velocities before and after it.
-    before: &'a [f32],
+    /// The velocities before and after the last kick.
+    previous_velocities: &'a [f32],
     velocities: &'a [f32],
     masses: &'a [f32],
     inverse_masses: &'a [f32],
-    shares: &'a mut [f32],
+    shadow_terms: &'a mut [f32],
     sums: &'a mut TileSums,
 }
 
-/// Sums that are made side by side, so that none waits for itself.
+/// The number of independent accumulators, which hides the latency of additions.
 const LANES: usize = 8;
 
-/// The mass of a node as far as it moves freely, kg.
+/// The mass of a node; 0 if it is pinned (kg).
 #[inline(always)]
 fn free_mass(inverse_mass: f32) -> f64 {
     if inverse_mass > 0.0 {
@@ -194,7 +205,7 @@ fn free_mass(inverse_mass: f32) -> f64 {
     }
 }
 
-impl Loops for OfAxis<'_> {
+impl Loops for AxisSums<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -202,7 +213,7 @@ impl Loops for OfAxis<'_> {
         // Kinetic energy, momentum, moment, mass, free mass, shadow energy.
         let mut lanes = [[0.0_f64; 6]; LANES];
         let count = self.masses.len();
-        let part = 1.0 / (6.0 * self.kicks);
+        let inverse_kicks = 1.0 / (6.0 * self.kick_substeps);
         for start in (0..count).step_by(LANES) {
             for (lane, node) in lanes.iter_mut().zip(start..count) {
                 let free_mass = free_mass(self.inverse_masses[node]);
@@ -212,16 +223,16 @@ impl Loops for OfAxis<'_> {
                     f64::from(self.masses[node])
                 };
                 let velocity = self.velocities[node];
-                // A kick of another length stands for one of a substep.
-                let share = velocity * (5.0 / 6.0) + (velocity - self.before[node]) * part;
-                self.shares[node] = share;
-                let [velocity, share] = [velocity, share].map(f64::from);
+                // The difference is scaled to a kick of one substep.
+                let shadow_term = velocity * (5.0 / 6.0) + (velocity - self.previous_velocities[node]) * inverse_kicks;
+                self.shadow_terms[node] = shadow_term;
+                let [velocity, shadow_term] = [velocity, shadow_term].map(f64::from);
                 lane[0] += free_mass * velocity * velocity;
                 lane[1] += free_mass * velocity;
                 lane[2] += mass * f64::from(self.positions[node]);
                 lane[3] += mass;
                 lane[4] += free_mass;
-                lane[5] += free_mass * velocity * (velocity / 12.0 - 0.5 * share);
+                lane[5] += free_mass * velocity * (velocity / 12.0 - 0.5 * shadow_term);
             }
         }
         let [kinetic, momentum, moment, mass, free_mass, shadow] =
@@ -237,7 +248,7 @@ impl Loops for OfAxis<'_> {
     }
 }
 
-/// The sum of `m a b` along one axis.
+/// Computes the sum of `m a b` along one axis.
 struct Product<'a>([&'a [f32]; 2], &'a [f32]);
 
 impl Loops for Product<'_> {
@@ -256,22 +267,27 @@ impl Loops for Product<'_> {
     }
 }
 
-/// What closed velocities add to the shadow energy, and the energy of all inner forces at the newest positions, less the work of a
-/// constant pressure, J.
-fn close(body: &mut System, carry: &Carry, team: &Team) -> [f64; 2] {
+/// Returns two energies (J): the part of the shadow energy that depends on velocities after the closing half kick, and
+/// the potential energy of internal forces at the newest positions. The work of a constant pressure is subtracted from
+/// the second one.
+fn flush_contribution(body: &mut System, carry: &IntegratorState, team: &Team) -> [f64; 2] {
     let kernel = body.kernel;
     let (inverse_masses, pins) = (&body.inverse_masses, &body.pins);
     let inertia = Inertia::of(body.uniform_inverse_mass, inverse_masses, body.scaling.as_deref());
     let state = body.state.substep();
-    let (positions, velocities, shares) = (state.positions, &*state.velocities, &*state.next_positions);
+    let (positions, velocities, shadow_terms) = (state.positions, &*state.velocities, &*state.next_positions);
     body.forces.write_records(positions, team);
     let forces = &body.forces;
     let view = forces.view(positions);
-    // Open velocities are closed to the side, so that comparing changes nothing.
-    let closed = carry.closing.map(|closing| Closed {
+    // The half kick goes to a separate buffer, so that a comparison does not change the state.
+    let flush = carry.deferred_kick.map(|deferred| HalfKickFlush {
         forces: forces.sum(),
         kernel,
-        kick: closing.kick({ carry.gravity }.next(closing.fall()), inertia, body.damping.as_ref()),
+        kick: deferred.kick(
+            { carry.gravity }.next(deferred.gravity_change()),
+            inertia,
+            body.damping.as_ref(),
+        ),
         positions,
         velocities,
     });
@@ -279,24 +295,26 @@ fn close(body: &mut System, carry: &Carry, team: &Team) -> [f64; 2] {
     team.pass(tile_count(count), Items::new(&mut body.tile_sums), |tile, sums| {
         let nodes = tile_nodes(tile, count);
         let mut axes = [[0.0_f32; TILE]; 3];
-        let velocities = match &closed {
+        let velocities = match &flush {
             None => velocities.slices(nodes.clone()),
-            Some(closed) => {
+            Some(flush) => {
                 let mut axes = axes.each_mut().map(|axis| &mut axis[..nodes.len()]);
-                closed.write(tile, nodes.clone(), &mut axes, pins.of_tile(tile));
+                flush.write(tile, nodes.clone(), &mut axes, pins.of_tile(tile));
                 axes.map(|axis| &*axis)
             }
         };
-        let products = velocities.into_iter().zip(shares.slices(nodes.clone()));
+        let products = velocities.into_iter().zip(shadow_terms.slices(nodes.clone()));
         sums.shadow = products
-            .map(|(velocities, shares)| kernel.run(Product([velocities, shares], &inverse_masses[nodes.clone()])))
+            .map(|(velocities, shadow_terms)| {
+                kernel.run(Product([velocities, shadow_terms], &inverse_masses[nodes.clone()]))
+            })
             .sum();
         sums.elastic = forces.energy_of_tile(tile, nodes, view);
     });
     let sums = body.tile_sums.iter();
-    let [closing, of_tiles] = sums.fold([0.0; 2], |[closing, elastic], sums| {
-        [closing + sums.shadow, elastic + sums.elastic]
+    let [flushed, tile_elastic] = sums.fold([0.0; 2], |[flushed, elastic], sums| {
+        [flushed + sums.shadow, elastic + sums.elastic]
     });
-    let [elastic, work] = body.forces.energy(of_tiles, positions, team);
-    [closing, elastic - work]
+    let [elastic, work] = body.forces.energy(tile_elastic, positions, team);
+    [flushed, elastic - work]
 }

@@ -1,4 +1,4 @@
-//! The trait that solvers implement, and the table of those that there are: how each moves a body, alone or with others, and what it keeps.
+//! The trait that integrators implement, and the coupled step of several bodies.
 
 use std::fmt::Debug;
 
@@ -7,56 +7,69 @@ use super::changed::Cached;
 use super::energy_sums::TileSums;
 use super::implicit::{Implicit, Solution};
 use super::leapfrog::Leapfrog;
-use super::needs::Need;
-use super::step_request::{Carry, StepRequest, StepStart};
-use super::substep::Part;
+use super::step_request::{IntegratorState, StepRequest, StepStart};
+use super::substep::SubstepKick;
+use super::substep_count::StepPlan;
 use super::verlet::Stepped;
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{Reader, Saved, Writer, shape_with};
 use crate::contact::Contacts;
 use crate::def::{BodyDefinition, Solver, SolverReport};
 use crate::forces::Forces;
-use crate::geometry::Bounds;
+use crate::geometry::Aabb;
 use crate::soa::{PerNode, Vectors};
 use crate::threads::Team;
 
-/// What each is saved as.
+/// The tag of each integrator in a snapshot.
 pub(super) const LEAPFROG: u8 = 0;
 pub(super) const IMPLICIT: u8 = 1;
 
-/// How a body is moved. The functions that do nothing by default are for integrators that keep something beside the state.
+/// Integrates a body in time. Methods without effect by default concern integrators with data beside the state.
 pub(crate) trait Integrator: PerNode + Debug + Send + Sync {
-    /// Takes a step that the body takes alone: in as many substeps as are asked for, or as it needs, or `again` in so many.
-    fn step(&mut self, body: &mut System, request: &StepRequest, again: Option<StepStart>, team: &Team) -> Stepped;
+    /// Takes an uncoupled step. The number of substeps is the requested one, the required one, or that of `retry`.
+    fn step(&mut self, body: &mut System, request: &StepRequest, retry: Option<StepStart>, team: &Team) -> Stepped;
 
-    /// What a step needs that the body takes together with others.
-    fn need(&mut self, body: &mut System, request: &StepRequest, team: &Team) -> Need;
+    /// Computes the substeps that the body needs in a coupled step.
+    fn plan_step(&mut self, body: &mut System, request: &StepRequest, team: &Team) -> StepPlan;
 
-    /// Begins such a step.
-    fn begin(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep) -> Stepped<()>;
+    /// Begins a coupled step.
+    fn begin(&mut self, body: &mut System, coupled: &mut CoupledBody, step: &CoupledStep) -> Stepped<()>;
 
-    /// Takes a substep of it, up to where other tissue may change where that leads.
-    fn substep(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep, index: u32) -> Stepped<()>;
+    /// Takes a substep up to the point where other tissue may change its result.
+    fn substep(&mut self, body: &mut System, coupled: &mut CoupledBody, step: &CoupledStep, index: u32) -> Stepped<()>;
 
-    /// Ends the substep, after which other tissue leaves velocities in this box.
-    fn end(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep, given: Bounds) -> Stepped<()>;
+    /// Ends the substep. `velocities` is the bounding box of velocities after contact with other tissue.
+    fn end(
+        &mut self,
+        body: &mut System,
+        coupled: &mut CoupledBody,
+        step: &CoupledStep,
+        velocities: Aabb,
+    ) -> Stepped<()>;
 
-    /// Takes the half kick that closes the step, where there is one.
-    fn close(&mut self, _body: &mut System, _walk: &mut CoupledBody, _step: &CoupledStep) -> Stepped<()> {
+    /// Takes the closing half kick of the step, if the integrator has one.
+    fn closing_half_kick(
+        &mut self,
+        _body: &mut System,
+        _coupled: &mut CoupledBody,
+        _step: &CoupledStep,
+    ) -> Stepped<()> {
         Ok(())
     }
 
-    /// Whether half kicks open and close a step: the last leaves the forces at its end, and the energy account compares such steps alone.
+    /// True if half kicks open and close a step. The last one leaves the forces at the end of the step. Only these
+    /// steps use the energy account.
     fn takes_half_kicks(&self) -> bool {
         false
     }
 
-    /// Whether stability limits its substeps.
+    /// True if stability limits the substeps.
     fn is_limited_by_stability(&self) -> bool {
         false
     }
 
-    /// Where its equations have led all nodes at once, if it solves such. Contacts with other tissue are solved after them, and change this.
+    /// The solution for all nodes, if the integrator solves a system of equations. Contacts with other tissue are
+    /// solved later and change it.
     fn solution(&self) -> Option<&Solution> {
         None
     }
@@ -65,47 +78,48 @@ pub(crate) trait Integrator: PerNode + Debug + Send + Sync {
         None
     }
 
-    /// The step that was tried is not to be: what was known before is known again.
-    fn put_back(&mut self) {}
+    /// Rolls back an attempted step.
+    fn rollback(&mut self) {}
 
-    /// Makes what the step in progress leaves to the next that of the current state.
+    /// Makes the data that the attempted step passes to the next one current.
     fn commit(&mut self) {}
 
-    /// Forgets what a change has made invalid.
-    fn forget(&mut self, _known: Cached) {}
+    /// Invalidates cached data.
+    fn forget(&mut self, _cached: Cached) {}
 
-    /// How it took the last step.
-    fn told(&self) -> SolverReport {
+    /// Reports how it took the last step.
+    fn last_report(&self) -> SolverReport {
         SolverReport::default()
     }
 
-    /// Adds what the next step depends on beside the state.
+    /// Adds the data that the next step depends on, except the state.
     fn hash(&self, _hasher: &mut StateHasher) {}
 
-    /// Writes which integrator it is, and what it keeps.
+    /// Writes the tag of the integrator and its data.
     fn save(&self, to: &mut Writer);
 
-    /// Makes room for so many springs in all.
+    /// Reserves memory for `count` springs in total.
     fn reserve_springs(&mut self, _count: usize) -> Result<()> {
         Ok(())
     }
 
-    /// Makes room for these contacts, where they are part of its equation.
+    /// Reserves memory for these contacts, if they are part of the equations.
     fn reserve_contacts(&mut self, _contacts: &mut Contacts) -> Result<()> {
         Ok(())
     }
 
-    /// Makes room for a cut that leaves the nodes that these forces have now, with so many springs more. Changes nothing before nodes are added.
+    /// Reserves memory for a cut that keeps the present nodes of these forces and adds `more` springs. Nothing else
+    /// changes before nodes are added.
     fn prepare_cut(&mut self, _forces: &Forces, _more: usize) -> Result<()> {
         Ok(())
     }
 
-    /// Has a new node go on as another does.
+    /// Copies the motion of node `source` to the new node.
     fn copy_motion(&mut self, _source: usize, _node: usize) {}
 }
 
-/// The integrator that a definition asks for, for nodes at these positions that these forces move.
-pub(super) fn make(
+/// Creates the integrator that a definition selects.
+pub(super) fn create(
     definition: &BodyDefinition,
     positions: &Vectors,
     forces: &mut Forces,
@@ -134,67 +148,67 @@ impl Saved for Box<dyn Integrator> {
     }
 }
 
-/// A step that bodies take together.
+/// A step that several bodies take together.
 #[derive(Clone, Copy)]
 pub(crate) struct CoupledStep<'a> {
     pub request: &'a StepRequest<'a>,
     pub substeps: u32,
-    /// Whether it ends with a comparison of energies.
+    /// True if it ends with an energy comparison.
     pub compares: bool,
-    /// Whether it is not tried again in shorter substeps.
+    /// True if it is not retried with shorter substeps.
     pub is_last: bool,
     pub team: &'a Team<'a>,
 }
 
 impl CoupledStep<'_> {
-    /// How long a substep is, s.
+    /// The length of a substep (s).
     pub fn substep(&self) -> f32 {
         (f64::from(self.request.dt) / f64::from(self.substeps)) as f32
     }
 }
 
-/// A body on its way through such a step.
+/// A body in a coupled step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CoupledBody {
-    pub start: Carry,
-    pub masses_for: f32,
-    pub carry: Carry,
-    pub(super) part: Part,
-    /// Of the open velocities, where the step ends with a comparison of energies.
+    pub start: IntegratorState,
+    pub scaling_substep: f32,
+    pub carry: IntegratorState,
+    pub(super) substep_kick: SubstepKick,
+    /// The energy sums before the closing half kick, if the step ends with an energy comparison.
     pub sums: Option<TileSums>,
-    /// What can be taken off its motion, J.
-    pub own: f64,
-    /// In how many substeps it would go by itself.
-    pub wanted: u32,
+    /// The kinetic energy that can be removed (J).
+    pub internal_kinetic: f64,
+    /// The number of substeps that it would take on its own.
+    pub uncoupled_substeps: u32,
 }
 
 impl CoupledBody {
-    /// A body's way through a step that is to begin, of a group of bodies.
+    /// Prepares a body of a group for a step.
     pub fn of(body: &mut System, request: &StepRequest, group: u64, team: &Team) -> Self {
-        let Need {
+        let StepPlan {
             mut start,
-            masses_for,
+            scaling_substep,
             substeps,
-        } = body.lend(|integrator, body| integrator.need(body, request, team));
-        start.energy.share(group);
+        } = body.with_integrator(|integrator, body| integrator.plan_step(body, request, team));
+        start.energy.set_group(group);
         Self {
             start,
-            masses_for,
+            scaling_substep,
             carry: start,
-            part: Part::opening(0.0),
+            substep_kick: SubstepKick::opening(0.0),
             sums: None,
-            own: 0.0,
-            wanted: substeps,
+            internal_kinetic: 0.0,
+            uncoupled_substeps: substeps,
         }
     }
 }
 
 impl System {
-    /// Has its integrator do something with it. A leapfrog stands in its place meanwhile.
-    pub fn lend<R>(&mut self, act: impl FnOnce(&mut dyn Integrator, &mut Self) -> R) -> R {
+    /// Calls `f` with the integrator. A leapfrog replaces the integrator during the call.
+    pub fn with_integrator<R>(&mut self, f: impl FnOnce(&mut dyn Integrator, &mut Self) -> R) -> R {
         // Leapfrog has no size: nothing is allocated.
         let mut integrator = std::mem::replace(&mut self.integrator, Box::new(Leapfrog));
-        let result = act(&mut *integrator, self);
+        let result = f(&mut *integrator, self);
         self.integrator = integrator;
         result
     }

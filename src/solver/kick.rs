@@ -1,43 +1,43 @@
-//! What forces do to velocities: the half kicks of leapfrog, with the damping of nodes solved exactly.
+//! The velocity update of leapfrog, with exact node damping.
 //!
-//! A full kick is two half kicks with the same force, so that a step cut into several, or followed by another, moves
-//! as one long one would.
+//! A full kick equals two half kicks with the same force. A step that is split into several, or followed by another,
+//! thus moves the body as one long step does.
 
 use std::ops::Range;
 
 use glam::Vec3;
 
-use super::mass_scaling::{MassScaling, Sliver};
-use super::subnormal::{on_grid, still_or};
+use super::flush_denormals::{flush_velocity, round_to_grid};
+use super::mass_scaling::{AddedMass, MassScaling};
 use crate::codec::saved;
-use crate::geometry::Bounds;
+use crate::geometry::Aabb;
 use crate::nodes::NodeDamping;
 use crate::simd::{ChosenKernel, Loops};
 use crate::soa::{TileForces, Vectors};
 
-/// The inverse masses of nodes that are free to move, 1/kg.
+/// The inverse masses of free nodes (1/kg).
 #[derive(Clone, Copy, Debug)]
 pub(super) enum InverseMasses<'a> {
-    /// The same for all; for a pinned node too, which something else holds.
+    /// One value for all nodes, including pinned ones, which are constrained elsewhere.
     Uniform(f32),
-    /// 0 where a node is pinned.
+    /// One value per node, 0 for pinned nodes.
     Each(&'a [f32]),
 }
 
-/// How nodes resist a force.
+/// The resistance of nodes to a force.
 #[derive(Clone, Copy)]
 pub(super) struct Inertia<'a> {
     pub inverse_masses: InverseMasses<'a>,
-    /// The nodes that gravity pulls less than in proportion, in their order.
-    pub heavier: &'a [Sliver],
+    /// The nodes with added mass that gravity must not act on, sorted by node.
+    pub weightless: &'a [AddedMass],
 }
 
 impl<'a> Inertia<'a> {
-    /// With the inverse mass `uniform` where there is such a one, else with `each`.
+    /// Uses the inverse mass `uniform` if there is one, otherwise `each`.
     pub fn of(uniform: Option<f32>, each: &'a [f32], scaling: Option<&'a MassScaling>) -> Self {
         Self {
             inverse_masses: uniform.map_or(InverseMasses::Each(each), InverseMasses::Uniform),
-            heavier: scaling.map_or(&[], MassScaling::heavier),
+            weightless: scaling.map_or(&[], MassScaling::weightless),
         }
     }
 }
@@ -45,59 +45,59 @@ impl<'a> Inertia<'a> {
 /// One kick of a body.
 #[derive(Clone, Copy)]
 pub(super) struct Kick<'a> {
-    /// How long the forces act, s.
+    /// The time that the forces act (s).
     pub duration: f32,
-    /// How long a drift after it takes, s.
+    /// The duration of the drift after it (s).
     pub substep: f32,
-    /// Whether it is half of one.
+    /// True for a half kick.
     pub half: bool,
     pub gravity: Vec3,
-    /// What gravity gives to a node without damping in this kick, m/s.
-    pub fall: Vec3,
+    /// The velocity change by gravity of a node without damping (m/s).
+    pub gravity_change: Vec3,
     pub inertia: Inertia<'a>,
-    /// Forces from outside, N.
+    /// Applied forces (N).
     pub applied: Option<&'a Vectors>,
     pub damping: Option<&'a NodeDamping>,
 }
 
 impl Kick<'_> {
-    /// Takes from the forces on nodes that have been made heavier what gravity will give them too much.
-    fn lighten(&self, nodes: &Range<usize>, forces: &mut TileForces) {
-        let heavier = self.inertia.heavier;
+    /// Subtracts the weight of added mass from the forces.
+    fn remove_excess_weight(&self, nodes: &Range<usize>, forces: &mut TileForces) {
+        let weightless = self.inertia.weightless;
         let gravity = match self.damping {
-            None => self.fall / self.duration,
+            None => self.gravity_change / self.duration,
             Some(_) => self.gravity,
         };
         if gravity == Vec3::ZERO {
             return;
         }
-        let first = heavier.partition_point(|sliver| (sliver.node as usize) < nodes.start);
-        for sliver in &heavier[first..] {
-            let node = sliver.node as usize;
+        let first = weightless.partition_point(|candidate| (candidate.node as usize) < nodes.start);
+        for candidate in &weightless[first..] {
+            let node = candidate.node as usize;
             if node >= nodes.end {
                 break;
             }
-            let place = node - nodes.start;
-            forces.set(place, forces.get(place) - gravity * sliver.added);
+            let index = node - nodes.start;
+            forces.set(index, forces.get(index) - gravity * candidate.added);
         }
     }
 }
 
-/// A kick for the nodes of one tile, and the drift that follows it.
+/// A kick for the nodes of one tile and the drift that follows it.
 pub(super) struct TileKick<'a, 'b> {
     pub kick: &'b Kick<'a>,
     pub nodes: Range<usize>,
-    /// The spring forces on these nodes; others are added to them.
+    /// The spring forces on these nodes. The kick adds other forces to them.
     pub forces: &'b mut TileForces,
     pub velocities: [&'b mut [f32]; 3],
     pub drift: Option<Drift<'b>>,
 }
 
-/// Where the nodes of a tile are, and where they are put.
+/// The positions of a tile before and after the drift.
 pub(super) struct Drift<'a> {
     pub positions: [&'a [f32]; 3],
     pub next_positions: [&'a mut [f32]; 3],
-    /// What positions lack, where that is carried on.
+    /// The rounding remainders of positions, if they are tracked.
     pub remainders: Option<[&'a mut [f32]; 3]>,
 }
 
@@ -120,7 +120,7 @@ impl Loops for TileKick<'_, '_> {
                 }
             }
         }
-        kick.lighten(&nodes, forces);
+        kick.remove_excess_weight(&nodes, forces);
         let mut drift = drift;
         for (axis, velocities) in velocities.into_iter().enumerate() {
             let axis = Axis {
@@ -128,7 +128,7 @@ impl Loops for TileKick<'_, '_> {
                 nodes: nodes.clone(),
                 forces: &forces.axes()[axis][..nodes.len()],
                 gravity: kick.gravity[axis],
-                fall: kick.fall[axis],
+                gravity_change: kick.gravity_change[axis],
                 velocities,
                 drift: drift.as_mut().map(|drift| AxisDrift {
                     positions: drift.positions[axis],
@@ -147,7 +147,7 @@ struct Axis<'a> {
     nodes: Range<usize>,
     forces: &'a [f32],
     gravity: f32,
-    fall: f32,
+    gravity_change: f32,
     velocities: &'a mut [f32],
     drift: Option<AxisDrift<'a>>,
 }
@@ -160,47 +160,47 @@ struct AxisDrift<'a> {
 }
 
 impl Axis<'_> {
-    /// Chooses among loops that do no more than they must.
+    /// Selects the cheapest loop for the kick.
     #[inline(always)]
     fn run(self) {
         let kick = self.kick;
-        let (duration, gravity, fall) = (kick.duration, self.gravity, self.fall);
+        let (duration, gravity, gravity_change) = (kick.duration, self.gravity, self.gravity_change);
         match (kick.damping, kick.inertia.inverse_masses) {
             (None, InverseMasses::Uniform(inverse_mass)) => {
-                self.each(
-                    |_, force, velocity| velocity + (force * inverse_mass * duration + fall),
+                self.for_each_node(
+                    |_, force, velocity| velocity + (force * inverse_mass * duration + gravity_change),
                     |coordinate| coordinate,
                 );
             }
             (None, InverseMasses::Each(inverse_masses)) => {
                 let inverse_masses = &inverse_masses[self.nodes.clone()];
-                self.each(
-                    |place, force, velocity| velocity + (force * inverse_masses[place] * duration + fall),
+                self.for_each_node(
+                    |index, force, velocity| velocity + (force * inverse_masses[index] * duration + gravity_change),
                     |coordinate| coordinate,
                 );
             }
             (Some(damping), inverse_masses) => {
                 let nodes = self.nodes.clone();
                 let (loss, gain) = (&damping.loss[nodes.clone()], &damping.gain[nodes.clone()]);
-                // Two half kicks in one: the second loses from what the first left.
+                // A full kick merges two half kicks: the second one damps what the first one left.
                 let (whole, share) = if kick.half { (1.0, 0.0) } else { (2.0, 1.0) };
-                let damped = move |place: usize, acceleration: f32, velocity: f32| {
-                    let (loss, gain) = (loss[place], gain[place]);
+                let damped = move |index: usize, acceleration: f32, velocity: f32| {
+                    let (loss, gain) = (loss[index], gain[index]);
                     let both = whole - share * loss;
-                    still_or(velocity + ((acceleration + gravity) * (gain * both) - velocity * (loss * both)))
+                    flush_velocity(velocity + ((acceleration + gravity) * (gain * both) - velocity * (loss * both)))
                 };
                 match inverse_masses {
                     InverseMasses::Uniform(inverse_mass) => {
-                        self.each(
-                            |place, force, velocity| damped(place, force * inverse_mass, velocity),
-                            on_grid,
+                        self.for_each_node(
+                            |index, force, velocity| damped(index, force * inverse_mass, velocity),
+                            round_to_grid,
                         );
                     }
                     InverseMasses::Each(inverse_masses) => {
                         let inverse_masses = &inverse_masses[nodes];
-                        self.each(
-                            |place, force, velocity| damped(place, force * inverse_masses[place], velocity),
-                            on_grid,
+                        self.for_each_node(
+                            |index, force, velocity| damped(index, force * inverse_masses[index], velocity),
+                            round_to_grid,
                         );
                     }
                 }
@@ -208,68 +208,68 @@ impl Axis<'_> {
         }
     }
 
-    /// Gives each node the velocity that `kicked` makes of its place in the tile, its force and its velocity, and lets it
-    /// drift to what `rounded` makes of its coordinate. Only what is damped comes to rest, and needs that.
+    /// Sets each velocity to `new_velocity` of the index in the tile, the force and the velocity. Then drifts each
+    /// coordinate and applies `round` to it. Only damped nodes come to rest and need rounding.
     #[inline(always)]
-    fn each(self, kicked: impl Fn(usize, f32, f32) -> f32, rounded: impl Fn(f32) -> f32) {
+    fn for_each_node(self, new_velocity: impl Fn(usize, f32, f32) -> f32, round: impl Fn(f32) -> f32) {
         let count = self.nodes.len();
         let (forces, velocities) = (&self.forces[..count], &mut self.velocities[..count]);
         match self.drift {
             None => {
-                for place in 0..count {
-                    velocities[place] = kicked(place, forces[place], velocities[place]);
+                for index in 0..count {
+                    velocities[index] = new_velocity(index, forces[index], velocities[index]);
                 }
             }
             Some(drift) => {
                 let substep = self.kick.substep;
                 let (positions, next_positions) = (&drift.positions[..count], &mut drift.next_positions[..count]);
                 let Some(remainders) = drift.remainders else {
-                    for place in 0..count {
-                        let velocity = kicked(place, forces[place], velocities[place]);
-                        velocities[place] = velocity;
-                        next_positions[place] = rounded(positions[place] + velocity * substep);
+                    for index in 0..count {
+                        let velocity = new_velocity(index, forces[index], velocities[index]);
+                        velocities[index] = velocity;
+                        next_positions[index] = round(positions[index] + velocity * substep);
                     }
                     return;
                 };
                 let remainders = &mut remainders[..count];
-                for place in 0..count {
-                    let velocity = kicked(place, forces[place], velocities[place]);
-                    velocities[place] = velocity;
-                    let way = velocity * substep + remainders[place];
-                    let next = rounded(positions[place] + way);
-                    next_positions[place] = next;
-                    remainders[place] = way - (next - positions[place]);
+                for index in 0..count {
+                    let velocity = new_velocity(index, forces[index], velocities[index]);
+                    velocities[index] = velocity;
+                    let displacement = velocity * substep + remainders[index];
+                    let next = round(positions[index] + displacement);
+                    next_positions[index] = next;
+                    remainders[index] = displacement - (next - positions[index]);
                 }
             }
         }
     }
 }
 
-/// What there is to know of a tile after a kick.
+/// Statistics of a tile after a kick.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Survey {
-    /// The box of its velocities; what is NaN is not in it.
-    pub velocities: Bounds,
-    /// Whether the squares of its velocities, and of its positions where they were looked at, are finite.
+pub(crate) struct TileStats {
+    /// The bounding box of its velocities without NaN.
+    pub velocities: Aabb,
+    /// True if the squares of its velocities, and of its positions if they were tested, are finite.
     pub finite: bool,
 }
 
-saved! { Survey { velocities, finite } }
+saved! { TileStats { velocities, finite } }
 
-impl Default for Survey {
+impl Default for TileStats {
     fn default() -> Self {
-        Self::NOTHING
+        Self::EMPTY
     }
 }
 
-impl Survey {
-    pub const NOTHING: Self = Self {
-        velocities: Bounds::EMPTY,
+impl TileStats {
+    pub const EMPTY: Self = Self {
+        velocities: Aabb::EMPTY,
         finite: true,
     };
 
-    /// What there is to know of both.
-    pub fn and(self, other: Self) -> Self {
+    /// Merges two statistics.
+    pub fn merge(self, other: Self) -> Self {
         Self {
             velocities: self.velocities.and(&other.velocities),
             finite: self.finite && other.finite,
@@ -277,15 +277,15 @@ impl Survey {
     }
 }
 
-/// Looks at the velocities of a tile, and at positions as well if only for being finite.
-pub(super) fn look(kernel: ChosenKernel, velocities: [&[f32]; 3], positions: Option<[&[f32]; 3]>) -> Survey {
-    Survey {
+/// Computes the statistics of a tile. `positions` are only tested for finite values.
+pub(super) fn tile_stats(kernel: ChosenKernel, velocities: [&[f32]; 3], positions: Option<[&[f32]; 3]>) -> TileStats {
+    TileStats {
         velocities: kernel.ranges(velocities).into(),
         finite: positions.is_none_or(|positions| kernel.run(AreFinite([velocities, positions]))),
     }
 }
 
-/// Whether the squares of vectors are finite.
+/// Tests if the squares of vectors are finite.
 struct AreFinite<'a>([[&'a [f32]; 3]; 2]);
 
 impl Loops for AreFinite<'_> {
@@ -297,10 +297,10 @@ impl Loops for AreFinite<'_> {
     }
 }
 
-/// Whether the square of every vector's length is finite.
+/// True if the squared length of every vector is finite.
 #[inline(always)]
 fn squares_are_finite([x, y, z]: [&[f32]; 3]) -> bool {
-    // Zero times what is not finite is NaN, and stays.
+    // Zero times a value that is not finite is NaN, and the sum stays NaN.
     let mut sums = [0.0_f32; 16];
     let blocks = x
         .as_chunks::<16>()

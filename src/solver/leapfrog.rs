@@ -1,25 +1,25 @@
-//! Leapfrog as an integrator: how many substeps stability needs, and steps that bodies take together. A step alone is in `verlet.rs`.
+//! Leapfrog as an integrator: substep selection and coupled steps. `verlet.rs` contains the uncoupled step.
 //!
-//! It keeps nothing of its own. What one step hands to the next is in [`Carry`] and in the state: reading velocities, sleep and changes of
-//! springs need it between steps.
+//! It has no data of its own. [`IntegratorState`] and the node state pass data from step to step, because reading
+//! velocities, sleeping and spring changes need it between steps.
 
 use super::System;
-use super::energy_monitor::Account;
+use super::energy_monitor::EnergyMonitor;
 use super::energy_sums::TileSums;
 use super::integrator::{CoupledBody, CoupledStep, Integrator, LEAPFROG};
-use super::needs::{Need, first_substep, prepare, refined, substeps_needed};
-use super::step_request::{Carry, StepRequest, StepStart};
-use super::verlet::{Step, Stepped, TooLong, begin, check, check_beside_springs, pass, run};
+use super::step_request::{IntegratorState, StepRequest, StepStart};
+use super::substep_count::{StepPlan, first_substep, prepare, refined, substeps_needed};
+use super::verlet::{Step, Stepped, SubstepTooLong, begin, check, check_beside_springs, run, run_kick};
 use crate::codec::{Writer, saved};
-use crate::geometry::Bounds;
+use crate::geometry::Aabb;
 use crate::soa::per_node;
 use crate::threads::Team;
 
-/// How often a step is begun again with shorter substeps, because its own motion made them necessary.
-const ATTEMPTS: u32 = 4;
+/// The maximum number of restarts with shorter substeps in a step whose own motion requires them.
+const MAX_ATTEMPTS: u32 = 4;
 
-/// How often masses are made within a step for elements that its motion made stiff.
-const RELIEFS: i32 = 8;
+/// The maximum number of mass updates within a step for elements that its motion stiffens.
+const MAX_SCALINGS: i32 = 8;
 
 /// The integrator of VERLET.
 #[derive(Debug)]
@@ -30,13 +30,13 @@ saved! { Leapfrog }
 per_node! { Leapfrog {} }
 
 impl Integrator for Leapfrog {
-    fn step(&mut self, body: &mut System, request: &StepRequest, again: Option<StepStart>, team: &Team) -> Stepped {
-        let start = match again {
+    fn step(&mut self, body: &mut System, request: &StepRequest, retry: Option<StepStart>, team: &Team) -> Stepped {
+        let start = match retry {
             Some(start) => start,
             None => {
-                let (carry, beside_springs) = prepare(body, request, team);
+                let (carry, non_spring_limit) = prepare(body, request, team);
                 if request.substeps == 0 {
-                    return run_stably(body, request, carry, beside_springs, team);
+                    return run_stably(body, request, carry, non_spring_limit, team);
                 }
                 StepStart {
                     carry,
@@ -48,65 +48,81 @@ impl Integrator for Leapfrog {
         run(body, request, start, 0.0, team)
     }
 
-    fn need(&mut self, body: &mut System, request: &StepRequest, team: &Team) -> Need {
-        let (start, beside_springs) = prepare(body, request, team);
+    fn plan_step(&mut self, body: &mut System, request: &StepRequest, team: &Team) -> StepPlan {
+        let (start, non_spring_limit) = prepare(body, request, team);
         if request.substeps > 0 {
-            return Need {
+            return StepPlan {
                 start,
                 substeps: request.substeps,
-                masses_for: 0.0,
+                scaling_substep: 0.0,
             };
         }
-        let stable_substep = first_substep(body, &start, beside_springs);
-        let mut need = Need::new(body, request, start, stable_substep, beside_springs);
-        need.start.pace = start.pace.after(need.substeps, request.dt);
-        let substeps = start.pace.keep(need.substeps, request.dt, request.max_substeps);
-        need.substeps = refined(substeps, &start, request);
-        need
+        let stable_substep = first_substep(body, &start, non_spring_limit);
+        let mut plan = StepPlan::new(body, request, start, stable_substep, non_spring_limit);
+        plan.start.substep_history = start.substep_history.after(plan.substeps, request.dt);
+        let substeps = start
+            .substep_history
+            .hold(plan.substeps, request.dt, request.max_substeps);
+        plan.substeps = refined(substeps, &start, request);
+        plan
     }
 
-    fn begin(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep) -> Stepped<()> {
-        let (request, substep) = (&step.request.of(body), step.substep());
-        if walk.masses_for == 0.0 {
-            check(&walk.start.stability, substep)?;
+    fn begin(&mut self, body: &mut System, coupled: &mut CoupledBody, step: &CoupledStep) -> Stepped<()> {
+        let (request, substep) = (&step.request.for_body(body), step.substep());
+        if coupled.scaling_substep == 0.0 {
+            check(&coupled.start.stability, substep)?;
         }
         begin(body, request);
-        walk.part = Step::of(request, step.substeps, walk.masses_for, step.team).opening(body, &mut walk.carry);
+        coupled.substep_kick =
+            Step::of(request, step.substeps, coupled.scaling_substep, step.team).opening(body, &mut coupled.carry);
         if let Some(damping) = &mut body.damping {
             damping.prepare(substep);
         }
         Ok(())
     }
 
-    fn substep(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep, index: u32) -> Stepped<()> {
-        let request = &step.request.of(body).weighed(body);
-        let CoupledBody { part, carry, .. } = walk;
+    fn substep(&mut self, body: &mut System, coupled: &mut CoupledBody, step: &CoupledStep, index: u32) -> Stepped<()> {
+        let request = &step.request.for_body(body).with_scaled_gravity(body);
+        let CoupledBody {
+            substep_kick, carry, ..
+        } = coupled;
         if index > 0 {
-            part.go_on(request.gravity, &mut carry.gravity);
+            substep_kick.set_full_kick(request.gravity, &mut carry.gravity);
         }
-        part.start = f64::from(index) / f64::from(step.substeps);
-        part.end = f64::from(index + 1) / f64::from(step.substeps);
+        substep_kick.start = f64::from(index) / f64::from(step.substeps);
+        substep_kick.end = f64::from(index + 1) / f64::from(step.substeps);
         if step.compares && index + 1 == step.substeps {
-            Account::keep_velocities(body, part);
+            EnergyMonitor::store_previous_velocities(body, substep_kick);
         }
-        pass(body, request, part, carry, step.team);
+        run_kick(body, request, substep_kick, carry, step.team);
         Ok(())
     }
 
-    fn end(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep, given: Bounds) -> Stepped<()> {
+    fn end(
+        &mut self,
+        body: &mut System,
+        coupled: &mut CoupledBody,
+        step: &CoupledStep,
+        velocities: Aabb,
+    ) -> Stepped<()> {
         let (substep, team) = (step.substep(), step.team);
-        body.forces.age(f64::from(substep), body.state.next_positions(), team);
+        body.forces
+            .advance(f64::from(substep), body.state.next_positions(), team);
         body.state.advance();
-        walk.carry.gravity.velocities = given;
-        Step::of(step.request, step.substeps, walk.masses_for, team).check_after(body, &mut walk.carry)
+        coupled.carry.gravity.velocities = velocities;
+        Step::of(step.request, step.substeps, coupled.scaling_substep, team).check_after(body, &mut coupled.carry)
     }
 
-    fn close(&mut self, body: &mut System, walk: &mut CoupledBody, step: &CoupledStep) -> Stepped<()> {
-        let CoupledBody { part, carry, .. } = walk;
-        walk.sums = step.compares.then(|| TileSums::of_open(body, part, step.team));
-        let request = &step.request.of(body).weighed(body);
-        part.close(request.gravity, &mut carry.gravity);
-        pass(body, request, part, carry, step.team);
+    fn closing_half_kick(&mut self, body: &mut System, coupled: &mut CoupledBody, step: &CoupledStep) -> Stepped<()> {
+        let CoupledBody {
+            substep_kick, carry, ..
+        } = coupled;
+        coupled.sums = step
+            .compares
+            .then(|| TileSums::before_flush(body, substep_kick, step.team));
+        let request = &step.request.for_body(body).with_scaled_gravity(body);
+        substep_kick.set_closing(request.gravity, &mut carry.gravity);
+        run_kick(body, request, substep_kick, carry, step.team);
         check_beside_springs(body, step.substep())
     }
 
@@ -119,65 +135,71 @@ impl Integrator for Leapfrog {
     }
 
     fn save(&self, to: &mut Writer) {
-        to.put(&[LEAPFROG]);
+        to.write(&[LEAPFROG]);
     }
 }
 
-/// Takes the step with as many substeps as stability needs.
-fn run_stably(body: &mut System, request: &StepRequest, start: Carry, beside_springs: f32, team: &Team) -> Stepped {
-    let mut stable_substep = first_substep(body, &start, beside_springs);
-    let mut beside_springs = beside_springs;
-    let (mut attempt, mut reliefs, mut was_tried, mut guess) = (0, 0, false, 1.0);
+/// Takes the step with as many substeps as stability requires.
+fn run_stably(
+    body: &mut System,
+    request: &StepRequest,
+    start: IntegratorState,
+    non_spring_limit: f32,
+    team: &Team,
+) -> Stepped {
+    let mut stable_substep = first_substep(body, &start, non_spring_limit);
+    let mut non_spring_limit = non_spring_limit;
+    let (mut attempt, mut scalings, mut was_tried, mut guess) = (0, 0, false, 1.0);
     loop {
-        if attempt >= ATTEMPTS {
+        if attempt >= MAX_ATTEMPTS {
             let anywhere = start.stability.limit_anywhere();
-            if body.forces.are_more_than_springs() {
-                // Where elements, terms and cavities go there is no end to how stiff they may be.
+            if body.forces.has_non_spring_forces() {
+                // The stiffness of elements, terms and cavities is unbounded under large deformation.
                 guess *= 0.5;
                 stable_substep = stable_substep.min(anywhere);
             } else {
                 stable_substep = anywhere;
             }
         }
-        let known = Need::new(body, request, start, stable_substep, beside_springs);
-        if known.substeps > request.max_substeps || known.substeps == u32::MAX {
-            reliefs += 1;
-            match body.relieve(request, was_tried, reliefs, team) {
-                Some(limit) if reliefs <= RELIEFS => {
-                    (attempt, guess, beside_springs) = (0, 1.0, limit);
+        let known_plan = StepPlan::new(body, request, start, stable_substep, non_spring_limit);
+        if known_plan.substeps > request.max_substeps || known_plan.substeps == u32::MAX {
+            scalings += 1;
+            match body.scale_for_deformation(request, was_tried, scalings, team) {
+                Some(limit) if scalings <= MAX_SCALINGS => {
+                    (attempt, guess, non_spring_limit) = (0, 1.0, limit);
                     stable_substep = first_substep(body, &start, limit);
                     continue;
                 }
                 _ => break,
             }
         }
-        let known_substeps = known.substeps;
-        let need = if guess < 1.0 {
-            Need::new(body, request, start, guess * stable_substep, guess * beside_springs)
+        let known_substeps = known_plan.substeps;
+        let plan = if guess < 1.0 {
+            StepPlan::new(body, request, start, guess * stable_substep, guess * non_spring_limit)
         } else {
-            known
+            known_plan
         };
-        let is_last = need.substeps >= request.max_substeps || attempt >= ATTEMPTS && guess == 1.0;
+        let is_last = plan.substeps >= request.max_substeps || attempt >= MAX_ATTEMPTS && guess == 1.0;
         (attempt, was_tried) = (attempt + 1, true);
-        let substeps = need.substeps.min(request.max_substeps);
-        let substeps = start.pace.keep(substeps, request.dt, request.max_substeps);
+        let substeps = plan.substeps.min(request.max_substeps);
+        let substeps = start.substep_history.hold(substeps, request.dt, request.max_substeps);
         let substeps = refined(substeps, &start, request);
-        let begun = StepStart::new(need.start, substeps);
-        match run(body, request, begun, need.masses_for, team) {
-            Ok(mut taken) => {
-                // A guess says nothing of what the next steps need.
-                taken.carry.pace = start.pace.after(known_substeps, request.dt);
-                taken.start.carry = start;
-                return Ok(taken);
+        let attempt_start = StepStart::new(plan.start, substeps);
+        match run(body, request, attempt_start, plan.scaling_substep, team) {
+            Ok(mut result) => {
+                // A guess does not predict the substeps of the next steps.
+                result.carry.substep_history = start.substep_history.after(known_substeps, request.dt);
+                result.start.carry = start;
+                return Ok(result);
             }
-            Err(found) => {
-                stable_substep = stable_substep.min(found.stable_substep);
-                beside_springs = beside_springs.min(found.stable_substep);
+            Err(error) => {
+                stable_substep = stable_substep.min(error.stable_substep);
+                non_spring_limit = non_spring_limit.min(error.stable_substep);
                 if is_last && substeps_needed(request, stable_substep) <= f64::from(request.max_substeps) {
                     break;
                 }
             }
         }
     }
-    Err(TooLong { stable_substep })
+    Err(SubstepTooLong { stable_substep })
 }

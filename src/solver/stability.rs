@@ -1,151 +1,160 @@
 //! The longest substep that an explicit solver may take.
 //!
-//! A spring's stiffness is at most `k n n^T + k max(0, 1 - L0/L) (I - n n^T)`: along it, and across it where it is
-//! stretched. With `q(x_i - x_j) <= (1 + t) q(x_i) + (1 + 1/t) q(x_j)` for each such form and t = m_i/m_j, the squares
-//! of the body's frequencies are at most the largest eigenvalue of any node's 3x3 matrix
-//! `sum_j (1/m_i + 1/m_j) K_ij`: exact for two masses, and for a long chain or a grid of equal ones. Any t holds; here it is between
-//! 1/4 and 4, or a heavy node with many light neighbours, as cuts make them, would have a bound far above any frequency. The same sum over
-//! the dampings bounds the rates of damping, and `h < 2 / (sqrt(omega² + delta²/4) + delta/2)` is leapfrog's limit with
-//! both (Belytschko, Liu, Moran 2000, section 6.2.1, with zeta = delta / 2 omega).
+//! A spring's stiffness is at most `k n n^T + k max(0, 1 - L0/L) (I - n n^T)`: the first part acts along the spring,
+//! the second one across it if it is stretched. For each such form `q(x_i - x_j) <= (1 + t) q(x_i) + (1 + 1/t) q(x_j)`
+//! with t = m_i/m_j. The squares of the body's frequencies are therefore at most the largest eigenvalue of any node's
+//! 3x3 matrix `sum_j (1/m_i + 1/m_j) K_ij`. The bound is exact for two masses, and for a long chain or a grid of equal
+//! masses. It holds for any t. Here t is limited to 1/4 to 4: otherwise a heavy node with many light neighbors, as cuts
+//! create them, would have a bound far above any frequency. The same sum over the dampings bounds the damping rates.
+//! With both, the limit of leapfrog is `h < 2 / (sqrt(omega² + delta²/4) + delta/2)` (Belytschko, Liu, Moran 2000,
+//! section 6.2.1, with zeta = delta / 2 omega).
 
 use glam::Vec3;
 
-use super::watched::{Candidate, Watched};
+use super::critical_nodes::{CriticalNode, CriticalNodes};
 use crate::codec::saved;
-use crate::soa::{Masses, Rates, Vectors};
+use crate::soa::{FrequencyBound, NodalMasses, Vectors};
 use crate::springs::{Springs, separation};
 
-/// The part of the longest stable substep that is used.
+/// The used fraction of the longest stable substep.
 pub(crate) const RESERVE: f32 = 0.8;
 
-/// How far neighbours may move against each other before the limit is estimated again, as a fraction of the length over
-/// which the matrices of their springs change. It then changes by less than what a chosen substep keeps in reserve.
+/// The relative displacement of neighbors before the limit is estimated again, as a fraction of the length over which
+/// the matrices of their springs change. The limit then changes by less than the reserve of the substep.
 const TRAVEL_BEFORE_ESTIMATE: f32 = 0.25;
 
-/// How much longer substeps have to be to be worth estimates of all nodes of a moving body.
+/// The gain in substep length that makes repeated estimates of a moving body worthwhile.
 ///
-/// A node's largest eigenvalue is at least a third of the sum of all three, which is no less than what its springs' stiffnesses
-/// add up to: without damping along springs an estimate allows at most sqrt(3) times the substep that is stable anywhere, as in
-/// even lattices in three dimensions. A moving body would pay for that with the time of several substeps every few substeps.
+/// A node's largest eigenvalue is at least a third of the trace, and the trace is at least the sum of its springs'
+/// stiffnesses. Without spring damping, an estimate thus allows at most sqrt(3) times the substep that is stable at all
+/// positions, for example in regular 3D lattices. A moving body would pay for this gain with the cost of several
+/// substeps every few substeps.
 const WORTH_LENGTHENING: f32 = 2.0;
 
-/// So few nodes are sorted into those that are watched one by one.
-const FEW: usize = 8;
+/// Up to this many nodes are inserted into the critical nodes one by one.
+const FEW_NODES: usize = 8;
 
-/// What is known about the longest stable substep of a body, with its masses as they are.
+/// The longest stable substep of a body with unscaled masses, as far as it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stability {
-    /// The limit at the positions of the last estimate, s; `None`: not estimated since the body's masses or pins changed.
-    now: Option<f32>,
-    /// The limit wherever the nodes are, s.
+    /// The limit at the positions of the last estimate (s). `None` if masses or pins have changed since.
+    current: Option<f32>,
+    /// The limit at all positions (s).
     anywhere: f32,
-    /// What the last estimate found, s.
-    found: f32,
-    /// How far neighbours may still move against each other before the estimate is stale, m.
-    reach: f32,
+    /// The result of the last estimate (s).
+    last_estimate: f32,
+    /// The relative displacement of neighbors for which the estimate remains valid (m).
+    valid_travel: f32,
 }
 
-saved! { Stability { now, anywhere, found, reach } }
+saved! { Stability { current, anywhere, last_estimate, valid_travel } }
 
 impl Stability {
     pub const UNKNOWN: Self = Self {
-        now: None,
+        current: None,
         anywhere: 0.0,
-        found: 0.0,
-        reach: 0.0,
+        last_estimate: 0.0,
+        valid_travel: 0.0,
     };
 
-    /// The longest stable substep, s, where it is known.
+    /// The longest stable substep, if it is known (s).
     pub fn limit(&self) -> Option<f32> {
-        self.now
+        self.current
     }
 
-    /// The longest substep that is stable wherever the nodes are, s, where `limit` is known.
+    /// The longest substep that is stable at all positions (s). Valid if `limit` is known.
     pub fn limit_anywhere(&self) -> f32 {
         self.anywhere
     }
 
-    /// What the last estimate found, s, wherever the nodes have gone since.
-    pub fn found(&self) -> f32 {
-        self.found
+    /// The result of the last estimate at its positions (s).
+    pub fn last_estimate(&self) -> f32 {
+        self.last_estimate
     }
 
-    /// Whether the estimate still holds after neighbours have moved against each other by up to `travel` more.
-    pub fn holds_after(&mut self, travel: f32) -> bool {
-        self.reach -= travel;
-        self.reach >= 0.0
+    /// Subtracts a relative displacement of neighbors from `valid_travel`. Returns true if the estimate is still valid.
+    pub fn remains_valid_after(&mut self, travel: f32) -> bool {
+        self.valid_travel -= travel;
+        self.valid_travel >= 0.0
     }
 
-    /// For how many substeps the estimate holds in which neighbours move against each other by up to `travel` each, m.
-    pub fn substeps_of(&self, travel: f32) -> f32 {
+    /// The number of substeps for which the estimate is valid, if neighbors move relative to each other by `travel` in
+    /// each (m).
+    pub fn valid_substeps(&self, travel: f32) -> f32 {
         if travel > 0.0 {
-            self.reach / travel
+            self.valid_travel / travel
         } else {
             f32::INFINITY
         }
     }
 
-    /// The same estimate, where `substep` is so short that the nodes may be anywhere: an estimate that never gets stale.
-    pub fn for_short(self, substep: f32) -> Option<Self> {
-        (self.now.is_some() && substep <= self.anywhere).then_some(Self {
-            now: Some(self.anywhere),
-            reach: f32::INFINITY,
+    /// Returns a permanently valid limit if `substep` is stable at all positions.
+    pub fn if_stable_anywhere(self, substep: f32) -> Option<Self> {
+        (self.current.is_some() && substep <= self.anywhere).then_some(Self {
+            current: Some(self.anywhere),
+            valid_travel: f32::INFINITY,
             ..self
         })
     }
 
-    /// Whether another estimate may allow longer substeps at the positions as they are now.
+    /// True if an estimate at the current positions may allow longer substeps.
     pub fn is_coarse(&self) -> bool {
-        self.reach == f32::INFINITY && self.now.is_some_and(f32::is_finite)
+        self.valid_travel == f32::INFINITY && self.current.is_some_and(f32::is_finite)
     }
 
-    /// Whether estimates allow substeps so much longer than those that are stable anywhere that they are worth their time.
+    /// True if estimates allow substeps enough longer than the limit at all positions to justify their cost.
     pub fn is_worth_estimating(&self) -> bool {
-        self.found > WORTH_LENGTHENING * self.anywhere
+        self.last_estimate > WORTH_LENGTHENING * self.anywhere
     }
 
-    /// The same, where the limit is found to be no longer than `limit`, s.
+    /// Returns a copy with the limit reduced to at most `limit` (s).
     pub fn shortened_to(self, limit: f32) -> Self {
         Self {
-            now: self.now.map(|now| now.min(limit)),
+            current: self.current.map(|current| current.min(limit)),
             ..self
         }
     }
 
-    /// The longest stable substep at these positions, and how long that is true. `watched` are up to date.
+    /// Estimates the longest stable substep at these positions, and its validity. The critical nodes must be up to
+    /// date.
     ///
-    /// Where the watched nodes show a limit that no other node can go below, wherever it is, no other is looked at.
-    pub fn estimate(springs: &dyn Springs, masses: Masses, positions: &Vectors, watched: &Watched) -> Self {
-        let mut found = Tightest {
+    /// If they give a limit that no other node can go below at any position, no other node is visited.
+    pub fn estimate(
+        springs: &dyn Springs,
+        masses: NodalMasses,
+        positions: &Vectors,
+        critical_nodes: &CriticalNodes,
+    ) -> Self {
+        let mut tightest = Tightest {
             limit: f32::INFINITY,
             shortest: f32::INFINITY,
         };
-        for candidate in watched.candidates() {
-            if candidate.limit >= found.limit {
+        for candidate in critical_nodes.candidates() {
+            if candidate.limit >= tightest.limit {
                 break;
             }
             if let Some(sums) = NodeBound::of(candidate.node as usize, springs, &masses, positions) {
-                found.take(&sums);
+                tightest.include(&sums);
             }
         }
-        if watched.limit_of_others() < found.limit {
+        if critical_nodes.other_limit() < tightest.limit {
             for node in 0..masses.masses.len() {
                 if let Some(sums) = NodeBound::of(node, springs, &masses, positions) {
-                    found.take(&sums);
+                    tightest.include(&sums);
                 }
             }
         }
         Self {
-            now: Some(found.limit),
-            anywhere: watched.limit(),
-            found: found.limit,
-            reach: TRAVEL_BEFORE_ESTIMATE * found.shortest,
+            current: Some(tightest.limit),
+            anywhere: critical_nodes.limit(),
+            last_estimate: tightest.limit,
+            valid_travel: TRAVEL_BEFORE_ESTIMATE * tightest.shortest,
         }
     }
 
-    /// The node whose springs allow the shortest substep at these positions, the other end of its stiffest spring, and that substep, s;
-    /// `None`: no node that is free has springs.
-    pub fn tightest(springs: &dyn Springs, masses: Masses, positions: &Vectors) -> Option<([usize; 2], f32)> {
+    /// Finds the node with the shortest stable substep at these positions, the other end of its stiffest spring, and
+    /// that substep (s). `None` if no free node has springs.
+    pub fn tightest(springs: &dyn Springs, masses: NodalMasses, positions: &Vectors) -> Option<([usize; 2], f32)> {
         let mut tightest = None;
         let mut shortest = f32::INFINITY;
         for node in 0..masses.masses.len() {
@@ -161,108 +170,114 @@ impl Stability {
         let node = tightest?;
         let (mut other, mut stiffest) = (node, -1.0);
         springs.visit(node, &mut |link| {
-            let inverse_mass = masses.of_spring(masses.inverse(node), link.neighbour as usize);
+            let inverse_mass = masses.spring_factor(masses.inverse(node), link.neighbor as usize);
             let stiffness = (link.stiffness + link.damping / shortest) * inverse_mass;
             if stiffness > stiffest {
-                (other, stiffest) = (link.neighbour as usize, stiffness);
+                (other, stiffest) = (link.neighbor as usize, stiffness);
             }
         });
         Some(([node, other], shortest))
     }
 
-    /// What the last estimate tells of the springs that it looked at.
+    /// Recovers the bound of the last estimate.
     fn tightest_known(&self) -> Option<Tightest> {
-        let shortest = self.reach / TRAVEL_BEFORE_ESTIMATE;
-        self.now.map(|limit| Tightest { limit, shortest })
+        let shortest = self.valid_travel / TRAVEL_BEFORE_ESTIMATE;
+        self.current.map(|limit| Tightest { limit, shortest })
     }
 
-    /// The same after springs of these nodes, given in order, have come or changed: no other node has to be looked at. Where they
-    /// became softer it may be lower than it has to be.
+    /// Updates the limit after springs of these nodes were added or changed, without visiting other nodes. `nodes` are
+    /// sorted. After softening, the limit may be lower than necessary.
     pub fn changed(
         self,
         nodes: &[u32],
         springs: &dyn Springs,
-        masses: Masses,
+        masses: NodalMasses,
         positions: &Vectors,
-        watched: &mut Watched,
+        critical_nodes: &mut CriticalNodes,
     ) -> Self {
-        let Some(mut found) = self.tightest_known() else {
+        let Some(mut tightest) = self.tightest_known() else {
             return self;
         };
-        let is_few = nodes.len() <= FEW;
+        let is_few = nodes.len() <= FEW_NODES;
         if !is_few {
-            watched.renew(nodes, springs, masses);
+            critical_nodes.update(nodes, springs, masses);
         }
         for &node in nodes {
             let Some(sums) = NodeBound::of(node as usize, springs, &masses, positions) else {
                 continue;
             };
             if is_few {
-                watched.insert(node, sums.anywhere.limit());
+                critical_nodes.insert(node, sums.anywhere.limit());
             }
-            found.take_changed(&sums, self.is_coarse());
+            tightest.include_changed(&sums, self.is_coarse());
         }
-        self.with(&found, watched)
+        self.with(&tightest, critical_nodes)
     }
 
-    /// The same after a cut has changed these nodes, in one walk over those that are watched. There is room for a candidate of each.
+    /// Updates the limit after a cut has changed these nodes, in one pass over the critical nodes. `candidates` must
+    /// have capacity for all nodes.
     pub fn cut(
         self,
         nodes: &[u32],
         springs: &dyn Springs,
-        masses: Masses,
+        masses: NodalMasses,
         positions: &Vectors,
-        (watched, mut candidates): (&mut Watched, Vec<Candidate>),
+        (critical_nodes, mut candidates): (&mut CriticalNodes, Vec<CriticalNode>),
     ) -> Self {
-        let Some(mut found) = self.tightest_known() else {
+        let Some(mut tightest) = self.tightest_known() else {
             return self;
         };
         for &node in nodes {
             if let Some(sums) = NodeBound::of(node as usize, springs, &masses, positions) {
                 let limit = sums.anywhere.limit();
-                candidates.push(Candidate { limit, node });
-                found.take_changed(&sums, self.is_coarse());
+                candidates.push(CriticalNode { limit, node });
+                tightest.include_changed(&sums, self.is_coarse());
             }
         }
-        watched.take_all(candidates);
-        self.with(&found, watched)
+        critical_nodes.merge(candidates);
+        self.with(&tightest, critical_nodes)
     }
 
-    fn with(self, found: &Tightest, watched: &Watched) -> Self {
+    fn with(self, tightest: &Tightest, critical_nodes: &CriticalNodes) -> Self {
         Self {
-            now: Some(found.limit),
-            found: self.found.min(found.limit),
-            anywhere: watched.limit(),
-            reach: TRAVEL_BEFORE_ESTIMATE * found.shortest,
+            current: Some(tightest.limit),
+            last_estimate: self.last_estimate.min(tightest.limit),
+            anywhere: critical_nodes.limit(),
+            valid_travel: TRAVEL_BEFORE_ESTIMATE * tightest.shortest,
         }
     }
 
-    /// What the next step depends on.
+    /// The values that the next step depends on.
     pub fn floats(&self) -> [f32; 4] {
-        [self.now.unwrap_or(-1.0), self.anywhere, self.found, self.reach]
+        [
+            self.current.unwrap_or(-1.0),
+            self.anywhere,
+            self.last_estimate,
+            self.valid_travel,
+        ]
     }
 }
 
-/// What the nodes show that have been looked at.
+/// The bound of the visited nodes.
 struct Tightest {
-    /// s
+    /// The shortest stable substep (s).
     limit: f32,
-    /// The shortest length over which the matrix of a node changes that may set the limit, m.
+    /// The shortest length over which the matrix of a critical node changes (m).
     shortest: f32,
 }
 
 impl Tightest {
-    /// Takes a node in that has changed; `is_coarse`: wherever it goes.
-    fn take_changed(&mut self, sums: &NodeBound, is_coarse: bool) {
+    /// Includes a changed node. `is_coarse`: with its limit at all positions.
+    fn include_changed(&mut self, sums: &NodeBound, is_coarse: bool) {
         if is_coarse {
             self.limit = self.limit.min(sums.anywhere.limit());
         } else {
-            self.take(sums);
+            self.include(sums);
         }
     }
 
-    /// Takes a node in. Nothing that moves can make a node matter whose springs are too weak even together.
-    fn take(&mut self, sums: &NodeBound) {
+    /// Includes a node. Nodes whose limit at all positions is above the current limit cannot matter.
+    fn include(&mut self, sums: &NodeBound) {
         if sums.anywhere.limit() < self.limit {
             self.limit = self.limit.min(sums.limit_below(self.limit));
             self.shortest = self.shortest.min(sums.shortest);
@@ -270,23 +285,23 @@ impl Tightest {
     }
 }
 
-/// The springs of one node, added up.
+/// The sums over the springs of a node.
 struct NodeBound {
-    /// The directed part of the matrices of stiffness, 1/s².
+    /// The directional part of the stiffness matrices (1/s²).
     along: Symmetric,
-    /// The part that is the same in all directions, 1/s².
+    /// The isotropic part (1/s²).
     across: f32,
-    /// The matrices of damping, 1/s.
+    /// The damping matrices (1/s).
     damping: Symmetric,
-    /// What stiffness and damping can be at most, wherever the nodes are.
-    anywhere: Rates,
-    /// The shortest length over which one of the matrices changes, m.
+    /// The bounds of stiffness and damping at all positions.
+    anywhere: FrequencyBound,
+    /// The shortest length over which one of the matrices changes (m).
     shortest: f32,
 }
 
 impl NodeBound {
-    /// `None`: the node is pinned.
-    fn of(node: usize, springs: &dyn Springs, masses: &Masses, positions: &Vectors) -> Option<Self> {
+    /// Returns `None` for a pinned node.
+    fn of(node: usize, springs: &dyn Springs, masses: &NodalMasses, positions: &Vectors) -> Option<Self> {
         let inverse_mass = masses.inverse(node);
         if inverse_mass == 0.0 {
             return None;
@@ -296,17 +311,17 @@ impl NodeBound {
             along: Symmetric::default(),
             across: 0.0,
             damping: Symmetric::default(),
-            anywhere: Rates::ZERO,
+            anywhere: FrequencyBound::ZERO,
             shortest: f32::INFINITY,
         };
         springs.visit(node, &mut |link| {
-            let neighbour = link.neighbour as usize;
-            let (length, direction) = separation(node, neighbour, positions.get(neighbour) - position);
-            let inverse_mass = masses.of_spring(inverse_mass, neighbour);
+            let neighbor = link.neighbor as usize;
+            let (length, direction) = separation(node, neighbor, positions.get(neighbor) - position);
+            let inverse_mass = masses.spring_factor(inverse_mass, neighbor);
             let stiffness = link.stiffness * inverse_mass;
-            sums.anywhere.stiffest += stiffness;
-            // Stretched to twice its rest length a spring is half as stiff across as along, and so on: only the rest
-            // has a direction.
+            sums.anywhere.omega_sq += stiffness;
+            // A spring that is stretched to twice its rest length has half its stiffness across. Only the difference is
+            // directional.
             let directed = if length > link.rest_length {
                 link.rest_length / length
             } else {
@@ -319,7 +334,7 @@ impl NodeBound {
             }
             if link.damping > 0.0 {
                 let damping = link.damping * inverse_mass;
-                sums.anywhere.most_damped += damping;
+                sums.anywhere.damping_rate += damping;
                 sums.damping.add_outer(direction, damping);
                 sums.shortest = sums.shortest.min(length);
             }
@@ -327,18 +342,18 @@ impl NodeBound {
         Some(sums)
     }
 
-    /// The longest substep that is stable for the node where it is, s, or anything from `known` on where it is no shorter.
+    /// The longest stable substep of the node (s). Returns `known` if it is not shorter.
     fn limit_below(&self, known: f32) -> f32 {
-        let bound = Rates {
-            stiffest: self.along.eigenvalue_bound() + self.across,
-            most_damped: self.damping.eigenvalue_bound(),
+        let bound = FrequencyBound {
+            omega_sq: self.along.eigenvalue_bound() + self.across,
+            damping_rate: self.damping.eigenvalue_bound(),
         };
         if bound.limit() >= known {
             return known;
         }
-        Rates {
-            stiffest: self.along.largest_eigenvalue() + self.across,
-            most_damped: self.damping.largest_eigenvalue(),
+        FrequencyBound {
+            omega_sq: self.along.largest_eigenvalue() + self.across,
+            damping_rate: self.damping.largest_eigenvalue(),
         }
         .limit()
     }
@@ -353,7 +368,7 @@ struct Symmetric {
 }
 
 impl Symmetric {
-    /// Adds `factor` times `vector vector^T`.
+    /// Adds `factor * vector * vector^T`.
     #[inline(always)]
     fn add_outer(&mut self, vector: Vec3, factor: f32) {
         let scaled = vector * factor;
@@ -361,17 +376,17 @@ impl Symmetric {
         self.off_diagonal += Vec3::new(scaled.y * vector.z, scaled.z * vector.x, scaled.x * vector.y);
     }
 
-    /// What the largest eigenvalue is at most.
+    /// An upper bound of the largest eigenvalue.
     fn eigenvalue_bound(&self) -> f32 {
         self.mean() + 2.0 * self.spread()
     }
 
-    /// A third of the sum of the eigenvalues.
+    /// The mean of the eigenvalues.
     fn mean(&self) -> f32 {
         self.diagonal.element_sum() / 3.0
     }
 
-    /// How far apart the eigenvalues are: none is further than twice that from their mean.
+    /// Half of a bound of the distance of eigenvalues from their mean.
     fn spread(&self) -> f32 {
         let deviation = self.diagonal - self.mean();
         ((deviation.length_squared() + 2.0 * self.off_diagonal.length_squared()) / 6.0).sqrt()

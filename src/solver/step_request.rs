@@ -1,47 +1,48 @@
-//! What is asked of a step, what a body takes from one to the next, and how an attempt ended.
+//! The input of a step, the state passed between steps, and the outcome of an attempt.
 
 use glam::Vec3;
 
 use super::System;
-use super::closing::ClosingKick;
+use super::deferred_half_kick::DeferredHalfKick;
 use super::energy_account::EnergyAccount;
 use super::gravity::GravityKicks;
-use super::pace::Pace;
 use super::stability::{RESERVE, Stability};
-use super::verlet::TooLong;
+use super::substep_history::SubstepHistory;
+use super::verlet::SubstepTooLong;
 use crate::base::Profile;
 use crate::codec::saved;
 use crate::contact::{DynamicTool, ToolPath};
 
-/// Near tools and other tissue a step of IMPLICIT or NEWTON is cut into as many parts as this, whatever is allowed otherwise: 4 s of them.
-const MOST_PARTS: u32 = 1 << 12;
+/// The maximum number of parts of a step of IMPLICIT or NEWTON near tools or other tissue, regardless of other limits.
+/// At 1 ms each they cover 4 s.
+const MAX_PARTS: u32 = 1 << 12;
 
-/// What is asked of a step.
+/// The input of a step.
 #[derive(Clone, Copy)]
 pub(crate) struct StepRequest<'a> {
-    /// Seconds, above 0.
+    /// The step length, above 0 (s).
     pub dt: f32,
     pub gravity: Vec3,
-    /// 0: as many as stability needs.
+    /// The number of substeps; 0 selects as many as stability requires.
     pub substeps: u32,
     pub max_substeps: u32,
-    /// Metres; 0: off.
+    /// The position tolerance (m); 0 disables it.
     pub tolerance: f32,
     pub tools: &'a [ToolPath],
-    /// Those of them that are rigid bodies.
+    /// The tools that are rigid bodies.
     pub dynamic: &'a [DynamicTool],
-    /// How fast nodes of the bodies are that take their substeps together, m/s; `None`: each body steps by itself.
+    /// The maximum node speed of all coupled bodies (m/s). `None` for an uncoupled body.
     pub neighbor_speed: Option<f32>,
-    /// Where the stages are timed, if they are.
+    /// Collects the times of stages, if present.
     pub profile: Option<&'a Profile>,
-    /// How many products there may be in all where equations are solved; `u32::MAX`: as many as the definition allows.
+    /// The maximum total number of matrix-vector products; `u32::MAX` uses the limit of the definition.
     pub work: u32,
-    /// Whether mass may be added where more substeps are needed than are allowed.
-    pub relieves: bool,
+    /// True if mass may be added when a step would need more substeps than allowed.
+    pub may_add_mass: bool,
 }
 
 impl StepRequest<'_> {
-    /// That of a step without gravity or tools.
+    /// A step without gravity and tools.
     pub fn alone(dt: f32, max_substeps: u32) -> Self {
         Self {
             dt,
@@ -52,51 +53,51 @@ impl StepRequest<'_> {
             tools: &[],
             neighbor_speed: None,
             work: u32::MAX,
-            relieves: false,
+            may_add_mass: false,
             profile: None,
             dynamic: &[],
         }
     }
 
-    /// The same with the gravity that acts on a body.
-    pub fn of(&self, body: &System) -> Self {
+    /// Returns the request with the acceleration that acts on a body.
+    pub fn for_body(&self, body: &System) -> Self {
         Self {
-            gravity: body.pull(self.gravity),
+            gravity: body.body_acceleration(self.gravity),
             ..*self
         }
     }
 
-    /// The same with the gravity that acts on all of a body's mass, as it is scaled now.
-    pub fn weighed(&self, body: &System) -> Self {
+    /// Returns the request with the gravity on the scaled mass of a body.
+    pub fn with_scaled_gravity(&self, body: &System) -> Self {
         Self {
             gravity: self.gravity * body.weight_share().unwrap_or(1.0),
             ..*self
         }
     }
 
-    /// In how many parts a step is taken at most that is cut because something is near: what is longer would take as long as it
-    /// liked.
-    pub fn most_parts(&self) -> u32 {
-        MOST_PARTS.max(match self.substeps {
+    /// The maximum number of parts of a step that is subdivided near tools or tissue. It bounds the cost of the step.
+    pub fn max_parts(&self) -> u32 {
+        MAX_PARTS.max(match self.substeps {
             0 => self.max_substeps,
             fixed => fixed,
         })
     }
 }
 
-/// How a step is taken.
+/// The start of a step and its substeps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StepStart {
-    /// What it begins with.
-    pub carry: Carry,
+    /// The state at the start.
+    pub carry: IntegratorState,
     pub substeps: u32,
-    /// After so many of them a world with a tolerance looks at it.
+    /// The number of substeps after which step doubling samples positions.
     pub middle: u32,
 }
 
 impl StepStart {
-    /// In so many substeps, looked at far from simple fractions of the step, where steps that have lost the phase of an oscillation may agree.
-    pub fn new(carry: Carry, substeps: u32) -> Self {
+    /// Samples positions far from simple fractions of the step, where steps that have lost the phase of an oscillation
+    /// may agree.
+    pub fn new(carry: IntegratorState, substeps: u32) -> Self {
         Self {
             carry,
             substeps,
@@ -105,64 +106,69 @@ impl StepStart {
     }
 }
 
-/// What one step hands to the next beside the state.
+/// The state that a step passes to the next, except positions and velocities.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Carry {
+pub(crate) struct IntegratorState {
     pub stability: Stability,
     pub gravity: GravityKicks,
-    /// What the velocities lack to be those at the time of the positions.
-    pub closing: Option<ClosingKick>,
-    /// The substep that masses are made for, s; 0: they are as they are, and `stability` is that of the current positions.
-    pub masses_for: f32,
+    /// The half kick that the velocities lack.
+    pub deferred_kick: Option<DeferredHalfKick>,
+    /// The substep that masses are computed for (s). 0: masses are unscaled, and `stability` belongs to the current
+    /// positions.
+    pub scaling_substep: f32,
     pub energy: EnergyAccount,
-    pub pace: Pace,
+    pub substep_history: SubstepHistory,
 }
 
-saved! { Carry { stability, gravity, closing, masses_for, energy, pace } }
+saved! { IntegratorState { stability, gravity, deferred_kick, scaling_substep, energy, substep_history } }
 
-impl Carry {
-    /// A change from outside: the body has another energy, and may need fewer substeps.
+impl IntegratorState {
+    /// Resets energy and substep history after a change from outside.
     pub fn forget(&mut self) {
         self.energy.forget();
-        self.pace = Pace::UNKNOWN;
+        self.substep_history = SubstepHistory::UNKNOWN;
     }
 
-    /// The longest substep that keeps the energy of a body that is stable in substeps of `limit` seconds: those of the last second were no longer.
+    /// The longest substep that conserves energy, for a body that is stable with substeps of `limit` seconds.
     pub fn limit_by_energy(&self, limit: f32) -> f32 {
-        limit.min(self.pace.shortest() / RESERVE) / self.energy.refinement() as f32
+        limit.min(self.substep_history.shortest() / RESERVE) / self.energy.refinement() as f32
     }
 
-    /// The longest stable substep with the masses in use, s, where it is known.
+    /// The longest stable substep with the present masses, if it is known (s).
     pub fn limit(&self) -> Option<f32> {
-        if self.masses_for > 0.0 {
-            Some(self.masses_for)
+        if self.scaling_substep > 0.0 {
+            Some(self.scaling_substep)
         } else {
             self.stability.limit()
         }
     }
 }
 
-/// How an attempted step ended. Nothing is current before [`System::commit`].
+/// The outcome of an attempted step. [`System::commit`] makes it current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Outcome {
-    /// The step is ready to be committed.
-    Done { substeps: u32, carry: Carry, error: f32 },
-    /// All of the body sleeps: nothing of it changes.
+    /// The step can be committed.
+    Done {
+        substeps: u32,
+        carry: IntegratorState,
+        error: f32,
+    },
+    /// The whole body sleeps and does not change.
     Asleep,
-    /// The step would have ended in infinity or NaN.
+    /// The step would end with infinity or NaN.
     NotFinite,
-    /// More substeps would be needed than are allowed.
+    /// The step would need more substeps than allowed.
     Unstable {
-        /// s
+        /// The longest stable substep (s).
         stable_substep: f32,
-        /// What was reached where a tolerance needs more, m, infinite where not even twice the substeps are allowed; 0 where it is
-        /// stability that does.
+        /// The error reached under a tolerance (m). Infinite if even twice the substeps are not allowed. 0 if stability
+        /// is the limit.
         error: f32,
     },
 }
 
-impl From<TooLong> for Outcome {
-    fn from(TooLong { stable_substep }: TooLong) -> Self {
+impl From<SubstepTooLong> for Outcome {
+    fn from(SubstepTooLong { stable_substep }: SubstepTooLong) -> Self {
         Outcome::Unstable {
             stable_substep,
             error: 0.0,

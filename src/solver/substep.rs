@@ -1,111 +1,111 @@
-//! One substep of VERLET, tile by tile: forces, kick, drift and pins of a tile while it is in the nearest cache.
+//! One substep of VERLET, tile by tile: forces, kick, drift and pins of a tile while it is in the L1 cache.
 
 use std::ops::Range;
 
 use glam::Vec3;
 
 use super::System;
-use super::closing::{Closed, ClosingKick};
+use super::deferred_half_kick::{DeferredHalfKick, HalfKickFlush};
 use super::gravity::GravityKicks;
-use super::kick::{Drift, Inertia, Kick, Survey, TileKick, look};
+use super::kick::{Drift, Inertia, Kick, TileKick, TileStats, tile_stats};
 use super::step_request::StepRequest;
-use crate::forces::Sum;
+use crate::forces::ForceSum;
 use crate::nodes::{NodeDamping, Pin};
 use crate::simd::ChosenKernel;
 use crate::soa::{TileForces, Vectors, View, copy_axes, tile_count, tile_nodes};
-use crate::springs::Motion;
+use crate::springs::ForceInput;
 use crate::threads::{Items, Team};
 
-/// Where a kick's velocities come from.
+/// The source and time of the velocities before a kick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum VelocityTime {
     /// The current state, at the time of the positions.
     Current,
     /// The current state, half a substep before the positions.
-    CurrentOpen,
+    CurrentLagging,
     /// The step in progress, at the time of the positions.
-    Closed,
+    InProgress,
     /// The step in progress, half a substep before the positions.
-    Open,
+    InProgressLagging,
 }
 
-/// One pass over a body: a kick, and the drift that follows it.
+/// One pass over a body: a kick and the drift that follows it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Part {
-    pub(super) before: VelocityTime,
-    /// Whether it is the last of the step.
+pub(crate) struct SubstepKick {
+    pub(super) velocity_time: VelocityTime,
+    /// True for the last pass of the step.
     pub last: bool,
-    /// Whether the nodes drift after the kick; where they do not, the spring forces are kept.
+    /// True if the nodes drift after the kick. Otherwise the spring forces are stored.
     pub drifts: bool,
-    /// Whether the kick is half of one.
+    /// True for a half kick.
     pub half: bool,
-    /// How long forces act on nodes without damping, s.
+    /// The time that forces act on nodes without damping (s).
     pub duration: f32,
-    /// How much of that belongs to this step, in substeps.
-    pub share: f64,
-    /// What gravity gives to them, m/s.
-    pub fall: Vec3,
+    /// The part of `duration` that belongs to this step, in substeps.
+    pub step_share: f64,
+    /// The velocity change by gravity (m/s).
+    pub gravity_change: Vec3,
     /// Fractions of the step at which the drift starts and ends.
     pub start: f64,
     pub end: f64,
-    /// s
+    /// The length of the substep (s).
     pub substep: f32,
 }
 
-impl Part {
+impl SubstepKick {
     /// The half kick that opens a step.
     pub fn opening(substep: f32) -> Self {
         Self {
-            before: VelocityTime::Current,
+            velocity_time: VelocityTime::Current,
             last: false,
             drifts: true,
             half: true,
             duration: 0.5 * substep,
-            share: 0.5,
-            fall: Vec3::ZERO,
+            step_share: 0.5,
+            gravity_change: Vec3::ZERO,
             start: 0.0,
             end: 0.0,
             substep,
         }
     }
 
-    /// The kick, without forces from outside.
+    /// The kick without applied forces.
     pub(super) fn kick<'a>(&self, gravity: Vec3, inertia: Inertia<'a>, damping: Option<&'a NodeDamping>) -> Kick<'a> {
         Kick {
             duration: self.duration,
             substep: self.substep,
             half: self.half,
             gravity,
-            fall: self.fall,
+            gravity_change: self.gravity_change,
             inertia,
             applied: None,
             damping,
         }
     }
 
-    /// The kick that closes the last step becomes part of this one.
-    pub fn join(&mut self, closing: &ClosingKick) {
-        self.before = VelocityTime::CurrentOpen;
+    /// Merges the deferred half kick of the last step into this kick.
+    pub fn merge_deferred(&mut self, deferred: &DeferredHalfKick) {
+        self.velocity_time = VelocityTime::CurrentLagging;
         self.half = false;
-        self.duration += 0.5 * closing.substep;
+        self.duration += 0.5 * deferred.substep;
     }
 
-    /// The full kick of a later substep, in this gravity.
-    pub fn go_on(&mut self, gravity: Vec3, kicks: &mut GravityKicks) {
-        self.before = VelocityTime::Open;
+    /// Changes to the full kick of a later substep.
+    pub fn set_full_kick(&mut self, gravity: Vec3, kicks: &mut GravityKicks) {
+        self.velocity_time = VelocityTime::InProgressLagging;
         self.half = false;
         self.duration = self.substep;
-        self.share = 1.0;
-        self.fall = kicks.next(gravity.as_dvec3() * f64::from(self.substep));
+        self.step_share = 1.0;
+        self.gravity_change = kicks.next(gravity.as_dvec3() * f64::from(self.substep));
     }
 
-    /// The half kick that closes the step, in this gravity.
-    pub fn close(&mut self, gravity: Vec3, kicks: &mut GravityKicks) {
+    /// Changes to the closing half kick of the step.
+    pub fn set_closing(&mut self, gravity: Vec3, kicks: &mut GravityKicks) {
         *self = Self {
-            before: VelocityTime::Open,
+            velocity_time: VelocityTime::InProgressLagging,
             last: true,
             drifts: false,
-            fall: kicks.next(gravity.as_dvec3() * f64::from(0.5 * self.substep)),
+            gravity_change: kicks.next(gravity.as_dvec3() * f64::from(0.5 * self.substep)),
             start: 1.0,
             end: 1.0,
             ..Self::opening(self.substep)
@@ -113,96 +113,102 @@ impl Part {
     }
 }
 
-/// s: in shorter substeps what positions lack is carried on. A tenth of a metre from a body's origin coordinates are rounded by up to 4 nm: over
-/// substeps so long that is 0.015 mm/s, over a hundredth of them 1.5 mm/s.
-const SHORT: f32 = 2.5e-4;
+/// Rounding remainders of positions are tracked in shorter substeps (s). At 0.1 m from a body's origin, coordinates are
+/// rounded by up to 4 nm. That is 0.015 mm/s over this substep and 1.5 mm/s over a hundredth of it.
+const REMAINDER_SUBSTEP: f32 = 2.5e-4;
 
-/// Changes the velocities by the forces at the latest positions, moves the nodes by them, and puts the pinned ones where
-/// they are led, along the axes that they are held along.
-pub(super) fn kick_and_drift(body: &mut System, request: &StepRequest, part: &Part, team: &Team) -> Survey {
+/// Updates velocities by the forces at the latest positions, moves the nodes, and moves pinned nodes to their targets
+/// along their constrained axes.
+pub(super) fn kick_and_drift(
+    body: &mut System,
+    request: &StepRequest,
+    substep_kick: &SubstepKick,
+    team: &Team,
+) -> TileStats {
     let node_count = body.node_count();
     let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
-    if part.drifts && part.substep < SHORT {
-        body.state.carry();
+    if substep_kick.drifts && substep_kick.substep < REMAINDER_SUBSTEP {
+        body.state.enable_remainders();
     }
     let state = body.state.substep();
     let kick = Kick {
         applied: body.applied.as_ref().filter(|_| body.forces_applied),
-        ..part.kick(request.gravity, inertia, body.damping.as_ref())
+        ..substep_kick.kick(request.gravity, inertia, body.damping.as_ref())
     };
     let tiles = tile_count(node_count);
-    let sleeper = body.sleeper.as_deref();
-    let is_asleep = |tile: usize| sleeper.is_some_and(|sleeper| sleeper.is_asleep(tile));
-    let forces_known = part.before == VelocityTime::Current && body.forces_current;
-    if !forces_known {
+    let sleep_state = body.sleep_state.as_deref();
+    let is_asleep = |tile: usize| sleep_state.is_some_and(|sleep_state| sleep_state.is_asleep(tile));
+    let are_forces_current = substep_kick.velocity_time == VelocityTime::Current && body.forces_current;
+    if !are_forces_current {
         body.forces.write_awake_records(state.positions, is_asleep, team);
-        body.forces.find(state.positions, team);
+        body.forces.compute(state.positions, team);
     }
     let forces = body.forces.sum();
-    if part.before == VelocityTime::Open
+    if substep_kick.velocity_time == VelocityTime::InProgressLagging
         && let Some(predicted) = &mut body.predicted_velocities
     {
-        let closed = Closed {
+        let flush = HalfKickFlush {
             forces,
             kernel: body.kernel,
             kick: Kick {
-                duration: 0.5 * part.substep,
+                duration: 0.5 * substep_kick.substep,
                 half: true,
-                fall: part.fall * (0.5 * part.substep / part.duration),
+                gravity_change: substep_kick.gravity_change * (0.5 * substep_kick.substep / substep_kick.duration),
                 ..kick
             },
             positions: state.positions,
             velocities: state.velocities,
         };
-        let written = (predicted.tiles_mut(), body.pins.tiles_mut());
-        team.pass(tiles, written, |tile, (mut predicted, pins)| {
+        let output = (predicted.tiles_mut(), body.pins.tiles_mut());
+        team.pass(tiles, output, |tile, (mut predicted, pins)| {
             if is_asleep(tile) {
                 predicted.iter_mut().for_each(|axis| axis.fill(0.0));
                 return;
             }
-            closed.write(tile, tile_nodes(tile, node_count), &mut predicted, pins);
+            flush.write(tile, tile_nodes(tile, node_count), &mut predicted, pins);
         });
     }
     let (first_remainders, remainders) = match state.remainders {
         None => (None, None),
         Some([first, newest]) => (Some(&*first), Some(newest)),
     };
-    let pass = Pass {
+    let input = SubstepInput {
         forces,
         kernel: body.kernel,
         masses: &body.masses,
         request,
-        part,
+        substep_kick,
         kick,
         positions: body.forces.view(state.positions),
-        first_velocities: (part.before != VelocityTime::Open && part.before != VelocityTime::Closed)
+        first_velocities: (substep_kick.velocity_time != VelocityTime::InProgressLagging
+            && substep_kick.velocity_time != VelocityTime::InProgress)
             .then_some(state.first_velocities),
-        first_forces: forces_known.then_some(state.first_forces),
-        damped_velocities: match part.before {
-            VelocityTime::Open => body.predicted_velocities.as_ref(),
+        first_forces: are_forces_current.then_some(state.first_forces),
+        damped_velocities: match substep_kick.velocity_time {
+            VelocityTime::InProgressLagging => body.predicted_velocities.as_ref(),
             _ => body.forces.springs.damped().then_some(state.first_velocities),
         },
-        first_remainders: first_remainders.filter(|_| part.before != VelocityTime::Open),
+        first_remainders: first_remainders.filter(|_| substep_kick.velocity_time != VelocityTime::InProgressLagging),
     };
-    let written = (
+    let output = (
         state.velocities.tiles_mut(),
         state.next_positions.tiles_mut(),
         state.forces.tiles_mut(),
         remainders
-            .filter(|_| part.drifts)
+            .filter(|_| substep_kick.drifts)
             .map(|remainders| remainders.tiles_mut()),
         body.pins.tiles_mut(),
-        Items::new(&mut body.surveys),
+        Items::new(&mut body.tile_stats),
     );
     team.pass(
         tiles,
-        written,
-        |tile, (velocities, next_positions, forces, remainders, pins, survey): (_, _, _, _, _, &mut Survey)| {
+        output,
+        |tile, (velocities, next_positions, forces, remainders, pins, stats): (_, _, _, _, _, &mut TileStats)| {
             if is_asleep(tile) {
-                *survey = Survey::NOTHING;
+                *stats = TileStats::EMPTY;
                 return;
             }
-            let mut written = Written {
+            let mut output = TileOutput {
                 velocities,
                 next_positions,
                 forces,
@@ -210,46 +216,52 @@ pub(super) fn kick_and_drift(body: &mut System, request: &StepRequest, part: &Pa
                 pins,
             };
             let mut sums = TileForces::ZERO;
-            *survey = pass.take(tile, tile_nodes(tile, node_count), &mut written, &mut sums);
+            *stats = input.run_tile(tile, tile_nodes(tile, node_count), &mut output, &mut sums);
         },
     );
-    body.surveys.iter().copied().fold(Survey::NOTHING, Survey::and)
+    body.tile_stats.iter().copied().fold(TileStats::EMPTY, TileStats::merge)
 }
 
-/// What all tiles of a substep read.
+/// The input of all tiles of a substep.
 #[derive(Clone, Copy)]
-pub(super) struct Pass<'a> {
-    pub forces: Sum<'a>,
+pub(super) struct SubstepInput<'a> {
+    pub forces: ForceSum<'a>,
     pub kernel: ChosenKernel,
     pub masses: &'a [f32],
     pub request: &'a StepRequest<'a>,
-    pub part: &'a Part,
+    pub substep_kick: &'a SubstepKick,
     pub kick: Kick<'a>,
     pub positions: View<'a>,
-    /// What the velocities are before the kick, where it is not what they are now.
+    /// The velocities before the kick, if they are not in the buffer of the step in progress.
     pub first_velocities: Option<&'a Vectors>,
-    /// The spring forces, where they are known.
+    /// The spring forces, if they are current.
     pub first_forces: Option<&'a Vectors>,
-    /// The velocities at the time of the positions, where springs are damped.
+    /// The velocities at the time of the positions, if springs have damping.
     pub damped_velocities: Option<&'a Vectors>,
-    /// What positions lack before the drift, where it is not what they lack now.
+    /// The remainders before the drift, if they are not in the buffer of the step in progress.
     pub first_remainders: Option<&'a Vectors>,
 }
 
-/// What a tile of a substep writes.
-pub(super) struct Written<'a> {
+/// The output of a tile of a substep.
+pub(super) struct TileOutput<'a> {
     pub velocities: [&'a mut [f32]; 3],
     pub next_positions: [&'a mut [f32]; 3],
-    /// Where spring forces are kept; nothing where the nodes drift.
+    /// The spring forces. Empty if the nodes drift.
     pub forces: [&'a mut [f32]; 3],
-    /// What positions lack, where that is carried on.
+    /// The rounding remainders of positions, if they are tracked.
     pub remainders: Option<[&'a mut [f32]; 3]>,
     pub pins: &'a mut [Pin],
 }
 
-impl Pass<'_> {
-    /// Takes it for a tile; `forces` are for its use.
-    pub fn take(&self, tile: usize, nodes: Range<usize>, written: &mut Written, forces: &mut TileForces) -> Survey {
+impl SubstepInput<'_> {
+    /// Takes the substep of a tile. `forces` is scratch memory.
+    pub fn run_tile(
+        &self,
+        tile: usize,
+        nodes: Range<usize>,
+        output: &mut TileOutput,
+        forces: &mut TileForces,
+    ) -> TileStats {
         if let Some(first_forces) = self.first_forces {
             for (forces, first) in forces.axes_mut().into_iter().zip(first_forces.slices(nodes.clone())) {
                 forces[..nodes.len()].copy_from_slice(first);
@@ -257,71 +269,71 @@ impl Pass<'_> {
         } else {
             let [vx, vy, vz] = match self.first_velocities {
                 Some(velocities) => velocities.slices(nodes.clone()),
-                None => written.velocities.each_ref().map(|axis| &**axis),
+                None => output.velocities.each_ref().map(|axis| &**axis),
             };
-            let [x, y, z] = written.next_positions.each_ref().map(|axis| &**axis);
-            let motion = Motion {
+            let [x, y, z] = output.next_positions.each_ref().map(|axis| &**axis);
+            let motion = ForceInput {
                 positions: self.positions,
                 velocities: self.damped_velocities,
-                soon: [vx, vy, vz, x, y, z],
+                prefetched: [vx, vy, vz, x, y, z],
             };
             self.forces.write(tile, nodes.clone(), &motion, forces);
         }
         if let Some(first_velocities) = self.first_velocities {
-            copy_axes(&mut written.velocities, first_velocities.slices(nodes.clone()));
+            copy_axes(&mut output.velocities, first_velocities.slices(nodes.clone()));
         }
-        if let (Some(first), Some(remainders)) = (self.first_remainders, &mut written.remainders) {
+        if let (Some(first), Some(remainders)) = (self.first_remainders, &mut output.remainders) {
             copy_axes(remainders, first.slices(nodes.clone()));
         }
-        if !self.part.drifts {
-            copy_axes(&mut written.forces, forces.axes().map(|axis| &axis[..nodes.len()]));
+        if !self.substep_kick.drifts {
+            copy_axes(&mut output.forces, forces.axes().map(|axis| &axis[..nodes.len()]));
         }
-        self.feel_pins(&nodes, forces, written.pins);
+        self.accumulate_pin_reactions(&nodes, forces, output.pins);
         self.kernel.run(TileKick {
             kick: &self.kick,
             nodes: nodes.clone(),
             forces,
-            velocities: written.velocities.each_mut().map(|axis| &mut **axis),
-            drift: self.part.drifts.then(|| Drift {
+            velocities: output.velocities.each_mut().map(|axis| &mut **axis),
+            drift: self.substep_kick.drifts.then(|| Drift {
                 positions: self.positions.slices(nodes.clone()),
-                next_positions: written.next_positions.each_mut().map(|axis| &mut **axis),
-                remainders: (written.remainders.as_mut()).map(|axes| axes.each_mut().map(|axis| &mut **axis)),
+                next_positions: output.next_positions.each_mut().map(|axis| &mut **axis),
+                remainders: (output.remainders.as_mut()).map(|axes| axes.each_mut().map(|axis| &mut **axis)),
             }),
         });
-        self.lead_pins(&nodes, written);
-        let positions = self.part.last.then(|| {
-            if self.part.drifts {
-                written.next_positions.each_ref().map(|axis| &**axis)
+        self.apply_prescribed_motion(&nodes, output);
+        let positions = self.substep_kick.last.then(|| {
+            if self.substep_kick.drifts {
+                output.next_positions.each_ref().map(|axis| &**axis)
             } else {
                 self.positions.slices(nodes)
             }
         });
-        look(
-            self.kernel,
-            written.velocities.each_ref().map(|axis| &**axis),
-            positions,
-        )
+        tile_stats(self.kernel, output.velocities.each_ref().map(|axis| &**axis), positions)
     }
 
-    /// Adds up what holds the pinned nodes.
-    fn feel_pins(&self, nodes: &Range<usize>, forces: &TileForces, pins: &mut [Pin]) {
+    /// Accumulates the reactions of pins.
+    fn accumulate_pin_reactions(&self, nodes: &Range<usize>, forces: &TileForces, pins: &mut [Pin]) {
         for pin in pins {
             let node = pin.node as usize;
             let weight = self.request.gravity * self.masses[node];
-            pin.force_sum -= (forces.get(node - nodes.start) + weight).as_dvec3() * self.part.share;
+            pin.force_sum -= (forces.get(node - nodes.start) + weight).as_dvec3() * self.substep_kick.step_share;
         }
     }
 
-    /// Puts the pinned nodes where they are led.
-    fn lead_pins(&self, nodes: &Range<usize>, written: &mut Written) {
-        for pin in &*written.pins {
-            let place = pin.node as usize - nodes.start;
+    /// Moves pinned nodes to their targets.
+    fn apply_prescribed_motion(&self, nodes: &Range<usize>, output: &mut TileOutput) {
+        for pin in &*output.pins {
+            let index = pin.node as usize - nodes.start;
             let velocity = pin.travel / self.request.dt;
-            pin.put(&mut written.velocities, place, velocity);
-            if self.part.drifts {
-                pin.put(&mut written.next_positions, place, pin.place(self.part.end));
-                if let Some(remainders) = &mut written.remainders {
-                    pin.put(remainders, place, Vec3::ZERO);
+            pin.write_held(&mut output.velocities, index, velocity);
+            if self.substep_kick.drifts {
+                pin.write_held(
+                    &mut output.next_positions,
+                    index,
+                    pin.position_at(self.substep_kick.end),
+                );
+                if let Some(remainders) = &mut output.remainders {
+                    pin.write_held(remainders, index, Vec3::ZERO);
                 }
             }
         }

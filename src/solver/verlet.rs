@@ -1,65 +1,72 @@
-//! VERLET: the paper's explicit integration (Halic et al., section 3) as leapfrog with kept velocities.
+//! VERLET: the explicit integration of Halic et al. (section 3), as leapfrog with stored velocities.
 //!
-//! A step of n substeps is half a kick, n drifts with full kicks between them, and half a kick: symmetric, of order 2,
-//! with the same positions as Verlet's own `2 x - x' + h² a`. Each substep visits the springs once: the half kick that
-//! closes a step is left to the next, which begins with the same forces, or where it cannot be left, its forces are kept
-//! for the next. Damping along springs needs velocities at the time of the positions: a first visit predicts them, a
-//! second uses them (order 2 too; Heun's method).
+//! A step of n substeps is a half kick, n drifts with full kicks between them, and a half kick. It is symmetric,
+//! second-order accurate, and gives the same positions as Verlet's `2 x - x' + h² a`. Each substep visits the springs
+//! once. The closing half kick is deferred to the next step, which begins with the same forces. If it cannot be
+//! deferred, its forces are stored for the next step. Spring damping needs velocities at the time of the positions: a
+//! first visit predicts them, and a second one uses them (Heun's method, also second-order accurate).
 
 use glam::DVec3;
 
 use super::System;
-use super::closing::{ClosingKick, close_aside, may_stay_open};
-use super::energy_monitor::Account;
+use super::deferred_half_kick::{DeferredHalfKick, can_defer_half_kick, flush_into};
+use super::energy_monitor::EnergyMonitor;
+use super::energy_removal::{remove_added_energy, remove_kinetic_energy};
 use super::energy_sums::TileSums;
-use super::grasp::Lapse;
-use super::pipeline::{self, DEEPEST, Plan};
-use super::sleep::Sleeper;
-use super::slow_down::{keep_energy, slow_down};
+use super::pipeline::{self, MAX_DEPTH, PipelinePlan};
+use super::sleep::SleepState;
 use super::stability::Stability;
-use super::step_request::{Carry, StepRequest, StepStart};
-use super::substep::{Part, VelocityTime, kick_and_drift};
+use super::step_request::{IntegratorState, StepRequest, StepStart};
+use super::substep::{SubstepKick, VelocityTime, kick_and_drift};
+use super::tool_attachments::ReactionInterval;
 use crate::base::{Stage, Stopwatch};
-use crate::contact::{Contacts, Meeting};
-use crate::geometry::Bounds;
+use crate::contact::{ContactInput, Contacts};
+use crate::geometry::Aabb;
 use crate::nodes::Mobility;
 use crate::threads::Team;
 
-/// The substep asked for is longer than what is stable, or the motion made it so on the way.
+/// The error of a substep that is unstable, initially or because of the motion during the step.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TooLong {
-    /// So long may it be, s.
+pub(crate) struct SubstepTooLong {
+    /// The longest stable substep (s).
     pub stable_substep: f32,
 }
 
-/// A step that was taken, and is not current yet.
+/// A step that is not committed yet.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StepResult {
     pub start: StepStart,
-    /// What it carries on to the next.
-    pub carry: Carry,
-    /// Whether its positions and velocities are finite.
+    /// The state for the next step.
+    pub carry: IntegratorState,
+    /// True if its positions and velocities are finite.
     pub finite: bool,
 }
 
-/// What came of a step, or why there is none.
-pub(super) type Stepped<T = StepResult> = Result<T, TooLong>;
+/// The result of a step.
+pub(super) type Stepped<T = StepResult> = Result<T, SubstepTooLong>;
 
-/// Takes the step with exactly so many substeps, with masses made for substeps of `masses_for` seconds; 0: as they are.
-pub(super) fn run(body: &mut System, request: &StepRequest, start: StepStart, masses_for: f32, team: &Team) -> Stepped {
+/// Takes the step with exactly `start.substeps` substeps. Masses are computed for substeps of `scaling_substep`
+/// seconds; 0 without added mass.
+pub(super) fn run(
+    body: &mut System,
+    request: &StepRequest,
+    start: StepStart,
+    scaling_substep: f32,
+    team: &Team,
+) -> Stepped {
     let mut step = Step {
         middle: start.middle,
-        ..Step::of(request, start.substeps, masses_for, team)
+        ..Step::of(request, start.substeps, scaling_substep, team)
     };
-    if masses_for == 0.0 {
+    if scaling_substep == 0.0 {
         check(&start.carry.stability, step.substep)?;
     }
-    // What must be known between substeps cannot be known in a pipeline.
-    if start.substeps > 2 && may_stay_open(body) && !body.is_grasped() && !body.sleeps() {
-        step.pipeline = Plan::of(&*body.forces.springs, body.node_count());
+    // A pipeline cannot do work between substeps.
+    if start.substeps > 2 && can_defer_half_kick(body) && !body.has_tool_attachments() && !body.sleeps() {
+        step.pipeline = PipelinePlan::of(&*body.forces.springs, body.node_count());
     }
-    if let Some(taken) = step.take(body, start)? {
-        return Ok(taken);
+    if let Some(result) = step.take(body, start)? {
+        return Ok(result);
     }
     step.pipeline = None;
     Ok(step.take(body, start)?.expect("only a pipeline goes too far"))
@@ -67,49 +74,49 @@ pub(super) fn run(body: &mut System, request: &StepRequest, start: StepStart, ma
 
 pub(super) fn check(stability: &Stability, substep: f32) -> Stepped<()> {
     match stability.limit() {
-        Some(stable_substep) if substep > stable_substep => Err(TooLong { stable_substep }),
+        Some(stable_substep) if substep > stable_substep => Err(SubstepTooLong { stable_substep }),
         _ => Ok(()),
     }
 }
 
-/// The same for elements, terms and what is enclosed, as they were deformed where forces were last worked out.
+/// Checks the substep against elements, terms and cavities, at the deformation of the last force evaluation.
 pub(super) fn check_beside_springs(body: &System, substep: f32) -> Stepped<()> {
-    let stable_substep = body.forces.newest_limit_beside_springs();
+    let stable_substep = body.forces.latest_non_spring_dt_limit();
     if substep <= stable_substep {
         Ok(())
     } else {
-        Err(TooLong { stable_substep })
+        Err(SubstepTooLong { stable_substep })
     }
 }
 
-/// A step to be taken.
+/// The parameters of a step.
 pub(super) struct Step<'a> {
     request: &'a StepRequest<'a>,
     substeps: u32,
-    /// s
+    /// The length of a substep (s).
     substep: f32,
     middle: u32,
-    /// The substep that masses are made for, s; 0: they are as they are.
-    masses_for: f32,
+    /// The substep that masses are computed for (s); 0 without added mass.
+    scaling_substep: f32,
     team: &'a Team<'a>,
-    pipeline: Option<Plan>,
+    pipeline: Option<PipelinePlan>,
 }
 
 impl<'a> Step<'a> {
-    /// In so many substeps, taken one by one.
-    pub fn of(request: &'a StepRequest<'a>, substeps: u32, masses_for: f32, team: &'a Team<'a>) -> Self {
+    /// Creates a step without a pipeline.
+    pub fn of(request: &'a StepRequest<'a>, substeps: u32, scaling_substep: f32, team: &'a Team<'a>) -> Self {
         Self {
             request,
             substeps,
             substep: (f64::from(request.dt) / f64::from(substeps)) as f32,
             middle: 0,
-            masses_for,
+            scaling_substep,
             team,
             pipeline: None,
         }
     }
 
-    /// Takes it; `None`: in a pipeline the body has moved further than is known to be stable.
+    /// Takes the step. Returns `None` if the body has moved beyond the known stability limit in a pipeline.
     fn take(&self, body: &mut System, start: StepStart) -> Stepped<Option<StepResult>> {
         let Self {
             request,
@@ -121,263 +128,285 @@ impl<'a> Step<'a> {
         let mut carry = start.carry;
         let mut finite = true;
         begin(body, request);
-        carry.energy.share(0);
-        let may_stay_open = may_stay_open(body) && !body.pins.are_led();
-        let mut part = self.opening(body, &mut carry);
-        let request = &request.weighed(body);
-        let account = Account::new(body, &carry, request, substeps);
-        account.open(body, &mut carry, &part, team);
+        carry.energy.set_group(0);
+        let can_defer_half_kick = can_defer_half_kick(body) && !body.pins.any_moves();
+        let mut substep_kick = self.opening(body, &mut carry);
+        let request = &request.with_scaled_gravity(body);
+        let monitor = EnergyMonitor::new(body, &carry, request, substeps);
+        monitor.start(body, &mut carry, &substep_kick, team);
         if let Some(damping) = &mut body.damping {
             damping.prepare(substep);
         }
         let mut index = 0;
         while index < substeps {
-            let mut parts = [part; DEEPEST];
+            let mut substep_kicks = [substep_kick; MAX_DEPTH];
             let depth = match index {
                 0 => 1,
-                // The last substep before a comparison is taken alone.
-                _ => self.depth(substeps - index - u32::from(account.compares), &carry),
+                // The last substep before a comparison is not part of a pipeline.
+                _ => self.depth(substeps - index - u32::from(monitor.compares), &carry),
             };
-            // Tools are not looked for between the substeps of a pipeline.
-            let depth = if depth > 1 && !self.stays_far(body, depth, &carry.gravity.velocities) {
+            // A pipeline does not detect tool contacts between its substeps.
+            let depth = if depth > 1 && !self.will_stay_far(body, depth, &carry.gravity.velocities) {
                 1
             } else {
                 depth
             };
-            for (index, part) in (index..).zip(&mut parts[..depth]) {
+            for (index, substep_kick) in (index..).zip(&mut substep_kicks[..depth]) {
                 if index > 0 {
-                    part.go_on(request.gravity, &mut carry.gravity);
+                    substep_kick.set_full_kick(request.gravity, &mut carry.gravity);
                 }
-                part.last = may_stay_open && index + 1 == substeps;
-                part.start = f64::from(index) / f64::from(substeps);
-                part.end = f64::from(index + 1) / f64::from(substeps);
+                substep_kick.last = can_defer_half_kick && index + 1 == substeps;
+                substep_kick.start = f64::from(index) / f64::from(substeps);
+                substep_kick.end = f64::from(index + 1) / f64::from(substeps);
             }
-            let parts = &parts[..depth];
-            part = parts[depth - 1];
-            if account.compares && index + 1 == substeps {
-                Account::keep_velocities(body, &part);
+            let substep_kicks = &substep_kicks[..depth];
+            substep_kick = substep_kicks[depth - 1];
+            if monitor.compares && index + 1 == substeps {
+                EnergyMonitor::store_previous_velocities(body, &substep_kick);
             }
             if let (2.., Some(plan)) = (depth, self.pipeline) {
                 let watch = Stopwatch::start(request.profile);
-                let surveys = pipeline::run(body, request, parts, plan, team);
+                let tile_stats = pipeline::run(body, request, substep_kicks, plan, team);
                 watch.stop(request.profile, Stage::Forces);
-                for survey in &surveys[..depth - 1] {
-                    if !self.is_stable_after(&mut carry.stability, &survey.velocities) {
-                        match carry.stability.for_short(substep) {
+                for stats in &tile_stats[..depth - 1] {
+                    if !self.is_stable_after(&mut carry.stability, &stats.velocities) {
+                        match carry.stability.if_stable_anywhere(substep) {
                             Some(anywhere) => carry.stability = anywhere,
                             None => return Ok(None),
                         }
                     }
                 }
-                for survey in &surveys[..depth] {
-                    if !self.has_stayed_far(body, &survey.velocities) {
+                for stats in &tile_stats[..depth] {
+                    if !self.has_stayed_far(body, &stats.velocities) {
                         return Ok(None);
                     }
                 }
-                carry.gravity.velocities = surveys[depth - 1].velocities;
-                finite = surveys[depth - 1].finite;
+                carry.gravity.velocities = tile_stats[depth - 1].velocities;
+                finite = tile_stats[depth - 1].finite;
             } else {
-                finite = pass(body, request, &parts[0], &mut carry, team);
-                body.forces.age(f64::from(substep), body.state.next_positions(), team);
+                finite = run_kick(body, request, &substep_kicks[0], &mut carry, team);
+                body.forces
+                    .advance(f64::from(substep), body.state.next_positions(), team);
             }
-            for _ in parts {
+            for _ in substep_kicks {
                 body.state.advance();
             }
             index += depth as u32;
             if index == self.middle
                 && let Some(coarse) = &mut body.coarse
             {
-                coarse.pass_middle(body.state.newest().0);
+                coarse.compare_middle(body.state.newest().0);
             }
             self.check_after(body, &mut carry)?;
         }
-        let sums = account.compares.then(|| TileSums::of_open(body, &part, team));
-        // What a tool touches is closed with it.
-        if may_stay_open && body.contacts.as_deref().is_none_or(Contacts::are_far) {
-            carry.closing = Some(ClosingKick {
+        let sums = monitor
+            .compares
+            .then(|| TileSums::before_flush(body, &substep_kick, team));
+        // The half kick is not deferred if a tool is near.
+        if can_defer_half_kick && body.contacts.as_deref().is_none_or(Contacts::is_clear_of_tools) {
+            carry.deferred_kick = Some(DeferredHalfKick {
                 substep,
                 gravity: request.gravity,
             });
         } else {
-            part.close(request.gravity, &mut carry.gravity);
-            finite = pass(body, request, &part, &mut carry, team);
+            substep_kick.set_closing(request.gravity, &mut carry.gravity);
+            finite = run_kick(body, request, &substep_kick, &mut carry, team);
             check_beside_springs(body, substep)?;
         }
-        if let Some(found) = account.settle(body, &mut carry, sums, team) {
-            let excess = carry.energy.compare(&found);
-            carry.energy.refine(slow_down(body, excess, false));
+        if let Some(energies) = monitor.record_step(body, &mut carry, sums, team) {
+            let excess = carry.energy.compare(&energies);
+            carry.energy.refine(remove_kinetic_energy(body, excess, false));
         }
         Ok(Some(StepResult { start, carry, finite }))
     }
 
-    /// Refuses to go on where the substep that was just taken has led the nodes to where longer ones are stable no more.
-    pub fn check_after(&self, body: &System, carry: &mut Carry) -> Stepped<()> {
+    /// Returns an error if the last substep moved the nodes to positions where the substep is unstable.
+    pub fn check_after(&self, body: &System, carry: &mut IntegratorState) -> Stepped<()> {
         let substep = self.substep;
         if !self.is_stable_after(&mut carry.stability, &{ carry.gravity.velocities }) {
-            let known = carry.stability.for_short(substep);
-            carry.stability = known.unwrap_or_else(|| body.estimate(body.state.newest().0));
+            let stability = carry.stability.if_stable_anywhere(substep);
+            carry.stability = stability.unwrap_or_else(|| body.estimate(body.state.newest().0));
             check(&carry.stability, substep)?;
         }
         check_beside_springs(body, substep)
     }
 
-    /// Whether what is known of stability still holds after a substep with velocities in this box. Masses that were made for
-    /// the substep are enough wherever nodes go.
-    fn is_stable_after(&self, stability: &mut Stability, velocities: &Bounds) -> bool {
-        self.masses_for > 0.0 || stability.holds_after(self.substep * diagonal(velocities))
+    /// True if the stability limit is valid after a substep with velocities in this box. With added mass it is valid at
+    /// all positions.
+    fn is_stable_after(&self, stability: &mut Stability, velocities: &Aabb) -> bool {
+        self.scaling_substep > 0.0 || stability.remains_valid_after(self.substep * diagonal(velocities))
     }
 
-    /// The first kick: the half that opens the step, together with the half that closes the last where that was left open.
-    pub fn opening(&self, body: &mut System, carry: &mut Carry) -> Part {
+    /// The first kick: the opening half kick, merged with the deferred half kick of the last step if there is one.
+    pub fn opening(&self, body: &mut System, carry: &mut IntegratorState) -> SubstepKick {
         let Self {
             request, substep, team, ..
         } = *self;
-        let mut part = Part::opening(substep);
-        let (half, mut fall) = (part.duration, DVec3::ZERO);
-        let closing = carry.closing.take();
-        if closing.is_some() {
-            body.use_masses_for(carry.masses_for);
+        let mut substep_kick = SubstepKick::opening(substep);
+        let (half, mut gravity_change) = (substep_kick.duration, DVec3::ZERO);
+        let deferred = carry.deferred_kick.take();
+        if deferred.is_some() {
+            body.scale_masses_for(carry.scaling_substep);
         }
-        let same_masses = carry.masses_for == self.masses_for;
-        match closing {
+        let same_masses = carry.scaling_substep == self.scaling_substep;
+        match deferred {
             None => {}
-            Some(closing) if same_masses && closing.joins(body, substep, request.weighed(body).gravity) => {
-                part.join(&closing);
-                fall = closing.fall();
+            Some(deferred)
+                if same_masses && deferred.can_merge(body, substep, request.with_scaled_gravity(body).gravity) =>
+            {
+                substep_kick.merge_deferred(&deferred);
+                gravity_change = deferred.gravity_change();
             }
-            Some(closing) => {
-                close_aside(body, &closing, &mut carry.gravity, team);
-                part.before = VelocityTime::Closed;
+            Some(deferred) => {
+                flush_into(body, &deferred, &mut carry.gravity, team);
+                substep_kick.velocity_time = VelocityTime::InProgress;
             }
         }
-        body.use_masses_for(self.masses_for);
-        carry.masses_for = self.masses_for;
+        body.scale_masses_for(self.scaling_substep);
+        carry.scaling_substep = self.scaling_substep;
         if body.scaling.as_ref().is_some_and(|scaling| scaling.has_changed()) {
-            keep_energy(body, &mut carry.energy);
-            part.before = VelocityTime::Closed;
+            remove_added_energy(body, &mut carry.energy);
+            substep_kick.velocity_time = VelocityTime::InProgress;
         }
-        fall += request.weighed(body).gravity.as_dvec3() * f64::from(half);
-        part.fall = carry.gravity.next(fall);
-        part
+        gravity_change += request.with_scaled_gravity(body).gravity.as_dvec3() * f64::from(half);
+        substep_kick.gravity_change = carry.gravity.next(gravity_change);
+        substep_kick
     }
 
-    /// Whether no tool comes near within so many substeps, if the motion does not become twice as fast.
-    fn stays_far(&self, body: &System, depth: usize, velocities: &Bounds) -> bool {
+    /// True if no tool comes near within `depth` substeps, as long as the velocity does not double.
+    fn will_stay_far(&self, body: &System, depth: usize, velocities: &Aabb) -> bool {
         let duration = depth as f32 * self.substep;
         body.contacts.as_ref().is_none_or(|contacts| {
             let StepRequest { tools, dt, .. } = *self.request;
-            contacts.stay_far(tools, dt, duration, 2.0 * fastest(velocities))
+            contacts.remains_clear_of_tools(tools, dt, duration, 2.0 * fastest(velocities))
         })
     }
 
-    /// Takes a substep with velocities in this box into account: whether no tool has come near.
-    fn has_stayed_far(&self, body: &mut System, velocities: &Bounds) -> bool {
+    /// Accounts for a substep with velocities in this box. Returns true if no tool has come near.
+    fn has_stayed_far(&self, body: &mut System, velocities: &Aabb) -> bool {
         body.contacts.as_mut().is_none_or(|contacts| {
             let StepRequest { tools, dt, .. } = *self.request;
-            contacts.pass_far(tools, dt, self.substep, fastest(velocities))
+            contacts.advance_clear_of_tools(tools, dt, self.substep, fastest(velocities))
         })
     }
 
-    /// How many of the substeps that are left are taken next in one go: as many as a pipeline takes, in even parts, where the substep is stable
-    /// wherever the nodes are, else as the motion is known to be stable for if it does not become twice as fast.
-    fn depth(&self, left: u32, carry: &Carry) -> usize {
+    /// The number of remaining substeps to take in the next pass. If the substep is stable at all positions, it is that
+    /// of the pipeline, divided evenly. Otherwise it is limited to the substeps known to be stable as long as the
+    /// velocity does not double.
+    fn depth(&self, left: u32, carry: &IntegratorState) -> usize {
         let Some(plan) = self.pipeline else {
             return 1;
         };
         let left = left.max(1) as usize;
         let depth = left.div_ceil(left.div_ceil(plan.depth));
-        if self.masses_for > 0.0 || carry.stability.for_short(self.substep).is_some() {
+        if self.scaling_substep > 0.0 || carry.stability.if_stable_anywhere(self.substep).is_some() {
             return depth;
         }
         let travel = 2.0 * self.substep * diagonal(&carry.gravity.velocities);
-        let stable = carry.stability.substeps_of(travel).min(depth as f32) as usize;
+        let stable = carry.stability.valid_substeps(travel).min(depth as f32) as usize;
         stable.max(1)
     }
 }
 
-/// No node is faster, m/s.
-fn fastest(velocities: &Bounds) -> f32 {
+/// The bound of node speeds (m/s).
+fn fastest(velocities: &Aabb) -> f32 {
     velocities.magnitudes().length()
 }
 
-/// How fast two nodes may be against each other, m/s.
-fn diagonal(velocities: &Bounds) -> f32 {
+/// The bound of the relative speed of two nodes (m/s).
+fn diagonal(velocities: &Aabb) -> f32 {
     (velocities.max - velocities.min).length()
 }
 
-/// Takes one part of the step; whether what it leads to is finite, where it was looked at.
-pub(super) fn pass(body: &mut System, request: &StepRequest, part: &Part, carry: &mut Carry, team: &Team) -> bool {
-    if part.drifts {
-        body.lead_grasps(request.tools, [part.start, part.end]);
+/// Takes one kick and drift of the step. Returns whether the result is finite, as far as it was tested.
+pub(super) fn run_kick(
+    body: &mut System,
+    request: &StepRequest,
+    substep_kick: &SubstepKick,
+    carry: &mut IntegratorState,
+    team: &Team,
+) -> bool {
+    if substep_kick.drifts {
+        body.drive_attachments(request.tools, [substep_kick.start, substep_kick.end]);
     }
     let watch = Stopwatch::start(request.profile);
-    let survey = kick_and_drift(body, request, part, team);
+    let stats = kick_and_drift(body, request, substep_kick, team);
     watch.stop(request.profile, Stage::Forces);
-    carry.gravity.velocities = meet_tools(body, request, part, survey.velocities);
-    body.feel_grasps(
+    carry.gravity.velocities = resolve_tool_contacts(body, request, substep_kick, stats.velocities);
+    body.accumulate_reactions(
         request.tools,
-        Lapse {
-            time: f64::from(part.substep),
+        ReactionInterval {
+            time: f64::from(substep_kick.substep),
             carried: 0.0,
-            at: part.start,
-            moved: if part.drifts { 1.0 } else { 0.0 },
+            at: substep_kick.start,
+            moved: if substep_kick.drifts { 1.0 } else { 0.0 },
             is_next: false,
         },
     );
-    // What tools have done was not looked at.
-    if part.last && body.contacts.as_ref().is_some_and(|contacts| !contacts.are_far()) {
+    // The effect of tools was not tested yet.
+    if substep_kick.last
+        && body
+            .contacts
+            .as_ref()
+            .is_some_and(|contacts| !contacts.is_clear_of_tools())
+    {
         body.state.newest_is_finite()
     } else {
-        survey.finite
+        stats.finite
     }
 }
 
-/// Starts the step over, from what is current.
+/// Restarts the step from the current state.
 pub(super) fn begin(body: &mut System, request: &StepRequest) {
     body.state.begin();
-    body.show_late();
-    body.forces.recall();
+    body.retract_pre_kick_velocities();
+    body.forces.restore();
     for pin in body.pins.iter_mut() {
         let position = body.state.positions().get(pin.node as usize);
         pin.goal = match pin.target {
-            Some(target) => pin.leading(position, (target.as_dvec3() - body.origin).as_vec3()),
+            Some(target) => pin.with_held(position, (target.as_dvec3() - body.origin).as_vec3()),
             None => position,
         };
         pin.travel = pin.goal - position;
         pin.force_sum = DVec3::ZERO;
     }
-    body.begin_grasps(request.tools);
+    body.begin_attachments(request.tools);
     if let Some(contacts) = &mut body.contacts {
         contacts.begin((request.tools, request.dynamic), body.origin);
     }
 }
 
-/// Lets tools stop the nodes that would enter them: the box of all velocities, given that of those before.
-fn meet_tools(body: &mut System, request: &StepRequest, part: &Part, velocities: Bounds) -> Bounds {
+/// Resolves tool contacts. Returns the bounding box of all velocities after contact, given that before it.
+fn resolve_tool_contacts(
+    body: &mut System,
+    request: &StepRequest,
+    substep_kick: &SubstepKick,
+    velocities: Aabb,
+) -> Aabb {
     let Some(contacts) = &mut body.contacts else {
         return velocities;
     };
     let fastest = fastest(&velocities);
     let state = body.state.substep();
-    contacts.resolve(Meeting {
+    contacts.resolve(ContactInput {
         kernel: body.kernel,
         tools: request.tools,
         origin: body.origin,
         dt: request.dt,
-        start: part.start,
-        end: part.end,
-        substep: part.substep,
-        drifts: part.drifts,
-        slack: part.substep * request.neighbor_speed.unwrap_or(0.0),
+        start: substep_kick.start,
+        end: substep_kick.end,
+        substep: substep_kick.substep,
+        drifts: substep_kick.drifts,
+        slack: substep_kick.substep * request.neighbor_speed.unwrap_or(0.0),
         neighbor_speed: request.neighbor_speed,
         thickness: contacts.thickness,
         fastest,
         mobility: Mobility {
             inverse_masses: &body.inverse_masses,
             damping: body.damping.as_ref(),
-            substep: part.substep,
-            half: part.half,
-            asleep: body.sleeper.as_deref().map(Sleeper::asleep),
+            substep: substep_kick.substep,
+            half: substep_kick.half,
+            asleep: body.sleep_state.as_deref().map(SleepState::asleep),
         },
         positions: state.positions,
         velocities: state.velocities,

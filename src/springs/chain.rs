@@ -1,9 +1,9 @@
-//! A linked list whose elements are allocated one by one.
+//! A singly linked list with individually allocated elements.
 
 use crate::base::{Error, Result, memory};
 use crate::codec::{Reader, Saved, Writer, load_count};
 
-/// An element on the heap: an array of one, because its memory can be asked for in a way that may be refused.
+/// An element on the heap. It is an array of one, because that allocation can fail without aborting.
 type Owned<T> = Box<[ListElement<T>; 1]>;
 
 /// An element of a list.
@@ -13,7 +13,7 @@ pub(super) struct ListElement<T> {
     next: Option<Owned<T>>,
 }
 
-/// A linked list.
+/// A singly linked list.
 #[derive(Debug)]
 pub(super) struct Chain<T> {
     first: Option<Owned<T>>,
@@ -22,30 +22,30 @@ pub(super) struct Chain<T> {
 impl<T> Chain<T> {
     pub const EMPTY: Self = Self { first: None };
 
-    /// Puts `value` before the others.
+    /// Inserts `value` at the front.
     pub fn push(&mut self, value: T) -> Result<()> {
-        self.put(unlinked(value)?);
+        self.push_element(unlinked(value)?);
         Ok(())
     }
 
-    /// Puts in an element that is in no list.
-    pub fn put(&mut self, Unlinked(mut element): Unlinked<T>) {
+    /// Inserts an unlinked element at the front.
+    pub fn push_element(&mut self, Unlinked(mut element): Unlinked<T>) {
         element[0].next = self.first.take();
         self.first = Some(element);
     }
 
-    /// Drops the first value of which this is true; whether there was one.
-    pub fn remove(&mut self, is: impl Fn(&T) -> bool) -> bool {
-        let mut place = &mut self.first;
-        while place.as_ref().is_some_and(|element| !is(&element[0].value)) {
-            place = match place {
+    /// Removes the first value that satisfies `predicate`. Returns true if there was one.
+    pub fn remove(&mut self, predicate: impl Fn(&T) -> bool) -> bool {
+        let mut cursor = &mut self.first;
+        while cursor.as_ref().is_some_and(|element| !predicate(&element[0].value)) {
+            cursor = match cursor {
                 Some(element) => &mut element[0].next,
                 None => return false,
             };
         }
-        match place.take() {
-            Some(mut found) => {
-                *place = found[0].next.take();
+        match cursor.take() {
+            Some(mut removed) => {
+                *cursor = removed[0].next.take();
                 true
             }
             None => false,
@@ -62,11 +62,11 @@ impl<T> Chain<T> {
         std::iter::successors(self.first(), |element| element.next()).map(|element| &element.value)
     }
 
-    /// The first value of which this is true.
-    pub fn find_mut(&mut self, is: impl Fn(&T) -> bool) -> Option<&mut T> {
+    /// The first value that satisfies `predicate`.
+    pub fn find_mut(&mut self, predicate: impl Fn(&T) -> bool) -> Option<&mut T> {
         let mut next = self.first.as_deref_mut();
         while let Some([element]) = next {
-            if is(&element.value) {
+            if predicate(&element.value) {
                 return Some(&mut element.value);
             }
             next = element.next.as_deref_mut();
@@ -83,7 +83,7 @@ impl<T> ListElement<T> {
 }
 
 impl<T> Drop for Chain<T> {
-    /// One after the other: by itself each element would drop the next within its own drop, as deep as the list is long.
+    /// Drops the elements in a loop. The default drop would recurse as deep as the list is long.
     fn drop(&mut self) {
         let mut next = self.first.take();
         while let Some(mut element) = next {
@@ -92,7 +92,7 @@ impl<T> Drop for Chain<T> {
     }
 }
 
-/// In their order.
+/// Values are saved in list order.
 impl<T: Saved> Saved for Chain<T> {
     const SHAPE: u64 = T::SHAPE;
     const LEAST: usize = 8;
@@ -107,7 +107,7 @@ impl<T: Saved> Saved for Chain<T> {
 
     fn load(from: &mut Reader) -> Result<Self> {
         let count = load_count(from, T::LEAST)?;
-        from.will_take(count.checked_mul(size_of::<ListElement<T>>()))?;
+        from.reserve_memory(count.checked_mul(size_of::<ListElement<T>>()))?;
         let mut values = memory::reserved(count)?;
         T::load_all(count, &mut values, from)?;
         let mut chain = Self::EMPTY;
@@ -116,7 +116,7 @@ impl<T: Saved> Saved for Chain<T> {
     }
 }
 
-/// An element that is in no list yet.
+/// An allocated element that is not in a list yet.
 #[derive(Debug)]
 pub(super) struct Unlinked<T>(Owned<T>);
 

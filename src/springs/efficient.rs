@@ -1,46 +1,45 @@
-//! EFFICIENT: a linked list per node, each link allocated on its own (Halic et al., section 4).
+//! EFFICIENT: a linked list per node, with each link allocated individually (Halic et al., section 4).
 //!
-//! Only springs that exist take memory, and each can be added and removed without touching another. What it costs is
-//! that a list must be followed from link to link: here sixteen lists are followed side by side, so that the waits for
-//! memory overlap.
+//! Only existing springs take memory, and adding or removing one does not touch others. The cost is pointer chasing.
+//! Sixteen lists are therefore traversed concurrently, so that their memory latencies overlap.
 
+use super::adjacency::Adjacency;
 use super::chain::{Chain, ListElement, unlinked};
-use super::ends::Ends;
-use super::gather::Gather;
-use super::kept::{DampedLink, KeptLink};
-use super::{Link, Motion, SpringChange, Springs, already_joined, not_joined};
+use super::node_sum::NodeSum;
+use super::stored_link::{DampedLink, StoredLink};
+use super::{ForceInput, Link, SpringChange, Springs, already_joined, not_joined};
 use crate::base::{Result, ensure, memory};
 use crate::codec::{Saved, Writer, saved};
 use crate::def::Spring;
 use crate::simd::prefetch;
 use crate::soa::{TileForces, tile_nodes};
 
-/// How many lists are followed side by side.
-const SIDE_BY_SIDE: usize = 16;
+/// The number of lists that are traversed concurrently.
+const CONCURRENT_LISTS: usize = 16;
 
 /// Springs in linked lists.
 #[derive(Debug)]
 pub(super) struct Efficient {
     spring_count: usize,
     damped: bool,
-    /// The size of an element is a multiple of a pointer's: a link with damping takes no more than one without.
+    /// Element sizes are multiples of a pointer's size, so a link with damping takes no more memory than one without.
     lists: Vec<Chain<DampedLink>>,
 }
 
 saved! { Efficient { spring_count, damped, lists } }
 
 impl Efficient {
-    /// Which storage it is, in bytes.
+    /// The tag of this storage in snapshots.
     pub const SAVED_AS: u8 = 1;
 
     pub fn new(node_count: usize, springs: &[Spring]) -> Result<Self> {
-        let ends = Ends::of(node_count, springs)?;
+        let adjacency = Adjacency::new(node_count, springs)?;
         let mut lists = memory::reserved(node_count)?;
-        // Node by node: what is followed together is allocated together.
+        // Allocated node by node, so that lists that are traversed together are adjacent in memory.
         for node in 0..node_count {
             let mut list = Chain::EMPTY;
-            for link in ends.links(node) {
-                list.push(DampedLink::of(&link))?;
+            for link in adjacency.links(node) {
+                list.push(DampedLink::from_link(&link))?;
             }
             lists.push(list);
         }
@@ -52,40 +51,40 @@ impl Efficient {
     }
 
     fn has(&self, a: u32, b: u32) -> bool {
-        self.lists[a as usize].iter().any(|link| link.neighbour() == b)
+        self.lists[a as usize].iter().any(|link| link.neighbor() == b)
     }
 
     #[inline(always)]
-    fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
+    fn tile_forces<const DAMPED: bool>(&self, tile: usize, input: &ForceInput, forces: &mut TileForces) {
         let nodes = tile_nodes(tile, self.lists.len());
-        let gather = Gather::<DAMPED>::new(motion, nodes.start, self.lists.len());
-        let mut fetched = nodes.start;
+        let node_sum = NodeSum::<DAMPED>::new(input, nodes.start, self.lists.len());
+        let mut prefetched_end = nodes.start;
         for node in nodes.clone() {
-            if node == fetched {
-                fetched = nodes.end.min(node + SIDE_BY_SIDE);
-                fetch(&self.lists[node..fetched]);
+            if node == prefetched_end {
+                prefetched_end = nodes.end.min(node + CONCURRENT_LISTS);
+                prefetch_lists(&self.lists[node..prefetched_end]);
             }
-            gather.node(node, self.lists[node].iter().map(DampedLink::link), forces);
+            node_sum.write_node(node, self.lists[node].iter().map(DampedLink::link), forces);
         }
     }
 }
 
-/// Follows lists side by side, so that all their links are in the nearest cache.
+/// Traverses lists concurrently, which brings all their links into the first-level cache.
 #[inline(always)]
-fn fetch(lists: &[Chain<DampedLink>]) {
-    let mut followed: [Option<&ListElement<DampedLink>>; SIDE_BY_SIDE] = [None; SIDE_BY_SIDE];
-    for (followed, list) in followed.iter_mut().zip(lists) {
-        *followed = list.first();
+fn prefetch_lists(lists: &[Chain<DampedLink>]) {
+    let mut cursor: [Option<&ListElement<DampedLink>>; CONCURRENT_LISTS] = [None; CONCURRENT_LISTS];
+    for (cursor, list) in cursor.iter_mut().zip(lists) {
+        *cursor = list.first();
     }
-    let mut more = true;
-    while more {
-        more = false;
-        for element in &mut followed {
+    let mut any_left = true;
+    while any_left {
+        any_left = false;
+        for element in &mut cursor {
             if let Some(link) = *element {
                 *element = link.next();
                 if let Some(next) = *element {
                     prefetch(next);
-                    more = true;
+                    any_left = true;
                 }
             }
         }
@@ -94,7 +93,7 @@ fn fetch(lists: &[Chain<DampedLink>]) {
 
 impl Springs for Efficient {
     fn save(&self, to: &mut Writer) {
-        to.put(&[Self::SAVED_AS]);
+        to.write(&[Self::SAVED_AS]);
         Saved::save(self, to);
     }
 
@@ -115,15 +114,15 @@ impl Springs for Efficient {
         (links, links + self.lists.capacity() * size_of::<Chain<DampedLink>>())
     }
 
-    fn visit(&self, node: usize, see: &mut dyn FnMut(Link)) {
-        self.lists[node].iter().map(DampedLink::link).for_each(see);
+    fn visit(&self, node: usize, f: &mut dyn FnMut(Link)) {
+        self.lists[node].iter().map(DampedLink::link).for_each(f);
     }
 
-    fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
-        if motion.velocities.is_some() {
-            self.tile_forces::<true>(tile, motion, forces);
+    fn forces(&self, tile: usize, input: &ForceInput, forces: &mut TileForces) {
+        if input.velocities.is_some() {
+            self.tile_forces::<true>(tile, input, forces);
         } else {
-            self.tile_forces::<false>(tile, motion, forces);
+            self.tile_forces::<false>(tile, input, forces);
         }
     }
 
@@ -143,17 +142,20 @@ impl Springs for Efficient {
         if !self.damped {
             (link_a.damping, link_b.damping) = (0.0, 0.0);
         }
-        let (link_a, link_b) = (unlinked(DampedLink::of(&link_a))?, unlinked(DampedLink::of(&link_b))?);
-        self.lists[a as usize].put(link_a);
-        self.lists[b as usize].put(link_b);
+        let (link_a, link_b) = (
+            unlinked(DampedLink::from_link(&link_a))?,
+            unlinked(DampedLink::from_link(&link_b))?,
+        );
+        self.lists[a as usize].push_element(link_a);
+        self.lists[b as usize].push_element(link_b);
         self.spring_count += 1;
         Ok(())
     }
 
     fn remove(&mut self, a: u32, b: u32) -> Result<()> {
-        for (node, neighbour) in [(a, b), (b, a)] {
-            // Both ends have it, or none.
-            if !self.lists[node as usize].remove(|link| link.neighbour() == neighbour) {
+        for (node, neighbor) in [(a, b), (b, a)] {
+            // Either both ends have the link or none has.
+            if !self.lists[node as usize].remove(|link| link.neighbor() == neighbor) {
                 return Err(not_joined(a, b));
             }
         }
@@ -163,8 +165,8 @@ impl Springs for Efficient {
 
     fn set(&mut self, changes: &[SpringChange]) -> Result<()> {
         for (node, link) in changes.iter().flat_map(SpringChange::ends) {
-            if let Some(kept) = self.lists[node as usize].find_mut(|kept| kept.neighbour() == link.neighbour) {
-                *kept = DampedLink::of(&link);
+            if let Some(stored) = self.lists[node as usize].find_mut(|stored| stored.neighbor() == link.neighbor) {
+                *stored = DampedLink::from_link(&link);
             }
         }
         Ok(())

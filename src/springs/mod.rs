@@ -1,15 +1,15 @@
-//! The springs of a body: how they are kept, and the forces of a tile's.
+//! Spring storages of a body and the spring forces of a tile.
 
+mod adjacency;
 mod chain;
 mod dynamic_bulk;
 mod efficient;
-mod ends;
 mod fast_link;
-mod gather;
-mod kept;
 mod kernels;
 mod law;
+mod node_sum;
 mod packed;
+mod stored_link;
 
 use std::fmt::Debug;
 use std::ops;
@@ -18,7 +18,7 @@ use glam::Vec3;
 
 use crate::def::{BodyDefinition, Spring, Storage};
 use crate::simd::ChosenKernel;
-use crate::soa::{Masses, Rates, TileForces, Vectors, View, tile_nodes};
+use crate::soa::{FrequencyBound, NodalMasses, TileForces, Vectors, View, tile_nodes};
 use law::half_energy;
 pub(crate) use law::{Tangent, pull, separation};
 use packed::Packed;
@@ -29,12 +29,12 @@ use crate::codec::{Reader, Saved, Writer, saved, shape_with};
 use dynamic_bulk::DynamicBulk;
 use efficient::Efficient;
 use fast_link::FastLink;
-use kept::{DampedLink, UndampedLink};
+use stored_link::{DampedLink, UndampedLink};
 
-/// One end of a spring, as the node at the other end sees it.
+/// One end of a spring: its parameters and the node at the other end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Link {
-    pub neighbour: u32,
+    pub neighbor: u32,
     /// N/m
     pub stiffness: f32,
     /// m
@@ -43,24 +43,24 @@ pub(crate) struct Link {
     pub damping: f32,
 }
 
-saved! { Link { neighbour, stiffness, rest_length, damping } }
+saved! { Link { neighbor, stiffness, rest_length, damping } }
 
 impl Link {
-    /// One that pulls at nothing, of this rest length.
-    pub fn slack(neighbour: u32, rest_length: f32) -> Self {
+    /// A link of stiffness 0 with this rest length.
+    pub fn slack(neighbor: u32, rest_length: f32) -> Self {
         Self {
-            neighbour,
+            neighbor,
             stiffness: 0.0,
             rest_length,
             damping: 0.0,
         }
     }
 
-    /// A spring as each of its nodes sees it.
+    /// Both ends of a spring, in the order of its nodes.
     pub fn ends(spring: &Spring) -> [Self; 2] {
         let [a, b] = spring.nodes;
-        [b, a].map(|neighbour| Self {
-            neighbour,
+        [b, a].map(|neighbor| Self {
+            neighbor,
             stiffness: spring.stiffness,
             rest_length: spring.rest_length,
             damping: spring.damping,
@@ -68,34 +68,34 @@ impl Link {
     }
 }
 
-/// A spring that is to have another stiffness, rest length or damping, as one of its nodes sees it.
+/// New parameters for an existing spring, stored from the side of one of its nodes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SpringChange {
     pub node: u32,
     pub before: Link,
-    /// To the same neighbour.
+    /// The new link, to the same neighbor.
     pub after: Link,
 }
 
 impl SpringChange {
-    /// Its nodes, each with what it sees then.
+    /// Both nodes of the spring, each with its new link.
     pub fn ends(&self) -> [(u32, Link); 2] {
         let other = Link {
-            neighbour: self.node,
+            neighbor: self.node,
             ..self.after
         };
-        [(self.node, self.after), (self.after.neighbour, other)]
+        [(self.node, self.after), (self.after.neighbor, other)]
     }
 }
 
-/// What a cut makes of springs.
+/// The changes that a cut makes to the springs.
 #[derive(Debug, Default)]
 pub(crate) struct Rewiring {
-    /// Springs that there are.
+    /// Existing springs to remove.
     pub removed: Vec<Spring>,
-    /// Others that there are, each once.
+    /// Existing springs with new parameters, each once.
     pub changed: Vec<SpringChange>,
-    /// Between nodes that have none.
+    /// New springs between nodes that have none yet.
     pub added: Vec<Spring>,
 }
 
@@ -105,119 +105,121 @@ impl Rewiring {
     }
 }
 
-/// What spring forces depend on, and what is wanted next.
+/// The input of a spring-force evaluation.
 #[derive(Clone, Copy)]
-pub(crate) struct Motion<'a> {
+pub(crate) struct ForceInput<'a> {
     pub positions: View<'a>,
-    /// Given where springs are damped.
+    /// Node velocities, present if springs are damped.
     pub velocities: Option<&'a Vectors>,
-    /// What the nodes of the tile need after the forces, to be fetched from memory meanwhile.
-    pub soon: [&'a [f32]; 6],
+    /// Per-node data that the caller needs after the forces; it is prefetched during the evaluation.
+    pub prefetched: [&'a [f32]; 6],
 }
 
-impl<'a> Motion<'a> {
-    /// Nothing is wanted next.
+impl<'a> ForceInput<'a> {
+    /// An input without prefetched data.
     pub fn at(positions: &'a Vectors, velocities: Option<&'a Vectors>) -> Self {
         Self {
             positions: positions.view(),
             velocities,
-            soon: [&[]; 6],
+            prefetched: [&[]; 6],
         }
     }
 }
 
-/// Where the nodes of a body are, and by which ways they go from there.
+/// The input of a tangent product: node positions and displacements.
 #[derive(Clone, Copy)]
-pub(crate) struct Course<'a> {
+pub(crate) struct DirectionInput<'a> {
     pub node_count: usize,
     pub positions: View<'a>,
-    pub ways: View<'a>,
+    pub displacements: View<'a>,
     pub tangent: Tangent,
 }
 
-/// How the springs of a body are kept. Every solver and every change of topology goes through this.
+/// A spring storage. Every solver and every topology change uses this trait.
 pub(crate) trait Springs: Debug + Send + Sync {
-    /// Whether springs may have damping: fixed when the body is made.
+    /// True if springs may have damping. Fixed when the body is created.
     fn damped(&self) -> bool;
 
     fn node_count(&self) -> usize;
 
     fn spring_count(&self) -> usize;
 
-    /// Bytes taken by the springs that exist, and bytes held from the allocator.
+    /// Bytes used by the existing springs, and bytes held from the allocator.
     fn bytes(&self) -> (usize, usize);
 
-    /// Shows the links of `node`, each once.
-    fn visit(&self, node: usize, see: &mut dyn FnMut(Link));
+    /// Calls `f` once for each link of `node`.
+    fn visit(&self, node: usize, f: &mut dyn FnMut(Link));
 
-    /// The nodes whose positions the forces of a tile are made of, and what lies between and at most sixteen beyond them;
-    /// `None`: any.
+    /// The range of nodes whose positions the forces of a tile depend on, with at most sixteen nodes beyond it. `None`:
+    /// any node.
     fn reads(&self, _tile: usize) -> Option<ops::Range<isize>> {
         None
     }
 
-    /// Whether neighbours are gathered so much that it pays to have positions as records too.
-    fn gathers(&self) -> bool {
+    /// True if so many neighbors are gathered that positions stored as records pay off.
+    fn prefers_records(&self) -> bool {
         false
     }
 
-    /// Writes the spring forces on the nodes of `tile`, in newtons; with velocities also the damping along springs.
-    fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces);
+    /// Writes the spring forces on the nodes of `tile`, in newtons. With velocities, the damping along springs is
+    /// included.
+    fn forces(&self, tile: usize, input: &ForceInput, forces: &mut TileForces);
 
-    /// Writes how the spring forces on the nodes of `tile` change, N, in the first order.
-    fn changes(&self, tile: usize, course: &Course, changes: &mut TileForces) {
-        let &Course {
+    /// Writes the first-order changes of the spring forces on the nodes of `tile`, N: the tangent times the
+    /// displacements.
+    fn force_changes(&self, tile: usize, input: &DirectionInput, changes: &mut TileForces) {
+        let &DirectionInput {
             node_count,
             positions,
-            ways,
+            displacements,
             tangent,
-        } = course;
+        } = input;
         let nodes = tile_nodes(tile, node_count);
         for node in nodes.clone() {
-            let (position, way) = (positions.get(node), ways.get(node));
+            let (position, displacement) = (positions.get(node), displacements.get(node));
             let mut sum = Vec3::ZERO;
             self.visit(node, &mut |link| {
-                let neighbour = link.neighbour as usize;
-                let offset = positions.get(neighbour) - position;
-                sum += tangent.change(node, &link, offset, ways.get(neighbour) - way);
+                let neighbor = link.neighbor as usize;
+                let offset = positions.get(neighbor) - position;
+                sum += tangent.force_change(node, &link, offset, displacements.get(neighbor) - displacement);
             });
             changes.set(node - nodes.start, sum);
         }
     }
 
-    /// Half the energy of all links of the nodes of a tile, J: of a spring between two tiles each has a half.
+    /// Half the energy of all links of a tile's nodes, J. Each end of a spring counts half of its energy.
     fn half_energy(&self, nodes: ops::Range<usize>, positions: View) -> f64 {
         let mut sum = 0.0;
         for node in nodes {
             self.visit(node, &mut |link| {
-                let way = positions.get(link.neighbour as usize) - positions.get(node);
-                sum += f64::from(half_energy(node, &link, way));
+                let offset = positions.get(link.neighbor as usize) - positions.get(node);
+                sum += f64::from(half_energy(node, &link, offset));
             });
         }
         sum
     }
 
-    /// Makes room for so many nodes in all.
+    /// Reserves memory for this total number of nodes.
     fn reserve_nodes(&mut self, node_count: usize) -> Result<()>;
 
-    /// Adds nodes without springs, for which room was made, up to so many in all, or takes the last away again. Changes nothing where it
-    /// fails.
+    /// Appends nodes without springs, within the reserved memory, or removes the last nodes, up to this total number.
+    /// Changes nothing on failure.
     fn resize(&mut self, node_count: usize) -> Result<()>;
 
-    /// Adds a spring between two nodes of the body; refused where the pair has one already. Its damping counts only where
-    /// springs are damped. Changes nothing where it fails.
+    /// Adds a spring between two nodes. Returns an error if the pair already has one. The damping is stored only if
+    /// springs are damped. Changes nothing on failure.
     fn add(&mut self, spring: &Spring) -> Result<()>;
 
-    /// Removes the spring between `a` and `b`; refused where there is none.
+    /// Removes the spring between `a` and `b`. Returns an error if there is none.
     fn remove(&mut self, a: u32, b: u32) -> Result<()>;
 
-    /// Gives springs that there are, each once, other parameters. Changes nothing where it fails.
+    /// Sets the parameters of existing springs, each listed once. Changes nothing on failure.
     fn set(&mut self, changes: &[SpringChange]) -> Result<()>;
 
-    /// Writes which storage it is, and what it keeps.
+    /// Writes the storage's tag and contents.
     fn save(&self, to: &mut Writer);
 
-    /// Changes springs as a cut does. Changes nothing where it fails.
+    /// Applies the changes of a cut. Changes nothing on failure.
     fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
         rewire_by(self, rewiring, Self::add, |springs, [a, b]| springs.remove(a, b))
     }
@@ -249,7 +251,7 @@ impl Saved for Box<dyn Springs> {
     }
 }
 
-/// `springs`, kept as a body's definition asks.
+/// Stores `springs` in the storage that the definition names.
 pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: &[Spring]) -> Result<Box<dyn Springs>> {
     let node_count = definition.positions.len();
     let width = definition.springs_per_node as usize;
@@ -270,7 +272,8 @@ pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: 
     })
 }
 
-/// Changes springs as a cut does, with these ways to add one and to remove one that is there. Changes nothing where it fails.
+/// Applies the changes of a cut with these functions to add a spring and to remove an existing one. Changes nothing on
+/// failure.
 fn rewire_by<S: Springs + ?Sized>(
     springs: &mut S,
     Rewiring {
@@ -281,43 +284,44 @@ fn rewire_by<S: Springs + ?Sized>(
     add: fn(&mut S, &Spring) -> Result<()>,
     remove: fn(&mut S, [u32; 2]) -> Result<()>,
 ) -> Result<()> {
-    let take_out = |springs: &mut S, all: &[Spring]| all.iter().try_for_each(|spring| remove(springs, spring.nodes));
+    let remove_all = |springs: &mut S, all: &[Spring]| all.iter().try_for_each(|spring| remove(springs, spring.nodes));
     for (done, spring) in added.iter().enumerate() {
         if let Err(error) = add(springs, spring) {
-            take_out(springs, &added[..done])?;
+            remove_all(springs, &added[..done])?;
             return Err(error);
         }
     }
     if let Err(error) = springs.set(changed) {
-        take_out(springs, added)?;
+        remove_all(springs, added)?;
         return Err(error);
     }
-    take_out(springs, removed)
+    remove_all(springs, removed)
 }
 
-/// Those of a node wherever it and its neighbours are; `None`: it is pinned.
-pub(crate) fn rates_anywhere(node: usize, springs: &dyn Springs, masses: &Masses) -> Option<Rates> {
+/// The spring rates of a node, valid at any positions. `None`: the node is pinned.
+pub(crate) fn spring_rates(node: usize, springs: &dyn Springs, masses: &NodalMasses) -> Option<FrequencyBound> {
     let inverse_mass = masses.inverse(node);
-    let mut rates = Rates::ZERO;
+    let mut rates = FrequencyBound::ZERO;
     springs.visit(node, &mut |link| {
-        // Masses that were added are what a node needs by itself, with half of each spring.
-        let inverse_mass = if masses.are_heavier {
+        // With mass scaling each node is bounded on its own and carries half of each spring: 2 / m_a replaces 1 / m_a +
+        // 1 / m_b.
+        let inverse_mass = if masses.are_scaled {
             2.0 * inverse_mass
         } else {
-            masses.of_spring(inverse_mass, link.neighbour as usize)
+            masses.spring_factor(inverse_mass, link.neighbor as usize)
         };
-        rates.stiffest += link.stiffness * inverse_mass;
-        rates.most_damped += link.damping * inverse_mass;
+        rates.omega_sq += link.stiffness * inverse_mass;
+        rates.damping_rate += link.damping * inverse_mass;
     });
     (inverse_mass > 0.0).then_some(rates)
 }
 
-/// Why a spring is not added.
+/// The error of an added spring whose nodes already have one.
 pub(crate) fn already_joined(a: u32, b: u32) -> Error {
     Error::invalid(format!("nodes {a} and {b} have a spring already"))
 }
 
-/// Why a spring is not removed.
+/// The error of a removed spring that does not exist.
 pub(crate) fn not_joined(a: u32, b: u32) -> Error {
     Error::invalid(format!("nodes {a} and {b} have no spring"))
 }

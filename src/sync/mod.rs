@@ -1,7 +1,7 @@
-//! Hand-overs between threads, of which none ever waits for another.
+//! Wait-free exchange of values between threads.
 //!
-//! One thread writes, others read what was written last and whole. Nothing here locks, allocates or waits.
+//! One thread writes; others read the latest complete value. Nothing here locks, allocates or waits.
 
+mod atomics;
 pub(crate) mod pool;
-mod sync;
 pub(crate) mod triple_buffer;

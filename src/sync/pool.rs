@@ -1,34 +1,34 @@
-//! From one thread to any number of others: the latest complete value, in two buffers more than there are readers.
+//! Publishes the latest complete value from one thread to several others, in two more buffers than there are readers.
 //!
-//! The writer announces each version in one word, with the buffer it is in. A buffer's own word has its version too, and how many readers hold it. A
-//! reader claims the buffer by exchanging that word for one with a claim more, which fails unless the buffer still holds just what was announced.
-//! The writer takes a buffer that is neither claimed nor the latest by exchanging its word for 0, which is no version that anybody looks for.
+//! The writer announces each version, with its buffer, in one atomic word. Each buffer has a word with its version and its number of claims. A
+//! reader claims a buffer by incrementing the claims in a compare-exchange, which fails unless the buffer still has the announced version.
+//! The writer takes a buffer without claims that is not the latest by setting its word to 0, a version that is never announced.
 //!
-//! While the writer looks for such a buffer, a reader keeps it from one at most: the one that it holds, or, where it held none, one whose
-//! announcement it heard before; what it claims after that is the latest. So one is always free, and the writer, which goes past each once, is
-//! wait-free. A reader tries again only when another reader came or went, or there is a later version: it is lock-free.
+//! While the writer searches, each reader can block at most one buffer: the one that it holds, or one whose
+//! announcement it read earlier; a later claim is of the latest buffer. One buffer is therefore always free, and the writer, which visits each once, is
+//! wait-free. A reader repeats its claim only after another reader's claim or release, or a later version: it is lock-free.
 
-// Buffers that threads share; each access has its reason.
+// Threads share the buffers; each access states its reason.
 #![allow(unsafe_code)]
 
 use std::collections::TryReserveError;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use super::sync::{ANNOUNCE, AtomicU64, LET_GO, LISTEN, TAKE_BACK, TELL_BEFORE_LOOKING, UnsafeCell, fence};
+use super::atomics::{ANNOUNCE, AtomicU64, LET_GO, LISTEN, TAKE_BACK, TELL_BEFORE_LOOKING, UnsafeCell, fence};
 
-/// Words have a version above these bits; in a buffer's they count claims.
+/// The bits below the version in a word; in a buffer's word they count claims.
 const VERSION: u32 = 16;
 const CLAIMS: u64 = (1 << VERSION) - 1;
-/// In the word that is announced: there is nobody to write any more,
+/// In the announced word: the writer was dropped.
 const OVER: u64 = 1 << (VERSION - 1);
-/// and which buffer it is.
+/// In the announced word: the index of the buffer.
 const WHICH: u64 = OVER - 1;
 
 #[derive(Debug)]
 struct Buffer<T> {
     word: AtomicU64,
-    /// `None` while there are not so many readers.
+    /// `None` until there are enough readers.
     content: UnsafeCell<Option<T>>,
 }
 
@@ -38,23 +38,23 @@ struct PoolShared<T> {
     buffers: Vec<Buffer<T>>,
 }
 
-// SAFETY: a buffer is read by those who claimed it, and written by the one writer while its word says that nobody can.
+// SAFETY: only readers with a claim read a buffer, and only the writer writes one, while its word allows no claim.
 unsafe impl<T: Send + Sync> Sync for PoolShared<T> {}
 // SAFETY: it owns what it holds.
 unsafe impl<T: Send> Send for PoolShared<T> {}
 
-/// The writing side; its end is told.
+/// The writing side. Readers can see that it was dropped.
 #[derive(Debug)]
 pub(crate) struct PoolWriter<T> {
     shared: Arc<PoolShared<T>>,
-    /// The version and the buffer that are the latest.
+    /// The latest version and its buffer.
     version: u64,
     latest: usize,
-    /// How many buffers have a content.
+    /// The number of buffers with a content.
     filled: usize,
 }
 
-/// A reading side, which always holds a buffer.
+/// A reading side. It always holds a claim on a buffer.
 #[derive(Debug)]
 pub(crate) struct PoolReader<T> {
     shared: Arc<PoolShared<T>>,
@@ -63,9 +63,9 @@ pub(crate) struct PoolReader<T> {
 }
 
 impl<T: Send + Sync> PoolWriter<T> {
-    /// A pool for so many readers at most, which has none yet. The first of these values is version 1.
-    pub fn new(most_readers: usize, contents: [T; 2]) -> Result<Self, TryReserveError> {
-        let count = most_readers + 2;
+    /// A pool for at most `max_readers` readers, without a reader yet. The first value is version 1.
+    pub fn new(max_readers: usize, contents: [T; 2]) -> Result<Self, TryReserveError> {
+        let count = max_readers + 2;
         debug_assert!(count as u64 <= WHICH);
         let mut buffers = Vec::new();
         buffers.try_reserve_exact(count)?;
@@ -85,17 +85,17 @@ impl<T: Send + Sync> PoolWriter<T> {
         })
     }
 
-    /// How many readers there are: at most so many, if none is added.
+    /// An upper bound on the number of readers; dropping a reader reduces it.
     pub fn reader_count(&self) -> usize {
         Arc::strong_count(&self.shared) - 1
     }
 
-    /// How many buffers it has.
+    /// The number of buffers.
     pub fn buffer_count(&self) -> usize {
         self.filled
     }
 
-    /// A reader more, which holds the latest, with one more buffer if it needs one; `None` where there are as many as can be.
+    /// Adds a reader, and a buffer if it needs one; `None` if the largest number is reached.
     pub fn add_reader<E>(&mut self, make: impl FnOnce() -> Result<T, E>) -> Result<Option<PoolReader<T>>, E> {
         let needed = self.reader_count() + 3;
         if needed > self.shared.buffers.len() {
@@ -103,13 +103,13 @@ impl<T: Send + Sync> PoolWriter<T> {
         }
         if needed > self.filled {
             let content = make()?;
-            self.shared.buffers[self.filled].content.with_mut(|place| {
-                // SAFETY: no buffer beyond those filled was ever announced, and nobody else writes.
-                unsafe { *place = Some(content) }
+            self.shared.buffers[self.filled].content.with_mut(|slot| {
+                // SAFETY: an unfilled buffer was never announced, and there is no other writer.
+                unsafe { *slot = Some(content) }
             });
             self.filled += 1;
         }
-        // It cannot change: this is the writer.
+        // Only this writer changes the latest buffer.
         self.shared.buffers[self.latest].word.fetch_add(1, Relaxed);
         Ok(Some(PoolReader {
             shared: Arc::clone(&self.shared),
@@ -118,17 +118,17 @@ impl<T: Send + Sync> PoolWriter<T> {
         }))
     }
 
-    /// Writes over what an earlier call wrote, and makes it the latest. Answers whether there was a buffer, which there always is.
+    /// Overwrites an old value and makes it the latest. Returns true if a buffer was free, which is always so.
     pub fn write(&mut self, write: impl FnOnce(&mut T)) -> bool {
-        // What was announced last is known to those who let go of buffers from here on.
+        // Readers that release a buffer from here on see the last announcement.
         fence(TELL_BEFORE_LOOKING);
         for (index, buffer) in self.shared.buffers[..self.filled].iter().enumerate() {
-            // The version is the writer's own; claims come and go.
+            // Only the writer changes the version; readers change the claims.
             let unclaimed = buffer.word.load(Relaxed) & !CLAIMS;
             let is_free = || buffer.word.compare_exchange(unclaimed, 0, TAKE_BACK, Relaxed).is_ok();
             if index != self.latest && is_free() {
                 buffer.content.with_mut(|content| {
-                    // SAFETY: it was unclaimed, and cannot be claimed with version 0, which is never announced.
+                    // SAFETY: the buffer had no claim, and version 0 is never announced, so that it cannot be claimed.
                     if let Some(content) = unsafe { &mut *content } {
                         write(content);
                     }
@@ -153,35 +153,35 @@ impl<T> Drop for PoolWriter<T> {
 }
 
 impl<T> PoolReader<T> {
-    /// Lets go of what it holds for the latest, if there is a later one: whether there is.
+    /// Claims the latest buffer instead of the current one, if it is newer. Returns true if it is.
     pub fn take(&mut self) -> bool {
         let shared = &*self.shared;
         if shared.latest.load(LISTEN) >> VERSION == self.version {
             return false;
         }
         shared.buffers[self.own].word.fetch_sub(1, LET_GO);
-        // The writer sees that, or this reader what the writer announced before it looked.
+        // Either the writer sees the release, or this reader sees the announcement before the writer's search.
         fence(TELL_BEFORE_LOOKING);
         (self.version, self.own) = shared.claim();
         true
     }
 
-    /// What it holds.
+    /// The claimed value.
     pub fn get(&self) -> &T {
         let buffer = &self.shared.buffers[self.own];
         let content = buffer.content.with(|content| {
-            // SAFETY: it is claimed until `take`, which needs `self` to be borrowed by nobody.
+            // SAFETY: the buffer stays claimed until `take`, which borrows `self` mutably.
             unsafe { &*content }
         });
         content.as_ref().expect("what was announced has a content")
     }
 
-    /// Its version: 1 of what the pool began with, one more of each that was written since.
+    /// The version of the claimed value: 1 for the first, and one more for each write.
     pub fn version(&self) -> u64 {
         self.version
     }
 
-    /// Whether there is nobody to write any more.
+    /// True if the writer was dropped.
     pub fn is_over(&self) -> bool {
         self.shared.latest.load(LISTEN) & OVER != 0
     }
@@ -194,7 +194,7 @@ impl<T> Drop for PoolReader<T> {
 }
 
 impl<T> PoolShared<T> {
-    /// Claims the latest: its version, and where it is.
+    /// Claims the latest buffer and returns its version and index.
     fn claim(&self) -> (u64, usize) {
         loop {
             let latest = self.latest.load(LISTEN);

@@ -1,17 +1,17 @@
-//! From one thread to one other: three buffers, of which the writer has one, the reader one, and one lies between them.
+//! A triple buffer from one thread to another: the writer has a buffer, the reader has one, and one is between them.
 //!
-//! Whoever is ready exchanges its own for the one between with a single atomic instruction: both sides are wait-free.
+//! Each side exchanges its buffer for the middle one by a single atomic instruction, so both are wait-free.
 
-// Three cells that two threads share; each access has its reason.
+// Two threads share three cells; each access states its reason.
 #![allow(unsafe_code)]
 
 use std::sync::Arc;
 
-use super::sync::{ACQUIRE_RELEASE, AtomicU8, UnsafeCell};
+use super::atomics::{ACQUIRE_RELEASE, AtomicU8, UnsafeCell};
 
-/// Set in the word between when what lies there was not read yet.
+/// Set if the middle buffer was not read yet.
 const NEW: u8 = 4;
-/// The part of that word that says which buffer it is.
+/// The bits for the index of the middle buffer.
 const WHICH: u8 = 3;
 
 #[derive(Debug)]
@@ -20,7 +20,7 @@ struct BufferShared<T> {
     between: AtomicU8,
 }
 
-// SAFETY: which thread uses a buffer is settled by exchanges of `between`: never two the same.
+// SAFETY: exchanges of `between` decide which thread uses a buffer: never both.
 unsafe impl<T: Send> Sync for BufferShared<T> {}
 // SAFETY: it owns what it holds.
 unsafe impl<T: Send> Send for BufferShared<T> {}
@@ -39,7 +39,7 @@ pub(crate) struct BufferReader<T> {
     own: u8,
 }
 
-/// Both sides of a hand-over of values that begin as these.
+/// Both sides of a triple buffer with these initial values.
 pub(crate) fn triple_buffer<T: Send>(contents: [T; 3]) -> (BufferWriter<T>, BufferReader<T>) {
     let shared = Arc::new(BufferShared {
         buffers: contents.map(UnsafeCell::new),
@@ -53,7 +53,7 @@ pub(crate) fn triple_buffer<T: Send>(contents: [T; 3]) -> (BufferWriter<T>, Buff
 }
 
 impl<T> BufferWriter<T> {
-    /// Writes over what one of the last three calls wrote, and hands it over.
+    /// Overwrites an old value and publishes it.
     pub fn write<R>(&mut self, write: impl FnOnce(&mut T) -> R) -> R {
         let result = self.shared.buffers[usize::from(self.own)].with_mut(|buffer| {
             // SAFETY: the buffer is the writer's own until the exchange below, and `self` is borrowed by this call alone.
@@ -65,9 +65,9 @@ impl<T> BufferWriter<T> {
 }
 
 impl<T> BufferReader<T> {
-    /// Takes what was written last: whether there was something that had not been read.
+    /// Takes the latest value. Returns true if it was not read before.
     pub fn take(&mut self) -> bool {
-        // Only the reader takes NEW away, so what is seen here is still there when it exchanges.
+        // Only the reader clears NEW, so it is still set at the exchange.
         if self.shared.between.load(std::sync::atomic::Ordering::Relaxed) & NEW == 0 {
             return false;
         }
@@ -75,7 +75,7 @@ impl<T> BufferReader<T> {
         true
     }
 
-    /// Reads what was taken last, or what the buffers began with.
+    /// Reads the value taken last, or the initial one.
     pub fn read<R>(&self, read: impl FnOnce(&T) -> R) -> R {
         self.shared.buffers[usize::from(self.own)].with(|buffer| {
             // SAFETY: the buffer is the reader's own until `take` exchanges it, which borrows `self` alone.
@@ -83,7 +83,7 @@ impl<T> BufferReader<T> {
         })
     }
 
-    /// Whether there is nobody to write any more.
+    /// True if the other side was dropped.
     pub fn is_alone(&self) -> bool {
         Arc::strong_count(&self.shared) == 1
     }

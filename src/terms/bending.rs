@@ -1,46 +1,48 @@
-//! Bending: hinges of two triangles that share an edge, which resist turning about it.
+//! Bending: hinges, which are two triangles with a common edge, resist rotation about it.
 //!
-//! An *arm* of a hinge is the way from the edge to the corner opposite, from where its foot is at rest, over its height at rest: `T` and
-//! `T'`, of length 1 and at right angles to the edge `e` as long as the triangles keep their shape. Then `|T + T'| = 2 sin(phi/2)` and
-//! `|T - T'| = 2 cos(phi/2)`, with phi the angle by which the surface turns at the edge, both along one line, and of
+//! An *arm* of a hinge is the vector from the edge to the opposite corner, divided by the rest height. It starts at the
+//! foot of that corner at rest. The arms are `T` and `T'`. While the triangles keep their shape, they have unit length
+//! and are perpendicular to the edge `e`. Then `|T + T'| = 2 sin(phi/2)` and `|T - T'| = 2 cos(phi/2)` with the bending
+//! angle phi. The vector
 //!
 //! `G = cos(phi0/2) (T + T') - sin(phi0/2) e/|e0| x (T - T')`
 //!
-//! the length is `2 |sin((phi - phi0)/2)|`. The energy of a hinge is `k/2 |G|²`. For a flat rest shape it is the quadratic one of
-//! isometric bending (Bergou, Wardetzky, Harmon, Zorin, Grinspun 2006); for a curved one a polynomial too, as in cubic shells (Garg,
-//! Grinspun, Wardetzky, Zorin 2007), but one that is nowhere below 0. `G` turns with the body and is 0 at rest, so momentum is kept and
-//! the rest shape is at rest; nothing is divided by what may become 0, so whatever becomes of a triangle, forces are finite.
+//! has the length `2 |sin((phi - phi0)/2)|`. The energy of a hinge is `k/2 |G|²`. For a flat rest shape it is the
+//! quadratic energy of isometric bending (Bergou, Wardetzky, Harmon, Zorin, Grinspun 2006). For a curved one it is a
+//! polynomial, as in cubic shells (Garg, Grinspun, Wardetzky, Zorin 2007), but never negative. `G` rotates with the
+//! body and is 0 at rest, so momentum is conserved and the rest shape is in equilibrium. No divisor can become 0, so
+//! forces are finite even if a triangle degenerates.
 //!
-//! With `k = D |e0|² / (A + A')` the flexural rigidity is D, whichever way it is bent, where triangles are equilateral, and Poisson's
-//! ratio is -1/3 (Seung, Nelson 1988). A sum over hinges cannot have both on every mesh: of squares that are cut alternately every other
-//! node gives way, which leaves 5/6 of D along a side.
+//! With `k = D |e0|² / (A + A')` equilateral triangles have the flexural rigidity D in every direction, and Poisson's
+//! ratio -1/3 (Seung, Nelson 1988). No sum over hinges has both properties on every mesh. In squares with alternating
+//! diagonals every other node yields, which leaves 5/6 of D along a side.
 
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::parting::Parting;
-use super::stencils::{SeePart, Stencil, StencilLaw, Stencils};
+use super::pieces::TermPieces;
+use super::stencils::{PieceVisitor, Stencil, StencilLaw, Stencils};
 use crate::base::{Error, Result, cross_matrix, ensure, memory, not_negative};
 use crate::codec::saved;
 use crate::def::BodyDefinition;
 use crate::soa::NodeOrder;
 
-/// Hinges: the two nodes of the edge, then those opposite.
+/// The law of hinges. Nodes are the two of the edge, then the opposite ones.
 #[derive(Debug)]
 pub(super) struct Hinges;
 
 saved! { Hinges }
 
-/// A hinge at rest.
+/// The rest shape of a hinge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HingeShape {
-    /// Where the feet of the arms lie on the edge, 0: at its first node, 1: at its second.
+    /// The positions of the arms' feet on the edge; 0 is its first node, 1 its second.
     feet: [f32; 2],
-    /// 1/m
+    /// The inverse rest heights, 1/m.
     inverse_heights: [f32; 2],
-    /// Of half the angle.
+    /// The cosine of half the rest angle.
     cosine: f32,
-    /// That of half the angle, over the length of the edge, 1/m; 0: flat.
+    /// The sine of half the rest angle divided by the rest length of the edge, 1/m. 0: flat.
     sine: f32,
 }
 
@@ -60,15 +62,15 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
     let at = |node: u32| rest[node as usize].as_dvec3();
     let mut hinges = memory::reserved(definition.triangles.len() * 3 / 2)?;
     let sides = sides(definition.triangles)?;
-    for joined in sides.chunk_by(|a, b| a.edge == b.edge) {
-        let &[a, b] = joined else {
-            if let [_] = joined {
+    for edge_sides in sides.chunk_by(|a, b| a.edge == b.edge) {
+        let &[a, b] = edge_sides else {
+            if let [_] = edge_sides {
                 continue;
             }
             return Err(Error::invalid(format!(
                 "{} triangles share the edge of nodes {:?}: bending_stiffness needs one or two at each edge",
-                joined.len(),
-                joined[0].edge
+                edge_sides.len(),
+                edge_sides[0].edge
             )));
         };
         let nodes = [a.edge[0], a.edge[1], a.opposite, b.opposite];
@@ -80,7 +82,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
         );
         let reach = nodes.map(|node| rest[node as usize].abs().max_element());
         let reach = reach.into_iter().fold(0.0, f32::max);
-        let Some((shape, stiffness)) = HingeShape::of(nodes.map(at), f64::from(reach)) else {
+        let Some((shape, stiffness)) = HingeShape::new(nodes.map(at), f64::from(reach)) else {
             return Err(Error::invalid(format!(
                 "triangles[{}] or triangles[{}] has no area at rest: too little for bending_stiffness",
                 a.triangle, b.triangle
@@ -105,7 +107,7 @@ struct TriangleSide {
     triangle: u32,
 }
 
-/// The sides of all triangles, those of one edge in a row.
+/// The sides of all triangles, sorted by edge.
 fn sides(triangles: &[[u32; 3]]) -> Result<Vec<TriangleSide>> {
     let mut sides = memory::reserved(3 * triangles.len())?;
     for (triangle, &[a, b, c]) in (0..).zip(triangles) {
@@ -120,9 +122,9 @@ fn sides(triangles: &[[u32; 3]]) -> Result<Vec<TriangleSide>> {
 }
 
 impl HingeShape {
-    /// Of a hinge whose corners are here at rest, with coordinates up to `reach`, and its stiffness over the flexural rigidity;
-    /// `None`: a triangle has no area.
-    fn of(corners: [DVec3; 4], reach: f64) -> Option<(Self, f64)> {
+    /// The rest shape of a hinge with these corners and coordinates up to `reach`, and its stiffness per flexural
+    /// rigidity. `None`: a triangle has no area.
+    fn new(corners: [DVec3; 4], reach: f64) -> Option<(Self, f64)> {
         let [start, end, opposite @ ..] = corners;
         let edge = end - start;
         let square = edge.length_squared();
@@ -131,7 +133,7 @@ impl HingeShape {
         let heights = arms.map(DVec3::length);
         let [first, second] = [0, 1].map(|arm| arms[arm] / heights[arm]);
         let (sine, cosine) = (0.5 * (first + second).length(), 0.5 * (first - second).length());
-        // What rounded coordinates make of a flat hinge.
+        // The angle that rounded coordinates give a flat hinge.
         let rounding = 4.0 * f64::from(f32::EPSILON) * (1.0 + reach / heights[0].min(heights[1]));
         let side = (first + second).dot(edge.cross(first - second)).signum();
         let is_flat = sine <= rounding;
@@ -147,11 +149,11 @@ impl HingeShape {
         };
         let areas = 0.5 * edge.length() * (heights[0] + heights[1]);
         let numbers = [shape.feet, shape.inverse_heights, [shape.cosine, shape.sine]];
-        let is_fine = numbers.as_flattened().iter().all(|number| number.is_finite());
-        (is_fine && areas > 0.0).then_some((shape, square / areas))
+        let is_valid = numbers.as_flattened().iter().all(|number| number.is_finite());
+        (is_valid && areas > 0.0).then_some((shape, square / areas))
     }
 
-    /// The arms, or how they change where nodes go these ways.
+    /// The arms; linear, so also their changes for displacements.
     #[inline(always)]
     fn arms(&self, [start, end, first, second]: &[DVec3; 4]) -> [DVec3; 2] {
         let edge = *end - *start;
@@ -162,17 +164,17 @@ impl HingeShape {
     }
 
     #[inline(always)]
-    fn bent(&self, places: &[DVec3; 4]) -> Bent {
-        let [first, second] = self.arms(places);
-        let (edge, across) = (places[1] - places[0], first - second);
+    fn state(&self, positions: &[DVec3; 4]) -> HingeState {
+        let [first, second] = self.arms(positions);
+        let (edge, across) = (positions[1] - positions[0], first - second);
         let mut turn = (first + second) * f64::from(self.cosine);
         if self.sine != 0.0 {
             turn -= edge.cross(across) * f64::from(self.sine);
         }
-        Bent { edge, across, turn }
+        HingeState { edge, across, turn }
     }
 
-    /// What share each place has in each arm.
+    /// The weight of each node in each arm.
     fn shares(&self) -> [[f64; 4]; 2] {
         [0, 1].map(|arm| {
             let foot = f64::from(self.feet[arm]);
@@ -183,49 +185,53 @@ impl HingeShape {
     }
 }
 
-/// A hinge as it is.
-struct Bent {
-    /// m
+/// The current state of a hinge.
+struct HingeState {
+    /// The edge, m.
     edge: DVec3,
-    /// `T - T'`.
+    /// The difference of the arms, `T - T'`.
     across: DVec3,
-    /// `G`.
+    /// The bending vector `G`.
     turn: DVec3,
 }
 
-impl Bent {
-    /// How G changes where nodes go these ways: in the first order, and what there is of the second.
+impl HingeState {
+    /// The first-order and second-order changes of G for these displacements.
     #[inline(always)]
-    fn changes(&self, shape: &HingeShape, ways: &[DVec3; 4]) -> [DVec3; 2] {
-        let [first, second] = shape.arms(ways);
+    fn turn_changes(&self, shape: &HingeShape, displacements: &[DVec3; 4]) -> [DVec3; 2] {
+        let [first, second] = shape.arms(displacements);
         let change = (first + second) * f64::from(shape.cosine);
         if shape.sine == 0.0 {
             return [change, DVec3::ZERO];
         }
-        let (sine, edge, across) = (f64::from(shape.sine), ways[1] - ways[0], first - second);
+        let (sine, edge, across) = (
+            f64::from(shape.sine),
+            displacements[1] - displacements[0],
+            first - second,
+        );
         [
             change - (edge.cross(self.across) + self.edge.cross(across)) * sine,
             edge.cross(across) * -sine,
         ]
     }
 
-    /// What a weight on G is on each node.
+    /// The transpose of the derivative of G, applied to a vector: one vector per node.
     #[inline(always)]
-    fn spread(&self, shape: &HingeShape, weight: DVec3) -> [DVec3; 4] {
+    fn distribute(&self, shape: &HingeShape, weight: DVec3) -> [DVec3; 4] {
         let along = weight * f64::from(shape.cosine);
-        let (mut sideways, mut of_edge) = (DVec3::ZERO, DVec3::ZERO);
+        let (mut transverse, mut of_edge) = (DVec3::ZERO, DVec3::ZERO);
         if shape.sine != 0.0 {
-            sideways = weight.cross(self.edge) * f64::from(shape.sine);
+            transverse = weight.cross(self.edge) * f64::from(shape.sine);
             of_edge = self.across.cross(weight) * f64::from(-shape.sine);
         }
-        let first = (along - sideways) * f64::from(shape.inverse_heights[0]);
-        let second = (along + sideways) * f64::from(shape.inverse_heights[1]);
+        let first = (along - transverse) * f64::from(shape.inverse_heights[0]);
+        let second = (along + transverse) * f64::from(shape.inverse_heights[1]);
         let end = of_edge - first * f64::from(shape.feet[0]) - second * f64::from(shape.feet[1]);
         [-(first + second + end), end, first, second]
     }
 }
 
-/// The share of the places in the edge.
+/// The weights of the nodes in the edge.
 const EDGE: [f64; 4] = [-1.0, 1.0, 0.0, 0.0];
 
 impl StencilLaw<4> for Hinges {
@@ -233,55 +239,55 @@ impl StencilLaw<4> for Hinges {
 
     type Shape = HingeShape;
 
-    fn energy(&self, shape: &HingeShape, places: &[DVec3; 4]) -> f64 {
-        0.5 * shape.bent(places).turn.length_squared()
+    fn energy(&self, shape: &HingeShape, positions: &[DVec3; 4]) -> f64 {
+        0.5 * shape.state(positions).turn.length_squared()
     }
 
-    /// Pieces of its two triangles that still have an edge together are hinges, as stiff as what they have of its area.
-    fn show_parts(&self, shape: &HingeShape, [a, b, c, d]: [u32; 4], parting: &Parting, see: &mut SeePart<4>) {
+    /// Pieces of both triangles with a common edge are hinges, with stiffness proportional to their area.
+    fn visit_pieces(&self, shape: &HingeShape, [a, b, c, d]: [u32; 4], pieces: &TermPieces, f: &mut PieceVisitor<4>) {
         let areas = shape.inverse_heights.map(|inverse| 1.0 / f64::from(inverse));
-        let show = |see: &mut SeePart<4>| {
-            for first in parting.of_cell([a, b, c]) {
-                for second in parting.of_cell([a, b, d]) {
+        let visit_all = |f: &mut PieceVisitor<4>| {
+            for first in pieces.cell_pieces([a, b, c]) {
+                for second in pieces.cell_pieces([a, b, d]) {
                     let ([a, b, c], [other_a, other_b, d]) = (first.nodes, second.nodes);
                     if [a, b] == [other_a, other_b] {
-                        let part = (areas[0] * first.part + areas[1] * second.part) / (areas[0] + areas[1]);
-                        see([a, b, c, d], part);
+                        let share = (areas[0] * first.share + areas[1] * second.share) / (areas[0] + areas[1]);
+                        f([a, b, c, d], share);
                     }
                 }
             }
         };
-        // Pieces that hang together elsewhere may have the edge in common with the same one: in all they are no more than the whole.
+        // Several pieces may share the edge of one piece. The shares are normalized if their sum exceeds 1.
         let mut sum = 0.0_f64;
-        show(&mut |_, part| sum += part);
-        show(&mut |nodes, part| see(nodes, part / sum.max(1.0)));
+        visit_all(&mut |_, share| sum += share);
+        visit_all(&mut |nodes, share| f(nodes, share / sum.max(1.0)));
     }
 
-    fn change(&self, shape: &HingeShape, places: &[DVec3; 4], ways: &[DVec3; 4]) -> f64 {
-        let bent = shape.bent(places);
-        let [first, second] = bent.changes(shape, ways);
+    fn energy_change(&self, shape: &HingeShape, positions: &[DVec3; 4], displacements: &[DVec3; 4]) -> f64 {
+        let state = shape.state(positions);
+        let [first, second] = state.turn_changes(shape, displacements);
         let change = first + second;
-        change.dot(bent.turn + change * 0.5)
+        change.dot(state.turn + change * 0.5)
     }
 
     #[inline(always)]
-    fn forces(&self, shape: &HingeShape, places: &[DVec3; 4]) -> [DVec3; 4] {
-        let bent = shape.bent(places);
-        bent.spread(shape, -bent.turn)
+    fn forces(&self, shape: &HingeShape, positions: &[DVec3; 4]) -> [DVec3; 4] {
+        let state = shape.state(positions);
+        state.distribute(shape, -state.turn)
     }
 
     #[inline(always)]
-    fn changes(&self, shape: &HingeShape, places: &[DVec3; 4], ways: &[DVec3; 4]) -> [DVec3; 4] {
-        let bent = shape.bent(places);
-        let [change, _] = bent.changes(shape, ways);
-        bent.spread(shape, -change)
+    fn force_changes(&self, shape: &HingeShape, positions: &[DVec3; 4], displacements: &[DVec3; 4]) -> [DVec3; 4] {
+        let state = shape.state(positions);
+        let [change, _] = state.turn_changes(shape, displacements);
+        state.distribute(shape, -change)
     }
 
-    fn blocks(&self, shape: &HingeShape, places: &[DVec3; 4], is_exact: bool) -> [[DMat3; 4]; 4] {
-        let bent = shape.bent(places);
+    fn blocks(&self, shape: &HingeShape, positions: &[DVec3; 4], is_exact: bool) -> [[DMat3; 4]; 4] {
+        let state = shape.state(positions);
         let (cosine, sine) = (f64::from(shape.cosine), f64::from(shape.sine));
         let [first, second] = shape.shares();
-        let [edge, across, turn] = [bent.edge, bent.across, bent.turn].map(cross_matrix);
+        let [edge, across, turn] = [state.edge, state.across, state.turn].map(cross_matrix);
         let difference = [0, 1, 2, 3].map(|node| first[node] - second[node]);
         let rates = [0, 1, 2, 3].map(|node| {
             DMat3::from_diagonal(DVec3::splat(cosine * (first[node] + second[node]))) + across * (sine * EDGE[node])
@@ -299,8 +305,9 @@ impl StencilLaw<4> for Hinges {
         })
     }
 
-    /// With the arms no longer than 1 and the edge no longer than at rest `|dG|` is at most the sum of what is here, times the ways.
-    fn rate(&self, shape: &HingeShape, inverse_masses: [f64; 4]) -> f64 {
+    /// For arms of at most unit length and an edge of at most its rest length, `|dG|` is at most the sum of these
+    /// bounds times the displacements.
+    fn rate_bound(&self, shape: &HingeShape, inverse_masses: [f64; 4]) -> f64 {
         let [first, second] = shape.shares();
         let (cosine, sine) = (f64::from(shape.cosine), f64::from(shape.sine).abs());
         let bound = |node: usize| {
@@ -316,18 +323,18 @@ impl StencilLaw<4> for Hinges {
             .sum()
     }
 
-    /// Longer arms and edges raise that bound; and with x the arms' part of it and y the edge's, G adds `|G| x y <= |G| (x + y)²/4`.
+    /// Longer arms and edges raise that bound. With its arm part x and edge part y, G adds `|G| x y <= |G| (x + y)²/4`.
     #[inline(always)]
-    fn stiffening(&self, shape: &HingeShape, places: &[DVec3; 4]) -> f64 {
+    fn stiffening(&self, shape: &HingeShape, positions: &[DVec3; 4]) -> f64 {
         if shape.sine == 0.0 {
             return 1.0;
         }
-        let bent = shape.bent(places);
+        let state = shape.state(positions);
         let (cosine, sine) = (f64::from(shape.cosine), f64::from(shape.sine));
-        // The sine itself, squared, is its part of the edge's length at rest.
-        let edge = bent.edge.length_squared() * sine * sine / (1.0 - cosine * cosine).max(f64::from(f32::EPSILON));
-        let longest = edge.max(0.25 * bent.across.length_squared()).max(1.0);
-        longest + 0.25 * bent.turn.length()
+        // Squared sine times edge length, relative to its value at rest.
+        let edge = state.edge.length_squared() * sine * sine / (1.0 - cosine * cosine).max(f64::from(f32::EPSILON));
+        let longest = edge.max(0.25 * state.across.length_squared()).max(1.0);
+        longest + 0.25 * state.turn.length()
     }
 
     fn scaled(&self, shape: &HingeShape, length: f64) -> (HingeShape, f64) {

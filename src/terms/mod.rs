@@ -1,22 +1,22 @@
-//! Terms of a body's energy beside those of springs and elements: each is of a few nodes, and follows one law.
+//! Energy terms of a body besides springs and elements. A term has a few nodes and follows one law.
 //!
-//! A tile's forces are made of all terms that have one of its nodes; what belongs to two tiles is worked out in each of them. So there
-//! are no buffers, any thread may take any tile, and results are the same for any number of threads.
+//! The forces on a tile are summed over all terms with a node in it; a term of two tiles is evaluated in both. So no
+//! buffers are needed, tiles can be computed in any order, and results do not depend on the number of threads.
 //!
-//! Each law is written once in `f64`, for energies, for exact solvers and for the rest. Where it is one of strings, `strings` has the
-//! forces once more, side by side in `f32`; of the same stored numbers.
+//! Each law is implemented in `f64`, for energies, the exact solvers and all else. For axial terms `axial_terms`
+//! computes the forces in SIMD-friendly `f32` loops from the same stored numbers.
 
-mod arms;
+mod anchor_springs;
+mod axial_terms;
 mod bending;
-mod fibres;
-mod home;
+mod fibers;
 mod limit;
+mod maxwell_springs;
 mod nonlinear;
-mod parting;
-mod set;
+mod pieces;
+mod plastic_springs;
 mod stencil_term;
 mod stencils;
-mod strings;
 
 use std::fmt::Debug;
 use std::ops::Range;
@@ -26,133 +26,142 @@ use glam::{DMat3, DVec3};
 
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{Reader, Saved, Writer, saved, shape_with};
-use crate::def::{BodyDefinition, Carried, RelaxationStep, Spring, Viscosity};
+use crate::def::{BodyDefinition, NodalStiffness, RelaxationStep, Spring, Viscosity};
 use crate::simd::ChosenKernel;
-use crate::soa::{Masses, NodeOrder, Rates, Region, Scale, TileForces, Vectors, View, tile_count};
-use crate::springs::{SpringChange, Springs, rates_anywhere};
+use crate::soa::{FrequencyBound, NodalMasses, NodeOrder, Region, Scale, TileForces, Vectors, View, tile_count};
+use crate::springs::{SpringChange, Springs, spring_rates};
 use crate::threads::Team;
-use arms::Arms;
+use anchor_springs::AnchorSprings;
 use bending::Hinges;
-use fibres::Fibres;
-use home::Home;
-use limit::Limit;
-use nonlinear::Stiffening;
-pub(crate) use parting::Parting;
-use set::Sets;
+use fibers::Fibers;
+use limit::StrainLimit;
+use maxwell_springs::MaxwellSprings;
+use nonlinear::NonlinearSprings;
+pub(crate) use pieces::TermPieces;
+use plastic_springs::PlasticSprings;
 use stencils::{StencilLaw, Stencils};
 
-/// How much the force on one node of a term lessens with the place of another, N/m, for its first nodes.
+/// The negative derivatives of the force on each of a term's first four nodes by the position of each, N/m.
 pub(crate) type TangentBlocks = [[DMat3; 4]; 4];
 
-/// What is done to terms that remember.
+/// An event for terms with internal variables.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Event {
-    /// A step begins, from what is current.
-    Recall,
-    /// The step in progress is the current state.
-    Keep,
-    /// An equation is to be solved for the end of so many seconds.
-    Foresee(f64),
-    /// Nodes have come to other places.
-    Age,
+pub(crate) enum HistoryEvent {
+    /// A step begins: the committed state is restored.
+    Restore,
+    /// The step in progress becomes the committed state.
+    Commit,
+    /// An implicit equation is solved for the end of a step of this length, s.
+    Predict(f64),
+    /// The nodes have moved.
+    Advance,
 }
 
 /// The terms of a body that follow one law.
 pub(crate) trait Term: Debug + Send + Sync {
-    /// Writes which law it is, and its terms.
+    /// Writes the law's tag and its terms.
     fn save(&self, to: &mut Writer);
 
-    /// Adds the forces on the nodes of a tile, N: by how much they are stiffer than their rates say, 1: not at all.
+    /// Adds the forces on the nodes of a tile, N. Returns the largest ratio of stiffness to the stiffness that the rate
+    /// bounds assume, at least 1.
     fn add_forces(
         &self,
         kernel: ChosenKernel,
-        of: (usize, Range<usize>),
+        tile_and_nodes: (usize, Range<usize>),
         positions: View,
         forces: &mut TileForces,
     ) -> f64;
 
-    /// Adds how the forces on the nodes of a tile change, N, in the first order; nothing is pushed sideways.
-    fn add_changes(&self, kernel: ChosenKernel, of: (usize, Range<usize>), places: [View; 2], changes: &mut TileForces);
+    /// Adds the first-order changes of the forces on the nodes of a tile, N, with a positive semidefinite tangent.
+    fn add_force_changes(
+        &self,
+        kernel: ChosenKernel,
+        tile_and_nodes: (usize, Range<usize>),
+        vectors: [View; 2],
+        changes: &mut TileForces,
+    );
 
-    /// The energy of the terms that begin in a tile, J.
+    /// The energy of the terms whose first tile is this one, J.
     fn energy(&self, tile: usize, at: &dyn Fn(usize) -> DVec3) -> f64;
 
-    /// Shows the force on each node of each term, N.
-    fn show_forces(&self, at: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(usize, DVec3));
+    /// Calls `f` with each node of each term and the force on it, N.
+    fn visit_forces(&self, at: &dyn Fn(usize) -> DVec3, f: &mut dyn FnMut(usize, DVec3));
 
-    /// Shows how the energy of each term changes where nodes go so much further, J, to the last digits.
-    fn show_changes(&self, at: &dyn Fn(usize) -> DVec3, more: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(f64));
+    /// Calls `f` with the energy change of each term for these displacements, J, computed without cancellation.
+    fn visit_changes(&self, at: &dyn Fn(usize) -> DVec3, displacement: &dyn Fn(usize) -> DVec3, f: &mut dyn FnMut(f64));
 
-    /// Shows each term's nodes and blocks: all second derivatives, or what is positive semidefinite of them.
-    fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &TangentBlocks));
+    /// Calls `f` with the nodes and blocks of each term: the exact second derivatives or a positive semidefinite
+    /// approximation.
+    fn visit_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, f: &mut dyn FnMut(&[u32], &TangentBlocks));
 
-    /// Shows the nodes of each term and how stiff it is, those of no stiffness too.
-    fn show_nodes(&self, see: &mut dyn FnMut(&[u32], f32));
+    /// Calls `f` with the nodes and stiffness of each term, including terms of stiffness 0.
+    fn visit_nodes(&self, f: &mut dyn FnMut(&[u32], f32));
 
-    /// By how much the stiffest is stiffer with nodes at `positions` than its rate says, 1: not at all.
+    /// The largest ratio of stiffness with nodes at `positions` to the stiffness that the rate bounds assume, at
+    /// least 1.
     fn stiffening(&self, positions: &Vectors) -> f64;
 
-    /// Adds what bounds the squares of frequencies to each node, 1/s².
-    fn add_rates(&self, masses: &Masses, rates: &mut [f32]);
+    /// Adds a bound of the squared frequencies at each node, 1/s².
+    fn add_rates(&self, masses: &NodalMasses, rates: &mut [f32]);
 
-    /// Shows what each node carries of each term, N/m, where those that are not free go no way.
-    fn show_carried(&self, masses: &Masses, see: &mut dyn FnMut(usize, f32));
+    /// Calls `f` with the nodal stiffness of each term at each node, N/m. Nodes that are not free do not move.
+    fn visit_nodal_stiffness(&self, masses: &NodalMasses, f: &mut dyn FnMut(usize, f32));
 
-    /// Takes away what has an edge between two nodes: how many terms.
+    /// Removes the terms with an edge between two nodes. Returns their number.
     fn remove_edge(&mut self, a: u32, b: u32) -> usize;
 
-    /// The spring between two nodes has another stiffness and rest length.
+    /// Takes the new stiffness and rest length of a spring.
     fn set_spring(&mut self, _change: &SpringChange) {}
 
-    /// Makes room for the parts that so many more nodes bring, beside so many.
-    fn reserve_nodes(&mut self, node_count: usize, more: usize) -> Result<()>;
+    /// Reserves memory for the terms of `added_nodes` more nodes.
+    fn reserve_nodes(&mut self, node_count: usize, added_nodes: usize) -> Result<()>;
 
-    /// Finds what a cut leaves, in a body of so many nodes then, and makes room for it; until [`Self::take_parts`] or
-    /// [`Self::forget_parts`] what it adds is shown among its nodes.
-    fn prepare_parts(&mut self, parting: &Parting, node_count: usize) -> Result<()>;
+    /// Computes the terms after a cut, in a body with then `node_count` nodes, and reserves memory for them. Until
+    /// [`Self::apply_cut`] or [`Self::discard_cut`], `visit_nodes` includes the new terms.
+    fn prepare_cut(&mut self, pieces: &TermPieces, node_count: usize) -> Result<()>;
 
-    /// Becomes what a cut leaves.
-    fn take_parts(&mut self);
+    /// Applies the prepared cut.
+    fn apply_cut(&mut self);
 
-    /// There is no cut.
-    fn forget_parts(&mut self);
+    /// Discards the prepared cut.
+    fn discard_cut(&mut self);
 
-    /// Refuses to scale what would have a number that is none. Terms of springs go with those.
+    /// Returns an error if scaling gives a number that is not finite. Terms of springs are scaled with the springs.
     fn check_scale(&self, region: &Region, scale: Scale) -> Result<()>;
 
-    /// Scales the terms with all nodes in a region, which must not be refused: how many.
+    /// Scales the terms with all nodes in a region, after a successful check. Returns their number.
     fn scale(&mut self, region: &Region, scale: Scale) -> usize;
 
-    /// Nodes are given from here on.
+    /// Sets the origin that node positions are relative to.
     fn move_origin(&mut self, _origin: DVec3) {}
 
-    /// Whether they hold a node against the world.
-    fn holds(&self, _node: usize) -> bool {
+    /// True if a term anchors this node to the world.
+    fn anchors(&self, _node: usize) -> bool {
         false
     }
 
-    /// Whether they remember anything.
-    fn remembers(&self) -> bool;
+    /// True if the terms have internal variables.
+    fn has_history(&self) -> bool;
 
-    fn pass(&mut self, moment: Event);
+    fn apply_event(&mut self, event: HistoryEvent);
 
-    /// Nodes have come to `positions`, and what is viscous along this course.
-    fn age(&mut self, kernel: ChosenKernel, positions: View, course: RelaxationStep, team: &Team);
+    /// Advances the internal variables to `positions` by this relaxation.
+    fn advance(&mut self, kernel: ChosenKernel, positions: View, relaxation: RelaxationStep, team: &Team);
 
-    /// What may change of them.
+    /// Hashes the state that can change.
     fn hash(&self, hasher: &mut StateHasher);
 }
 
 impl Saved for Box<dyn Term> {
     const SHAPE: u64 = {
         let shape = 0;
-        let shape = shape_with(shape, Stencils::<Home, 1>::SHAPE);
-        let shape = shape_with(shape, Stencils::<Arms, 2>::SHAPE);
-        let shape = shape_with(shape, Stencils::<Limit, 2>::SHAPE);
-        let shape = shape_with(shape, Stencils::<Sets, 2>::SHAPE);
+        let shape = shape_with(shape, Stencils::<AnchorSprings, 1>::SHAPE);
+        let shape = shape_with(shape, Stencils::<MaxwellSprings, 2>::SHAPE);
+        let shape = shape_with(shape, Stencils::<StrainLimit, 2>::SHAPE);
+        let shape = shape_with(shape, Stencils::<PlasticSprings, 2>::SHAPE);
         let shape = shape_with(shape, Stencils::<Hinges, 4>::SHAPE);
-        let shape = shape_with(shape, Stencils::<Stiffening, 2>::SHAPE);
-        shape_with(shape, Stencils::<Fibres, 4>::SHAPE)
+        let shape = shape_with(shape, Stencils::<NonlinearSprings, 2>::SHAPE);
+        shape_with(shape, Stencils::<Fibers, 4>::SHAPE)
     };
     const LEAST: usize = 1;
 
@@ -163,13 +172,13 @@ impl Saved for Box<dyn Term> {
     fn load(from: &mut Reader) -> Result<Self> {
         let [law] = from.take_array()?;
         Ok(match law {
-            Home::SAVED_AS => memory::boxed(Stencils::<Home, 1>::load(from)?)?,
-            Arms::SAVED_AS => memory::boxed(Stencils::<Arms, 2>::load(from)?)?,
-            Limit::SAVED_AS => memory::boxed(Stencils::<Limit, 2>::load(from)?)?,
-            Sets::SAVED_AS => memory::boxed(Stencils::<Sets, 2>::load(from)?)?,
+            AnchorSprings::SAVED_AS => memory::boxed(Stencils::<AnchorSprings, 1>::load(from)?)?,
+            MaxwellSprings::SAVED_AS => memory::boxed(Stencils::<MaxwellSprings, 2>::load(from)?)?,
+            StrainLimit::SAVED_AS => memory::boxed(Stencils::<StrainLimit, 2>::load(from)?)?,
+            PlasticSprings::SAVED_AS => memory::boxed(Stencils::<PlasticSprings, 2>::load(from)?)?,
             Hinges::SAVED_AS => memory::boxed(Stencils::<Hinges, 4>::load(from)?)?,
-            Stiffening::SAVED_AS => memory::boxed(Stencils::<Stiffening, 2>::load(from)?)?,
-            Fibres::SAVED_AS => memory::boxed(Stencils::<Fibres, 4>::load(from)?)?,
+            NonlinearSprings::SAVED_AS => memory::boxed(Stencils::<NonlinearSprings, 2>::load(from)?)?,
+            Fibers::SAVED_AS => memory::boxed(Stencils::<Fibers, 4>::load(from)?)?,
             _ => return Err(from.refusal("no law of terms")),
         })
     }
@@ -179,43 +188,43 @@ impl Saved for Box<dyn Term> {
 #[derive(Debug)]
 pub(crate) struct Terms {
     laws: Vec<Box<dyn Term>>,
-    /// Whether any node is held against the world.
-    pub holds_any: bool,
-    /// Of the springs, where they have arms.
+    /// True if any node is anchored to the world.
+    pub anchors_any: bool,
+    /// The viscosity of the springs, if they have Maxwell branches.
     viscosity: Viscosity,
     kernel: ChosenKernel,
-    /// Room for a number per node.
+    /// Working memory with a number per node.
     sums: Vec<f32>,
-    /// What bounds their frequencies, with that of the springs where they were given.
-    rates: Rates,
-    rates_known: bool,
-    /// By how much terms are stiffer than that, where forces were last worked out: the bits of an `f32` from 1 on, whose order is
-    /// that of the numbers.
+    /// The frequency bound of the terms, including the springs that were passed.
+    rates: FrequencyBound,
+    rates_valid: bool,
+    /// The ratio of the terms' stiffness to the one that the bound assumes, from the last force evaluation. It is
+    /// stored as the bits of an `f32` of at least 1; their order is that of the numbers.
     stiffening: AtomicU32,
-    /// The same at the current state.
-    settled: f32,
+    /// That ratio at the current state.
+    committed_stiffening: f32,
 }
 
-saved! { Terms { laws, holds_any, viscosity, kernel, sums, rates, rates_known, stiffening, settled } }
+saved! { Terms { laws, anchors_any, viscosity, kernel, sums, rates, rates_valid, stiffening, committed_stiffening } }
 
 impl Terms {
-    /// Those that a definition asks for; `springs` are its springs. `None`: it asks for none.
+    /// Creates the terms of a definition for its `springs`. `None`: there are no terms.
     pub fn new(
         kernel: ChosenKernel,
         definition: &BodyDefinition,
         springs: &[Spring],
         order: &NodeOrder,
     ) -> Result<Option<Box<Self>>> {
-        let made = [
-            home::new(definition, order)?,
-            arms::new(definition, springs, order)?,
+        let candidates = [
+            anchor_springs::new(definition, order)?,
+            maxwell_springs::new(definition, springs, order)?,
             limit::new(definition, springs, order)?,
-            set::new(definition, springs, order)?,
+            plastic_springs::new(definition, springs, order)?,
             bending::new(definition, order)?,
             nonlinear::new(definition, springs, order)?,
-            fibres::new(definition, order)?,
+            fibers::new(definition, order)?,
         ];
-        let laws = memory::collected_within(made.len(), made.into_iter().flatten())?;
+        let laws = memory::collected_within(candidates.len(), candidates.into_iter().flatten())?;
         if laws.is_empty() {
             return Ok(None);
         }
@@ -228,22 +237,22 @@ impl Terms {
                 Viscosity::default()
             },
             kernel,
-            holds_any: nodes.any(|node| laws.iter().any(|law| law.holds(node))),
+            anchors_any: nodes.any(|node| laws.iter().any(|law| law.anchors(node))),
             laws,
             sums: memory::filled(0.0, definition.positions.len())?,
-            rates: Rates::ZERO,
-            rates_known: false,
+            rates: FrequencyBound::ZERO,
+            rates_valid: false,
             stiffening: AtomicU32::new(1.0_f32.to_bits()),
-            settled: 1.0,
+            committed_stiffening: 1.0,
         })?))
     }
 
-    /// Those of each law.
+    /// The terms of each law.
     pub fn laws(&self) -> impl Iterator<Item = &dyn Term> {
         self.laws.iter().map(|law| &**law)
     }
 
-    /// The same, to be changed.
+    /// The terms of each law, mutable.
     pub fn laws_mut(&mut self) -> impl Iterator<Item = &mut Box<dyn Term>> {
         self.laws.iter_mut()
     }
@@ -258,119 +267,126 @@ impl Terms {
         }
     }
 
-    /// Adds how the forces on the nodes of a tile change with nodes at the first of `places` that go the ways of the second, N.
-    pub fn add_changes(&self, tile: usize, nodes: Range<usize>, places: [View; 2], changes: &mut TileForces) {
+    /// Adds the changes of the forces on the nodes of a tile, N. `vectors` are the positions and displacements of
+    /// nodes.
+    pub fn add_force_changes(&self, tile: usize, nodes: Range<usize>, vectors: [View; 2], changes: &mut TileForces) {
         for law in &self.laws {
-            law.add_changes(self.kernel, (tile, nodes.clone()), places, changes);
+            law.add_force_changes(self.kernel, (tile, nodes.clone()), vectors, changes);
         }
     }
 
-    /// The energy of the terms that begin in a tile, J.
+    /// The energy of the terms whose first tile is this one, J.
     pub fn energy_of_tile(&self, tile: usize, at: &dyn Fn(usize) -> DVec3) -> f64 {
         self.laws.iter().map(|law| law.energy(tile, at)).sum()
     }
 
-    /// The energy of all, J.
+    /// The energy of all terms, J.
     pub fn energy(&self, at: &dyn Fn(usize) -> DVec3) -> f64 {
         (0..tile_count(self.sums.len()))
             .map(|tile| self.energy_of_tile(tile, at))
             .sum()
     }
 
-    /// Makes room for so many nodes in all.
+    /// Reserves memory for this total number of nodes.
     pub fn reserve_nodes(&mut self, count: usize) -> Result<()> {
-        let known = self.sums.len();
+        let old_count = self.sums.len();
         memory::reserve(&mut self.sums, count)?;
-        let more = count.saturating_sub(known);
-        self.laws.iter_mut().try_for_each(|law| law.reserve_nodes(known, more))
+        let added_nodes = count.saturating_sub(old_count);
+        self.laws
+            .iter_mut()
+            .try_for_each(|law| law.reserve_nodes(old_count, added_nodes))
     }
 
-    /// Finds what a cut leaves, in a body of so many nodes then, and makes room for it.
-    pub fn prepare_parts(&mut self, parting: &Parting, node_count: usize) -> Result<()> {
+    /// Computes the terms after a cut, in a body with then `node_count` nodes, and reserves memory for them.
+    pub fn prepare_cut(&mut self, pieces: &TermPieces, node_count: usize) -> Result<()> {
         memory::reserve(&mut self.sums, node_count)?;
         self.laws
             .iter_mut()
-            .try_for_each(|law| law.prepare_parts(parting, node_count))
+            .try_for_each(|law| law.prepare_cut(pieces, node_count))
     }
 
-    /// They are what a cut leaves, in a body of so many nodes.
-    pub fn take_parts(&mut self, node_count: usize) {
+    /// Applies the prepared cut in a body with now `node_count` nodes.
+    pub fn apply_cut(&mut self, node_count: usize) {
         self.sums.resize(node_count, 0.0);
-        self.laws.iter_mut().for_each(|law| law.take_parts());
+        self.laws.iter_mut().for_each(|law| law.apply_cut());
         self.forget_rates();
     }
 
-    /// Scales the terms with all nodes in a region, which must not be refused: how many.
+    /// Scales the terms with all nodes in a region, after a successful check. Returns their number.
     pub fn scale(&mut self, region: &Region, scale: Scale) -> usize {
         let count = self.laws.iter_mut().map(|law| law.scale(region, scale)).sum();
-        if scale.stiffness == 0.0 && self.holds_any {
+        if scale.stiffness == 0.0 && self.anchors_any {
             let laws = &self.laws;
-            self.holds_any = (0..self.sums.len()).any(|node| laws.iter().any(|law| law.holds(node)));
+            self.anchors_any = (0..self.sums.len()).any(|node| laws.iter().any(|law| law.anchors(node)));
         }
         count
     }
 
-    /// Masses, pins or springs have changed.
+    /// Invalidates the frequency bound after masses, pins or springs have changed.
     pub fn forget_rates(&mut self) {
-        self.rates_known = false;
+        self.rates_valid = false;
     }
 
-    /// Makes the bound on frequencies that of these masses and springs, which some terms make stiffer.
-    pub fn find_rates(&mut self, springs: &dyn Springs, masses: &Masses) {
-        if self.rates_known {
+    /// Updates the frequency bound for these masses and springs. Terms add stiffness to the springs.
+    pub fn find_rates(&mut self, springs: &dyn Springs, masses: &NodalMasses) {
+        if self.rates_valid {
             return;
         }
         self.sums.fill(0.0);
         for law in &self.laws {
-            if masses.are_heavier {
-                law.show_carried(masses, &mut |node, stiffness| {
+            if masses.are_scaled {
+                law.visit_nodal_stiffness(masses, &mut |node, stiffness| {
                     self.sums[node] += stiffness * masses.inverse(node);
                 });
             } else {
                 law.add_rates(masses, &mut self.sums);
             }
         }
-        let mut most = Rates::ZERO;
+        let mut max_rates = FrequencyBound::ZERO;
         for (node, &sum) in self.sums.iter().enumerate() {
-            let of_springs = rates_anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
-            most.stiffest = most.stiffest.max(sum + of_springs.stiffest);
-            most.most_damped = most.most_damped.max(of_springs.most_damped);
+            let spring_bound = spring_rates(node, springs, masses).unwrap_or(FrequencyBound::ZERO);
+            max_rates.omega_sq = max_rates.omega_sq.max(sum + spring_bound.omega_sq);
+            max_rates.damping_rate = max_rates.damping_rate.max(spring_bound.damping_rate);
         }
-        self.rates = most;
-        self.rates_known = true;
+        self.rates = max_rates;
+        self.rates_valid = true;
     }
 
-    /// Adds what the nodes that are free carry.
-    pub fn add_to(&self, masses: &Masses, all: &mut [Carried]) {
+    /// Adds the nodal stiffness of free nodes.
+    pub fn add_to(&self, masses: &NodalMasses, all: &mut [NodalStiffness]) {
         for law in &self.laws {
-            law.show_carried(masses, &mut |node, stiffness| all[node].add(stiffness, self.viscosity));
+            law.visit_nodal_stiffness(masses, &mut |node, stiffness| all[node].add(stiffness, self.viscosity));
         }
     }
 
-    /// Forces are about to be worked out for other positions.
-    pub fn begin(&mut self) {
+    /// Resets the stiffness ratio before a force evaluation at other positions.
+    pub fn reset_stiffening(&mut self) {
         *self.stiffening.get_mut() = 1.0_f32.to_bits();
     }
 
-    /// Makes what bounds frequencies that of nodes at `positions`, which is the current state.
-    pub fn settle_at(&mut self, positions: &Vectors) {
+    /// Computes the stiffness ratio with nodes at `positions` and makes it the current one.
+    pub fn commit_stiffening_at(&mut self, positions: &Vectors) {
         let stiffest = self.laws.iter().map(|law| law.stiffening(positions));
         let stiffest = stiffest.fold(1.0, f64::max) as f32;
         *self.stiffening.get_mut() = stiffest.to_bits();
-        self.settled = stiffest;
+        self.committed_stiffening = stiffest;
     }
 
-    /// Where forces were worked out last is the current state.
-    pub fn settle(&mut self) {
-        self.settled = f32::from_bits(*self.stiffening.get_mut());
+    /// Makes the stiffness ratio of the last force evaluation the current one.
+    pub fn commit_stiffening(&mut self) {
+        self.committed_stiffening = f32::from_bits(*self.stiffening.get_mut());
     }
 
-    /// What bounds frequencies with the nodes at the current state, where `is_settled`, or where forces were last worked out.
-    pub fn rates(&self, is_settled: bool) -> Rates {
-        let newest = || f32::from_bits(self.stiffening.load(Ordering::Relaxed));
-        let stiffening = if is_settled { self.settled } else { newest() };
-        let rates = Rates {
-            stiffest: self.rates.stiffest * stiffening,
+    /// The frequency bound at the current state if `at_committed`, otherwise at the last force evaluation.
+    pub fn rates(&self, at_committed: bool) -> FrequencyBound {
+        let latest = || f32::from_bits(self.stiffening.load(Ordering::Relaxed));
+        let stiffening = if at_committed {
+            self.committed_stiffening
+        } else {
+            latest()
+        };
+        let rates = FrequencyBound {
+            omega_sq: self.rates.omega_sq * stiffening,
             ..self.rates
         };
         if self.viscosity.is_none() {
@@ -380,11 +396,11 @@ impl Terms {
         }
     }
 
-    /// Nodes have come to `positions`, and what is viscous along this course.
-    pub fn age(&mut self, positions: &Vectors, course: impl Fn(Viscosity) -> RelaxationStep, team: &Team) {
-        let (kernel, course) = (self.kernel, course(self.viscosity));
+    /// Advances the internal variables to `positions` by this relaxation.
+    pub fn advance(&mut self, positions: &Vectors, relaxation: impl Fn(Viscosity) -> RelaxationStep, team: &Team) {
+        let (kernel, relaxation) = (self.kernel, relaxation(self.viscosity));
         for law in &mut self.laws {
-            law.age(kernel, positions.view(), course, team);
+            law.advance(kernel, positions.view(), relaxation, team);
         }
     }
 }

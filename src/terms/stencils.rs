@@ -1,99 +1,106 @@
-//! Terms of a few nodes each, kept by the tiles that have one of their nodes.
+//! Terms of a few nodes each, indexed by the tiles that contain one of their nodes.
 
 use std::fmt::Debug;
 use std::ops::Range;
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::parting::Parting;
-use super::strings::{OfTile, Tension};
-use super::{Event, Term};
+use super::axial_terms::{AxialResponse, TileAxialTerms};
+use super::pieces::TermPieces;
+use super::{HistoryEvent, Term};
 use crate::base::{Result, StateHasher, memory, outer};
 use crate::codec::{Saved, saved};
 use crate::def::{RelaxationStep, Spring};
 use crate::soa::{NodeOrder, Region, Scale, TILE, TileForces, View, tile_count};
 
-/// What a term does whose stiffness is 1.
+/// The law of a term with unit stiffness.
 pub(super) trait StencilLaw<const N: usize>: Saved + Debug + Send + Sync + 'static {
-    /// Which law it is, in bytes.
+    /// The tag of this law in snapshots.
     const SAVED_AS: u8;
 
-    /// What the term of some nodes is at rest.
+    /// The rest shape of a term.
     type Shape: Saved + Copy + Debug + Send + Sync;
 
-    fn energy(&self, shape: &Self::Shape, places: &[DVec3; N]) -> f64;
+    fn energy(&self, shape: &Self::Shape, positions: &[DVec3; N]) -> f64;
 
-    /// How the energy changes where nodes go these ways, to the last digits of the change.
-    fn change(&self, shape: &Self::Shape, places: &[DVec3; N], ways: &[DVec3; N]) -> f64;
+    /// The energy change for these displacements, computed without cancellation.
+    fn energy_change(&self, shape: &Self::Shape, positions: &[DVec3; N], displacements: &[DVec3; N]) -> f64;
 
-    /// The same of what acts on top of it, which may cancel it.
-    fn change_of_load(&self, _shape: &Self::Shape, _places: &[DVec3; N], _ways: &[DVec3; N]) -> f64 {
+    /// The energy change of an additional load, which may cancel the first.
+    fn load_energy_change(&self, _shape: &Self::Shape, _positions: &[DVec3; N], _displacements: &[DVec3; N]) -> f64 {
         0.0
     }
 
     /// The force on each node.
-    fn forces(&self, shape: &Self::Shape, places: &[DVec3; N]) -> [DVec3; N];
+    fn forces(&self, shape: &Self::Shape, positions: &[DVec3; N]) -> [DVec3; N];
 
-    /// How the forces change where nodes go these ways, in the first order, by the blocks that are positive semidefinite.
-    fn changes(&self, shape: &Self::Shape, places: &[DVec3; N], ways: &[DVec3; N]) -> [DVec3; N] {
-        let blocks = self.blocks(shape, places, false);
-        blocks.map(|row| -row.iter().zip(ways).map(|(&block, &way)| block * way).sum::<DVec3>())
+    /// The first-order force changes for these displacements, by the positive semidefinite blocks.
+    fn force_changes(&self, shape: &Self::Shape, positions: &[DVec3; N], displacements: &[DVec3; N]) -> [DVec3; N] {
+        let blocks = self.blocks(shape, positions, false);
+        blocks.map(|row| {
+            -row.iter()
+                .zip(displacements)
+                .map(|(&block, &displacement)| block * displacement)
+                .sum::<DVec3>()
+        })
     }
 
-    /// How much the force on each node lessens with the place of each: exactly, or what is positive semidefinite of it.
-    fn blocks(&self, shape: &Self::Shape, places: &[DVec3; N], is_exact: bool) -> [[DMat3; N]; N];
+    /// The negative derivatives of each node's force by each position: exact, or a positive semidefinite approximation.
+    fn blocks(&self, shape: &Self::Shape, positions: &[DVec3; N], is_exact: bool) -> [[DMat3; N]; N];
 
-    /// What bounds the squares of frequencies as long as it does not stiffen, beyond what springs of its terms have.
-    fn rate(&self, _shape: &Self::Shape, _inverse_masses: [f64; N]) -> f64 {
+    /// A bound of the squared frequency without stiffening, in addition to that of the springs of the terms.
+    fn rate_bound(&self, _shape: &Self::Shape, _inverse_masses: [f64; N]) -> f64 {
         0.0
     }
 
-    /// By how much it is stiffer than that, 1: not at all.
-    fn stiffening(&self, _shape: &Self::Shape, _places: &[DVec3; N]) -> f64 {
+    /// The ratio of the stiffness to the one that the rate assumes, at least 1.
+    fn stiffening(&self, _shape: &Self::Shape, _positions: &[DVec3; N]) -> f64 {
         1.0
     }
 
-    /// Whether two of its nodes have an edge.
+    /// True if two of its nodes have an edge.
     fn is_edge(&self, _a: usize, _b: usize) -> bool {
         N > 1
     }
 
-    /// Whether its terms are springs': they go with those, and are not scaled by themselves.
-    const IS_OF_SPRINGS: bool = false;
+    /// True if its terms belong to springs, which are cut and scaled with the springs.
+    const BELONGS_TO_SPRINGS: bool = false;
 
-    /// What it is where everything is so many times as long at rest, and how many times as stiff it is then.
+    /// The shape if all rest lengths are multiplied by `length`, and the factor of its stiffness.
     fn scaled(&self, shape: &Self::Shape, _length: f64) -> (Self::Shape, f64) {
         (*shape, 1.0)
     }
 
-    /// Whether what it is at rest is a number.
+    /// True if the rest shape is finite.
     fn is_finite(&self, _shape: &Self::Shape) -> bool {
         true
     }
 
-    /// What changes of it as it is scaled or its spring is given another rest length.
+    /// The number that scaling or a new rest length changes, for hashing.
     fn size(&self, _shape: &Self::Shape) -> f32 {
         0.0
     }
 
-    /// What the term of a spring becomes with this rest length, where its terms are springs'; `None`: it has none.
-    fn shape_of_spring(&self, _before: &Self::Shape, _rest_length: f32) -> Option<Self::Shape> {
+    /// The shape of a spring's term with this rest length. `None`: the spring has no term.
+    fn shape_with_rest_length(&self, _before: &Self::Shape, _rest_length: f32) -> Option<Self::Shape> {
         None
     }
 
-    /// Shows the nodes of all parts of a term that a cut leaves, and what part of its stiffness each has. Springs' are known.
-    fn show_parts(&self, _shape: &Self::Shape, nodes: [u32; N], _parting: &Parting, see: &mut SeePart<N>) {
-        see(nodes, 1.0);
+    /// Calls `f` with the nodes and stiffness share of each piece of a term after a cut. Terms of springs do not use
+    /// it.
+    fn visit_pieces(&self, _shape: &Self::Shape, nodes: [u32; N], _pieces: &TermPieces, f: &mut PieceVisitor<N>) {
+        f(nodes, 1.0);
     }
 
-    /// Nodes are given from here on.
+    /// Sets the origin that node positions are relative to.
     fn move_origin(&self, _shape: &mut Self::Shape, _origin: DVec3) {}
 
-    /// Whether it is a string: it pulls along one vector, the sum of what its nodes have, weighted by numbers that add up to 0. What
-    /// follows is for those, to be worked out side by side in `f32`, and marked `#[inline(always)]`.
-    const IS_STRING: bool = Self::IS_OF_SPRINGS;
+    /// True if it is an axial term: it pulls along one vector, a sum of its nodes' positions with weights that add up
+    /// to 0. The following functions are for axial terms. They run in SIMD-friendly `f32` loops and must be
+    /// `#[inline(always)]`.
+    const IS_AXIAL: bool = Self::BELONGS_TO_SPRINGS;
 
-    /// Those of a spring, unless it says otherwise.
+    /// The weights of the nodes; by default those of a spring.
     #[inline(always)]
     fn weights(_shape: &Self::Shape) -> [f32; N] {
         let mut weights = [0.0; N];
@@ -101,87 +108,88 @@ pub(super) trait StencilLaw<const N: usize>: Saved + Debug + Send + Sync + 'stat
         weights
     }
 
-    /// What of a shape counts beside its length.
-    fn numbers(_shape: &Self::Shape) -> [f32; 2] {
+    /// The parameters of a shape that the response depends on.
+    fn parameters(_shape: &Self::Shape) -> [f32; 2] {
         [0.0; 2]
     }
 
-    fn tension(&self, _numbers: [f32; 2], _length: f32) -> Tension {
-        Tension::default()
+    fn response(&self, _parameters: [f32; 2], _length: f32) -> AxialResponse {
+        AxialResponse::default()
     }
 
-    /// What a string that remembers has to know of its length, m.
-    fn elastic(&self, _numbers: [f32; 2], length: f32) -> f32 {
+    /// The elastic elongation that the internal variables depend on, m.
+    fn elastic(&self, _parameters: [f32; 2], length: f32) -> f32 {
         length
     }
 
-    /// Whether terms remember anything; what follows is for those, which are strings.
-    const REMEMBERS: bool = false;
+    /// True if terms have internal variables. The following functions are for these, which are axial.
+    const HAS_HISTORY: bool = false;
 
-    /// Something is about to be done to all terms.
-    fn begin(&mut self, _moment: Event) {}
+    /// Prepares the law for an event that all terms receive.
+    fn begin_event(&mut self, _event: HistoryEvent) {}
 
-    fn pass(&self, _moment: Event, _shape: &mut Self::Shape) {}
+    fn apply_event(&self, _event: HistoryEvent, _shape: &mut Self::Shape) {}
 
-    /// Nodes have come to where this is elastic of it, m.
-    fn age(&self, _shape: &mut Self::Shape, _elastic: f32, _course: RelaxationStep) {}
+    /// Advances the internal variables to this elastic elongation, m.
+    fn advance(&self, _shape: &mut Self::Shape, _elastic: f32, _relaxation: RelaxationStep) {}
 
     fn hash(&self, _shape: &Self::Shape, _hasher: &mut StateHasher) {}
 }
 
-/// What is shown the nodes of a part of a term, and its part of the stiffness.
-pub(super) type SeePart<'a, const N: usize> = dyn FnMut([u32; N], f64) + 'a;
+/// Receives the nodes of a piece of a term and its share of the stiffness.
+pub(super) type PieceVisitor<'a, const N: usize> = dyn FnMut([u32; N], f64) + 'a;
 
-/// A term: some nodes, how stiff it is, and what it is at rest.
+/// A term: its nodes, stiffness and rest shape.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stencil<T, const N: usize> {
     pub nodes: [u32; N],
-    /// 0: it does nothing; below 0: it was taken away.
+    /// 0: it is inactive. Below 0: it was removed.
     pub stiffness: f32,
     pub shape: T,
 }
 
 saved! { [T: Saved, const N: usize] Stencil<T, N> { nodes, stiffness, shape } }
 
-/// A term for each spring, with the shape that its rest length leads to; one without a length at rest has no strain, and nothing that goes
-/// by that.
-pub(super) fn of_springs<T>(
+/// Creates a term per spring, with a shape from its rest length. With `needs_strain`, a spring of rest length 0 gets an
+/// inactive term, because its strain is undefined.
+pub(super) fn spring_stencils<T>(
     springs: &[Spring],
     order: &NodeOrder,
-    goes_by_strain: bool,
+    needs_strain: bool,
     shape: impl Fn(f32) -> T,
 ) -> Result<Vec<Stencil<T, 2>>> {
     memory::collected(springs.iter().map(|spring| {
         let mut nodes = spring.nodes.map(|node| order.own(node));
         nodes.sort_unstable();
-        let is_there = spring.rest_length > 0.0 || !goes_by_strain;
+        let is_active = spring.rest_length > 0.0 || !needs_strain;
         Stencil {
             nodes,
-            stiffness: if is_there { spring.stiffness } else { 0.0 },
+            stiffness: if is_active { spring.stiffness } else { 0.0 },
             shape: shape(spring.rest_length),
         }
     }))
 }
 
-/// Terms of one law.
+/// The terms of one law.
 #[derive(Debug)]
 pub(super) struct Stencils<L: StencilLaw<N>, const N: usize> {
     pub(super) law: L,
-    /// By the first of their tiles, but for those of cuts, which follow them.
+    /// Sorted by nodes, and so by first tile. Terms created by cuts follow.
     pub(super) all: Vec<Stencil<L::Shape, N>>,
-    /// Where the terms of each tile begin among those that begin in it, and those that only end in it.
+    /// The start of each tile's range in `all`, for the terms whose first tile it is, and in `visitors`, for others
+    /// with a node in it.
     pub(super) starts: Vec<usize>,
     pub(super) visitor_starts: Vec<usize>,
     pub(super) visitors: Vec<u32>,
-    /// Those that cuts have added, by all tiles that have a node of them; of no tiles before a cut.
-    pub(super) later: Vec<Vec<u32>>,
-    /// What a cut is to do: stiffnesses of terms there are, and others.
+    /// The terms created by cuts, for each tile with one of their nodes. Empty before the first cut.
+    pub(super) cut_terms: Vec<Vec<u32>>,
+    /// The prepared cut: new stiffnesses of existing terms, and new terms.
     pub(super) changed: Vec<(u32, f32)>,
     pub(super) added: Vec<Stencil<L::Shape, N>>,
 }
 
 saved! { [L: StencilLaw<N>, const N: usize] Stencils<L, N> {
-    law, all, starts, visitor_starts, visitors, later, changed, added,
+    law, all, starts, visitor_starts, visitors, cut_terms, changed, added,
 } }
 
 pub(super) fn tile_of(node: u32) -> usize {
@@ -189,7 +197,7 @@ pub(super) fn tile_of(node: u32) -> usize {
 }
 
 impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
-    /// A term of these, for a body to have.
+    /// Creates the terms as a boxed `Term`.
     pub fn boxed(law: L, all: Vec<Stencil<L::Shape, N>>, node_count: usize) -> Result<Option<Box<dyn Term>>> {
         Ok(Some(memory::boxed(Self::new(law, all, node_count)?)?))
     }
@@ -231,80 +239,80 @@ impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
             starts,
             visitor_starts,
             visitors,
-            later: Vec::new(),
+            cut_terms: Vec::new(),
             changed: Vec::new(),
             added: Vec::new(),
         })
     }
 
-    /// Those of the first that begin in a tile.
-    pub(super) fn first(&self, tile: usize) -> Range<usize> {
-        stretch(&self.starts, tile)
+    /// The terms that existed before cuts and whose first tile is this one.
+    pub(super) fn initial(&self, tile: usize) -> Range<usize> {
+        range_of(&self.starts, tile)
     }
 
-    /// The places among visitors of those of the first that only end in it.
+    /// The range in `visitors` of the other terms from before cuts with a node in this tile.
     pub(super) fn visitors(&self, tile: usize) -> Range<usize> {
-        stretch(&self.visitor_starts, tile)
+        range_of(&self.visitor_starts, tile)
     }
 
-    /// Those of cuts that have a node of it.
-    pub(super) fn later(&self, tile: usize) -> &[u32] {
-        self.later.get(tile).map_or(&[], |later| later)
+    /// The terms created by cuts with a node in this tile.
+    pub(super) fn cut_terms(&self, tile: usize) -> &[u32] {
+        self.cut_terms.get(tile).map_or(&[], |cut_terms| cut_terms)
     }
 
-    /// Those that begin in a tile.
-    pub(super) fn beginning(&self, tile: usize) -> impl Iterator<Item = usize> {
+    /// The terms whose first tile is this one.
+    pub(super) fn owned(&self, tile: usize) -> impl Iterator<Item = usize> {
         let begins = move |index: &usize| self.all[*index].first_tile() == tile;
-        let later = self.later(tile).iter().map(|&index| index as usize);
-        self.first(tile).chain(later.filter(begins))
+        let cut_terms = self.cut_terms(tile).iter().map(|&index| index as usize);
+        self.initial(tile).chain(cut_terms.filter(begins))
     }
 
-    /// All that have a node of a tile.
-    pub(super) fn of_tile(&self, tile: usize) -> impl Iterator<Item = usize> {
-        let others = self.visitors[self.visitors(tile)].iter().chain(self.later(tile));
-        self.first(tile).chain(others.map(|&index| index as usize))
+    /// All terms with a node in a tile.
+    pub(super) fn touching(&self, tile: usize) -> impl Iterator<Item = usize> {
+        let others = self.visitors[self.visitors(tile)].iter().chain(self.cut_terms(tile));
+        self.initial(tile).chain(others.map(|&index| index as usize))
     }
 
-    /// The one between these nodes, in order, where there is one.
+    /// The term of these sorted nodes, if there is one.
     pub(super) fn find(&self, nodes: &[u32]) -> Option<usize> {
-        let later = self.later(tile_of(nodes[0])).iter().map(|&index| index as usize);
+        let cut_terms = self.cut_terms(tile_of(nodes[0])).iter().map(|&index| index as usize);
         let is_it = |index: &usize| self.all[*index].nodes == nodes && self.all[*index].stiffness >= 0.0;
         let first = &self.all[..self.starts.last().copied().unwrap_or(0)];
         let first = first.binary_search_by(|stencil| stencil.nodes[..].cmp(nodes));
-        first.ok().into_iter().chain(later).find(is_it)
+        first.ok().into_iter().chain(cut_terms).find(is_it)
     }
 
-    pub(super) fn strings<'a>(
+    pub(super) fn tile_axial_terms<'a>(
         &'a self,
         (tile, nodes): (usize, Range<usize>),
         positions: View<'a>,
-        ways: Option<View<'a>>,
+        displacements: Option<View<'a>>,
         sums: &'a mut TileForces,
-    ) -> OfTile<'a, L, N> {
-        OfTile {
+    ) -> TileAxialTerms<'a, L, N> {
+        TileAxialTerms {
             law: &self.law,
             all: &self.all,
-            beginning: self.first(tile),
+            owned: self.initial(tile),
             visitors: &self.visitors[self.visitors(tile)],
-            later: self.later(tile),
+            cut_terms: self.cut_terms(tile),
             nodes,
             positions,
-            ways,
+            displacements,
             sums,
         }
     }
 
-    pub(super) fn there(&self) -> impl Iterator<Item = &Stencil<L::Shape, N>> {
+    pub(super) fn active(&self) -> impl Iterator<Item = &Stencil<L::Shape, N>> {
         self.all.iter().filter(|stencil| stencil.stiffness > 0.0)
     }
 }
 
 impl<L: StencilLaw<N>, const N: usize> Stencils<L, N> {
-    /// Where the terms are that a region has all nodes of.
+    /// The indices of terms with all nodes in a region.
     pub(super) fn within(&self, region: &Region) -> impl Iterator<Item = usize> {
-        let tiles = region.tiles().filter(|_| !L::IS_OF_SPRINGS);
+        let tiles = region.tiles().filter(|_| !L::BELONGS_TO_SPRINGS);
         tiles
-            .flat_map(|tile| self.beginning(tile))
+            .flat_map(|tile| self.owned(tile))
             .filter(|&index| self.all[index].stiffness > 0.0 && region.has_all(&self.all[index].nodes))
     }
 
@@ -326,7 +334,7 @@ impl<T, const N: usize> Stencil<T, N> {
     }
 
     #[inline(always)]
-    pub(super) fn seen(&self, vectors: &View) -> [DVec3; N] {
+    pub(super) fn vectors_in(&self, vectors: &View) -> [DVec3; N] {
         self.nodes.map(|node| vectors.get(node as usize).as_dvec3())
     }
 
@@ -335,54 +343,58 @@ impl<T, const N: usize> Stencil<T, N> {
         self.nodes.map(|node| at(node as usize))
     }
 
-    /// Adds what its nodes of a tile are given by a stiffness of 1.
+    /// Adds its stiffness times `vectors` to the sums of its nodes in a tile.
     #[inline(always)]
-    pub(super) fn give(&self, nodes: &Range<usize>, gifts: &[DVec3; N], sums: &mut TileForces) {
-        for (&node, &gift) in self.nodes.iter().zip(gifts) {
-            let place = (node as usize).wrapping_sub(nodes.start);
-            if place < nodes.len() {
-                let more: Vec3 = (gift * f64::from(self.stiffness)).as_vec3();
-                sums.set(place, sums.get(place) + more);
+    pub(super) fn scatter(&self, nodes: &Range<usize>, vectors: &[DVec3; N], sums: &mut TileForces) {
+        for (&node, &vector) in self.nodes.iter().zip(vectors) {
+            let index = (node as usize).wrapping_sub(nodes.start);
+            if index < nodes.len() {
+                let contribution: Vec3 = (vector * f64::from(self.stiffness)).as_vec3();
+                sums.set(index, sums.get(index) + contribution);
             }
         }
     }
 }
 
-/// What a sum of places weighted by numbers that add up to 0 is, given the numbers of all but the first.
+/// The weighted sum of positions, where weights add up to 0 and the first is omitted.
 #[inline(always)]
 pub(super) fn weighted(weights: &[f32; 3], [first, others @ ..]: &[DVec3; 4]) -> DVec3 {
     let terms = weights.iter().zip(others);
     terms
-        .map(|(&weight, &place)| (place - *first) * f64::from(weight))
+        .map(|(&weight, &position)| (position - *first) * f64::from(weight))
         .sum()
 }
 
-/// The share that each place has in such a sum.
+/// The weights of all positions in such a sum.
 #[inline(always)]
 pub(super) fn shares(weights: &[f32; 3]) -> [f64; 4] {
     let [a, b, c] = weights.map(f64::from);
     [-(a + b + c), a, b, c]
 }
 
-/// How much longer a way becomes by more, to the last digits of that; 0 where both lengths are.
-pub(super) fn lengthening(way: DVec3, more: DVec3) -> f64 {
-    let then = way + more;
-    let both = way.length() + then.length();
-    if both > 0.0 { more.dot(way + then) / both } else { 0.0 }
+/// The change of a vector's length if `change` is added, without cancellation; 0 if both lengths are 0.
+pub(super) fn lengthening(offset: DVec3, change: DVec3) -> f64 {
+    let then = offset + change;
+    let both = offset.length() + then.length();
+    if both > 0.0 {
+        change.dot(offset + then) / both
+    } else {
+        0.0
+    }
 }
 
-/// Where a way points. Where it has no length, its nodes being in one place, it points along x, from the node with the lower number.
-pub(super) fn direction(way: DVec3) -> DVec3 {
-    let length = way.length();
-    if length > 0.0 { way / length } else { DVec3::X }
+/// The direction of a vector. A zero vector, of coincident nodes, points along x from the lower node index.
+pub(super) fn direction(offset: DVec3) -> DVec3 {
+    let length = offset.length();
+    if length > 0.0 { offset / length } else { DVec3::X }
 }
 
-/// The matrix that has `along` in a direction, and `across` at right angles to it.
-pub(super) fn directed(direction: DVec3, along: f64, across: f64) -> DMat3 {
+/// The matrix with the eigenvalue `along` in a direction and `across` perpendicular to it.
+pub(super) fn axial_matrix(direction: DVec3, along: f64, across: f64) -> DMat3 {
     outer(direction * (along - across), direction) + DMat3::from_diagonal(DVec3::splat(across))
 }
 
-/// The places from one tile's start to that of the next; none of a tile without a start.
-fn stretch(starts: &[usize], tile: usize) -> Range<usize> {
+/// The range of a tile; empty for a tile without a start.
+fn range_of(starts: &[usize], tile: usize) -> Range<usize> {
     starts.get(tile..tile + 2).map_or(0..0, |ends| ends[0]..ends[1])
 }

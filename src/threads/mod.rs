@@ -1,14 +1,15 @@
-//! The threads of a world, and the passes they share.
+//! Threads of a world, and parallel passes.
 //!
-//! A step is one [`Threads::lead`]: the leader runs the step, and whenever it comes to a [`Team::pass`] the others help.
-//! A step must neither allocate nor lock, which no pool made for jobs of any kind promises; passes over tiles need no
-//! more than a counter for each thread.
+//! A step is one [`Threads::lead`]. The leader runs the step, and the other threads help with each [`Team::pass`]. A
+//! step must neither allocate nor lock, which general-purpose thread pools do not guarantee. A pass over tiles needs
+//! only one counter per thread.
 //!
-//! Which thread works on a tile is left to chance; what a tile's work is, never: it sees its own part of the data alone
-//! beside what nobody changes, so results do not depend on the number of threads.
+//! The thread that processes a tile is arbitrary, but the work on a tile is not. It has exclusive access to its own
+//! part of the data and shared access to data that do not change. Therefore results do not depend on the number of
+//! threads.
 #![allow(unsafe_code)]
 
-mod board;
+mod dispatcher;
 mod split;
 mod tasks;
 mod team;
@@ -26,16 +27,16 @@ use crate::base::{Error, Result, memory};
 use tasks::Tasks;
 use workers::Workers;
 
-/// The most threads a world can have.
+/// Maximum number of threads of a world.
 const MAX_THREADS: u32 = 256;
 
-/// The threads of a world, the caller's among them.
+/// Threads of a world, including the caller's.
 #[derive(Default)]
-pub(crate) struct Threads(Others);
+pub(crate) struct Threads(Helpers);
 
-/// Who helps the leader.
+/// Helpers of the leader.
 #[derive(Default)]
-enum Others {
+enum Helpers {
     #[default]
     Nobody,
     Workers(Workers),
@@ -43,45 +44,45 @@ enum Others {
 }
 
 impl Threads {
-    /// So many threads, 0: one per core. The caller's is one of them; the others are started here, and sleep.
+    /// Creates `count` threads; 0: one per core. One of them is the caller's. The others are started here and sleep.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: more than 256. [`Error::Unsupported`]: a thread could not be started.
     /// [`Error::OutOfMemory`].
     pub fn new(count: u32) -> Result<Self> {
         Ok(Self(match resolved(count)? {
-            1 => Others::Nobody,
-            count => Others::Workers(Workers::start(count)?),
+            1 => Helpers::Nobody,
+            count => Helpers::Workers(Workers::start(count)?),
         }))
     }
 
-    /// The threads of the caller's job system, which is asked for `count` tasks a step, 0: one per core. It is never
-    /// asked for one alone.
+    /// Uses the threads of the caller's job system, with `count` tasks per step; 0: one per core. A single task is
+    /// never submitted.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: more than 256. [`Error::OutOfMemory`].
-    pub fn of_tasks(run_tasks: RunTasks, count: u32) -> Result<Self> {
+    pub fn with_tasks(run_tasks: RunTasks, count: u32) -> Result<Self> {
         Ok(Self(match resolved(count)? {
-            1 => Others::Nobody,
-            count => Others::Tasks(memory::boxed(Tasks::new(run_tasks, count)?)?),
+            1 => Helpers::Nobody,
+            count => Helpers::Tasks(memory::boxed(Tasks::new(run_tasks, count)?)?),
         }))
     }
 
-    /// How many threads take part at most.
+    /// Maximum number of threads that take part.
     pub fn count(&self) -> usize {
         match &self.0 {
-            Others::Nobody => 1,
-            Others::Workers(workers) => workers.board().count(),
-            Others::Tasks(tasks) => tasks.count(),
+            Helpers::Nobody => 1,
+            Helpers::Workers(workers) => workers.dispatcher().count(),
+            Helpers::Tasks(tasks) => tasks.count(),
         }
     }
 
-    /// Runs `lead` once, on this thread or on one of a job system's; the others help with its passes.
+    /// Runs `lead` once, on this thread or on one of the job system. The others help with its passes.
     pub fn lead<R: Send>(&mut self, lead: impl FnOnce(&Team) -> R + Send) -> R {
         match &mut self.0 {
-            Others::Nobody => lead(&Team::alone()),
-            Others::Workers(workers) => workers.lead(lead),
-            Others::Tasks(tasks) => tasks.lead(lead),
+            Helpers::Nobody => lead(&Team::alone()),
+            Helpers::Workers(workers) => workers.lead(lead),
+            Helpers::Tasks(tasks) => tasks.lead(lead),
         }
     }
 }
@@ -89,9 +90,9 @@ impl Threads {
 impl fmt::Debug for Threads {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let who = match &self.0 {
-            Others::Nobody => "Nobody",
-            Others::Workers(_) => "Workers",
-            Others::Tasks(_) => "Tasks",
+            Helpers::Nobody => "Nobody",
+            Helpers::Workers(_) => "Workers",
+            Helpers::Tasks(_) => "Tasks",
         };
         write!(f, "Threads({who}, {})", self.count())
     }

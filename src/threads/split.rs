@@ -1,34 +1,34 @@
-//! Data that tiles change, cut so that each has a part of its own.
+//! Mutable data, split into one part per tile.
 
 use std::marker::PhantomData;
 
-/// Data in parts that do not overlap.
+/// Data in disjoint parts.
 ///
 /// # Safety
 /// For every number of tiles that it [`fits`](Self::fits), parts of different tiles may be used at the same time, on
 /// different threads.
 pub(crate) unsafe trait Split: Sync {
-    /// What the work on a tile is given.
+    /// Data passed to the work on a tile.
     type Part;
 
-    /// Whether there is a part for each of so many tiles, and none is left over.
+    /// True if there is exactly one part for each of `tiles` tiles.
     fn fits(&self, tiles: usize) -> bool;
 
-    /// The part of a tile.
+    /// Returns the part of a tile.
     ///
     /// # Safety
-    /// It fits more tiles than `tile`, and this part is asked for once.
+    /// The data must fit a number of tiles greater than `tile`. Each part may be requested only once.
     unsafe fn part(&self, tile: usize) -> Self::Part;
 }
 
-/// A slice, borrowed mutably by whoever asks for a range that nobody else has.
+/// A slice that hands out disjoint mutable ranges.
 struct SharedSlice<'a, T> {
     start: *mut T,
     length: usize,
     slice: PhantomData<&'a mut [T]>,
 }
 
-// SAFETY: `range` is all it offers, which hands out values of `&mut T`.
+// SAFETY: only `range` accesses the slice, and it returns `&mut T`.
 unsafe impl<T: Send> Sync for SharedSlice<'_, T> {}
 
 impl<'a, T> SharedSlice<'a, T> {
@@ -41,21 +41,21 @@ impl<'a, T> SharedSlice<'a, T> {
     }
 
     /// # Safety
-    /// `start <= end <= length`, and no other range that is asked for overlaps this one.
+    /// `start <= end <= length`, and ranges must not overlap.
     unsafe fn range(&self, start: usize, end: usize) -> &'a mut [T] {
-        // SAFETY: within the slice, which is borrowed for as long; nobody else has this range.
+        // SAFETY: the range is within the slice, which is borrowed for this lifetime, and no other range overlaps it.
         unsafe { std::slice::from_raw_parts_mut(self.start.add(start), end - start) }
     }
 }
 
-/// A slice in pieces of one length, the last shorter.
+/// A slice in pieces of equal length; the last one may be shorter.
 pub(crate) struct Tiles<'a, T> {
     slice: SharedSlice<'a, T>,
     length: usize,
 }
 
 impl<'a, T> Tiles<'a, T> {
-    /// Pieces of `length`, above 0.
+    /// Creates pieces of `length`, which must be positive.
     pub fn new(slice: &'a mut [T], length: usize) -> Self {
         assert!(length > 0, "tiles have a length");
         Self {
@@ -65,7 +65,7 @@ impl<'a, T> Tiles<'a, T> {
     }
 }
 
-// SAFETY: pieces of a slice one after another.
+// SAFETY: the pieces are disjoint.
 unsafe impl<'a, T: Send> Split for Tiles<'a, T> {
     type Part = &'a mut [T];
 
@@ -76,22 +76,22 @@ unsafe impl<'a, T: Send> Split for Tiles<'a, T> {
     unsafe fn part(&self, tile: usize) -> &'a mut [T] {
         let start = tile * self.length;
         let end = self.slice.length.min(start + self.length);
-        // SAFETY: the tile is below the slice's length over the tiles', rounded up.
+        // SAFETY: the tile is less than the slice's length divided by that of the pieces, rounded up.
         unsafe { self.slice.range(start, end) }
     }
 }
 
-/// A slice with one item for each tile.
+/// A slice with one item per tile.
 pub(crate) struct Items<'a, T>(SharedSlice<'a, T>);
 
 impl<'a, T> Items<'a, T> {
-    /// As many tiles as the slice has items.
+    /// Creates one part per item.
     pub fn new(slice: &'a mut [T]) -> Self {
         Self(SharedSlice::new(slice))
     }
 }
 
-// SAFETY: each item is a part of its own.
+// SAFETY: the items are disjoint.
 unsafe impl<'a, T: Send> Split for Items<'a, T> {
     type Part = &'a mut T;
 
@@ -100,23 +100,22 @@ unsafe impl<'a, T: Send> Split for Items<'a, T> {
     }
 
     unsafe fn part(&self, tile: usize) -> &'a mut T {
-        // SAFETY: the tile is below the slice's length; an item is asked for once.
+        // SAFETY: the tile is less than the slice's length, and each item is requested once.
         unsafe { &mut *self.0.start.add(tile) }
     }
 }
 
-/// A slice in pieces of various lengths.
+/// A slice in pieces of different lengths.
 pub(crate) struct Ragged<'a, T> {
     slice: SharedSlice<'a, T>,
     starts: &'a [usize],
 }
 
 impl<'a, T> Ragged<'a, T> {
-    /// Pieces from each of these places to the next, from the last to the end, and then empty ones. They go up, within
-    /// the slice.
+    /// Creates pieces that begin at `starts`. The last one reaches to the end, and further ones are empty.
     ///
     /// # Panics
-    /// Where they do not.
+    /// If the starts are not sorted or exceed the slice.
     pub fn new(slice: &'a mut [T], starts: &'a [usize]) -> Self {
         let end = starts.last().copied().unwrap_or(0);
         assert!(starts.is_sorted() && end <= slice.len(), "pieces lie in order within");
@@ -127,7 +126,7 @@ impl<'a, T> Ragged<'a, T> {
     }
 }
 
-// SAFETY: pieces of a slice one after another.
+// SAFETY: the pieces are disjoint.
 unsafe impl<'a, T: Send> Split for Ragged<'a, T> {
     type Part = &'a mut [T];
 
@@ -138,12 +137,12 @@ unsafe impl<'a, T: Send> Split for Ragged<'a, T> {
     unsafe fn part(&self, tile: usize) -> &'a mut [T] {
         let start = |tile: usize| self.starts.get(tile).copied().unwrap_or(self.slice.length);
         let (start, end) = (start(tile), start(tile + 1));
-        // SAFETY: `new` has seen that the starts go up and stay within.
+        // SAFETY: `new` has checked that the starts are sorted and within the slice.
         unsafe { self.slice.range(start, end) }
     }
 }
 
-// SAFETY: nothing.
+// SAFETY: there are no data.
 unsafe impl Split for () {
     type Part = ();
 
@@ -154,7 +153,7 @@ unsafe impl Split for () {
     unsafe fn part(&self, _tile: usize) {}
 }
 
-// SAFETY: what is in it does the same, or there is nothing.
+// SAFETY: the contained data satisfy the contract, if there are any.
 unsafe impl<D: Split> Split for Option<D> {
     type Part = Option<D::Part>;
 
@@ -168,7 +167,7 @@ unsafe impl<D: Split> Split for Option<D> {
     }
 }
 
-// SAFETY: each does the same, and they share nothing.
+// SAFETY: each item satisfies the contract, and items are disjoint.
 unsafe impl<D: Split, const N: usize> Split for [D; N] {
     type Part = [D::Part; N];
 
@@ -184,7 +183,7 @@ unsafe impl<D: Split, const N: usize> Split for [D; N] {
 
 macro_rules! split_tuples {
     ($($name:ident)*) => {
-        // SAFETY: each does the same, and they share nothing.
+        // SAFETY: each item satisfies the contract, and items are disjoint.
         #[allow(non_snake_case)]
         unsafe impl<$($name: Split),*> Split for ($($name,)*) {
             type Part = ($($name::Part,)*);

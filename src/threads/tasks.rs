@@ -1,4 +1,4 @@
-//! The threads of a caller's job system.
+//! Parallel passes on the caller's job system.
 
 use std::cell::UnsafeCell;
 use std::ffi::c_void;
@@ -7,24 +7,24 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 
-use super::board::{Board, Patience};
+use super::dispatcher::{Dispatcher, SpinWait};
 use super::team::Team;
 use crate::base::Result;
 
-/// Runs tasks on the threads of a job system: calls the task once for every index below the count, on any threads, in
-/// any order, even one after another; returns when all of them have.
+/// Runs tasks on a job system. It calls the task once for every index below the count, on any threads and in any order,
+/// even sequentially, and returns after all calls have returned.
 type Run = dyn Fn(u32, &(dyn Fn(u32) + Sync)) + Sync;
 
-/// A task as C sees it: its data, and its index.
+/// A task in C: its data and its index.
 type CTask = unsafe extern "C" fn(task_data: *mut c_void, index: u32);
 
-/// As C gives it: a context, the task with its data, and how often it is to be called.
+/// A job system in C: a context, the task with its data, and the number of calls.
 type CRun = unsafe extern "C" fn(context: *mut c_void, task: Option<CTask>, task_data: *mut c_void, count: u32);
 
-/// A job system of the caller's, whose threads a world steps with instead of its own.
+/// The caller's job system. A world can use its threads instead of own ones.
 ///
-/// Tasks of one step help each other where they run at the same time, and each takes until the step ends: a job system
-/// should not be asked for more tasks than it has threads that are free.
+/// The tasks of a step help each other while they run at the same time, and each lasts until the step ends. Therefore
+/// the number of tasks should not exceed the number of free threads.
 ///
 /// ```
 /// # use sinew::{mesh::Mesh, *};
@@ -50,23 +50,24 @@ enum JobSystem {
     C { run: CRun, context: *mut c_void },
 }
 
-// SAFETY: the context is handed to `run` and used for nothing else; `from_c` demands that this may happen on any thread.
+// SAFETY: the context is only passed to `run`, which may be called on any thread by the contract of `from_c`.
 unsafe impl Send for RunTasks {}
-// SAFETY: as above.
+// SAFETY: the same contract.
 unsafe impl Sync for RunTasks {}
 
 impl RunTasks {
-    /// A function that calls the task it is given once for every index below the count, on any threads, in any order,
-    /// even one after another, and returns when all of them have.
+    /// Uses a function that calls the given task once for every index below the count. The calls may run on any threads
+    /// and in any order, even sequentially. The function must return after all calls have returned.
     pub fn new(run: &'static Run) -> Self {
         Self(JobSystem::Rust(run))
     }
 
-    /// The same in C: `run(context, task, task_data, count)` calls `task(task_data, index)`.
+    /// Uses a C function: `run(context, task, task_data, count)` calls `task(task_data, index)` for every index.
     ///
     /// # Safety
-    /// As long as a world uses it, `run` may be called with `context` from any thread that steps the world; it calls
-    /// `task` with the data it was given, not after it has returned, and does not return before these calls have.
+    /// While a world uses it, `run` must be callable with `context` from any thread that steps the world. It must pass
+    /// the given data to `task`, must not call `task` after it has returned, and must not return before these calls
+    /// have.
     pub unsafe fn from_c(run: CRun, context: *mut c_void) -> Self {
         Self(JobSystem::C { run, context })
     }
@@ -76,7 +77,7 @@ impl RunTasks {
             JobSystem::Rust(run) => run(count, task),
             JobSystem::C { run, context } => {
                 let data = (&raw const task).cast_mut().cast();
-                // SAFETY: `from_c` was promised that this call is fine, and that `task` is not used after it.
+                // SAFETY: the contract of `from_c` allows this call, and `task` is not used after it.
                 unsafe { run(context, Some(run_c_task), data, count) }
             }
         }
@@ -84,7 +85,7 @@ impl RunTasks {
 }
 
 /// # Safety
-/// `data` points to a task that may be called; it does not panic.
+/// `data` must point to a task that may be called and does not panic.
 unsafe extern "C" fn run_c_task(data: *mut c_void, index: u32) {
     // SAFETY: the same contract.
     let task = unsafe { *data.cast::<&(dyn Fn(u32) + Sync)>() };
@@ -99,9 +100,9 @@ impl PartialEq for RunTasks {
                 JobSystem::C { run, context },
                 JobSystem::C {
                     run: other,
-                    context: its,
+                    context: other_context,
                 },
-            ) => std::ptr::fn_addr_eq(run, other) && context == its,
+            ) => std::ptr::fn_addr_eq(run, other) && context == other_context,
             _ => false,
         }
     }
@@ -116,34 +117,34 @@ impl fmt::Debug for RunTasks {
     }
 }
 
-/// A job system and what its threads meet at.
+/// A job system and the state that its tasks share.
 pub(super) struct Tasks {
     run_tasks: RunTasks,
-    board: Board,
+    dispatcher: Dispatcher,
 }
 
 impl Tasks {
-    /// `count` tasks.
+    /// Creates a dispatcher for `count` tasks.
     pub fn new(run_tasks: RunTasks, count: usize) -> Result<Self> {
-        let board = Board::new(count)?;
-        Ok(Self { run_tasks, board })
+        let dispatcher = Dispatcher::new(count)?;
+        Ok(Self { run_tasks, dispatcher })
     }
 
     pub fn count(&self) -> usize {
-        self.board.count()
+        self.dispatcher.count()
     }
 
-    /// The first task to begin leads, those that begin before it ends follow, and later ones have nothing to do: no task
-    /// waits for one that may never begin. Where none begins, this thread leads.
+    /// The first task to start leads. Tasks that start before it ends follow, and later ones do nothing, so no task
+    /// waits for one that may never start. If no task starts, this thread leads.
     pub fn lead<R: Send>(&mut self, lead: impl FnOnce(&Team) -> R + Send) -> R {
         let step = TaskStep {
-            board: &self.board,
-            begun: AtomicUsize::new(0),
-            ended: AtomicBool::new(false),
+            dispatcher: &self.dispatcher,
+            started: AtomicUsize::new(0),
+            is_over: AtomicBool::new(false),
             lead: UnsafeCell::new(Some(lead)),
             result: UnsafeCell::new(None),
         };
-        self.run_tasks.run(self.board.count() as u32, &|_| step.task());
+        self.run_tasks.run(self.dispatcher.count() as u32, &|_| step.task());
         match (step.result.into_inner(), step.lead.into_inner()) {
             (Some(result), _) => result.unwrap_or_else(|panic| resume_unwind(panic)),
             (None, Some(lead)) => lead(&Team::alone()),
@@ -152,53 +153,53 @@ impl Tasks {
     }
 }
 
-/// A step that tasks take together.
+/// A step that is executed by tasks.
 struct TaskStep<'a, F, R> {
-    board: &'a Board,
-    /// How many tasks have begun.
-    begun: AtomicUsize,
-    ended: AtomicBool,
-    /// Both are used by the first task, and when all have returned.
+    dispatcher: &'a Dispatcher,
+    /// Number of tasks that have started.
+    started: AtomicUsize,
+    is_over: AtomicBool,
+    /// `lead` and `result` are used by the first task, and after all tasks have returned.
     lead: UnsafeCell<Option<F>>,
     result: UnsafeCell<Option<thread::Result<R>>>,
 }
 
-// SAFETY: the cells are used by one task alone, and what is in them may go to its thread.
+// SAFETY: only one task uses the cells, and their contents are Send.
 unsafe impl<F: Send, R: Send> Sync for TaskStep<'_, F, R> {}
 
 impl<F: FnOnce(&Team) -> R, R> TaskStep<'_, F, R> {
     /// Does not panic.
     fn task(&self) {
-        match self.begun.fetch_add(1, Ordering::Relaxed) {
+        match self.started.fetch_add(1, Ordering::Relaxed) {
             0 => self.lead(),
-            seat if seat < self.board.count() => self.follow(seat),
-            // Called more often than it was asked to be.
+            thread_index if thread_index < self.dispatcher.count() => self.follow(thread_index),
+            // The job system made more calls than requested.
             _ => {}
         }
     }
 
     fn lead(&self) {
-        // SAFETY: the first task alone comes here.
+        // SAFETY: only the first task calls this function.
         if let Some(lead) = unsafe { &mut *self.lead.get() }.take() {
-            // SAFETY: nobody else makes one: the board is borrowed mutably by `Tasks::lead`, which made one step of it.
-            let team = unsafe { Team::of(self.board, None) };
+            // SAFETY: no other team exists. `Tasks::lead` borrows the dispatcher mutably and creates one step with it.
+            let team = unsafe { Team::with_dispatcher(self.dispatcher, None) };
             let result = catch_unwind(AssertUnwindSafe(|| lead(&team)));
-            // SAFETY: the first task alone comes here.
+            // SAFETY: only the first task calls this function.
             unsafe { *self.result.get() = Some(result) };
         }
-        self.ended.store(true, Ordering::Release);
+        self.is_over.store(true, Ordering::Release);
     }
 
-    fn follow(&self, seat: usize) {
-        let mut seen = None;
-        let mut patience = Patience::new();
-        while !self.ended.load(Ordering::Acquire) {
-            let generation = self.board.generation(seat);
-            if seen != Some(generation) {
-                seen = Some(generation);
-                self.board.follow(seat);
-                patience = Patience::new();
-            } else if patience.ends() {
+    fn follow(&self, thread_index: usize) {
+        let mut last_generation = None;
+        let mut wait = SpinWait::new();
+        while !self.is_over.load(Ordering::Acquire) {
+            let generation = self.dispatcher.generation(thread_index);
+            if last_generation != Some(generation) {
+                last_generation = Some(generation);
+                self.dispatcher.follow(thread_index);
+                wait = SpinWait::new();
+            } else if wait.is_over() {
                 thread::yield_now();
             }
         }

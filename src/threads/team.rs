@@ -1,67 +1,68 @@
-//! The passes of a step.
+//! Parallel passes of a step.
 
 use std::marker::PhantomData;
 
-use super::board::Board;
+use super::dispatcher::Dispatcher;
 use super::split::Split;
 use super::workers::Workers;
 
-/// Those who work on a step together, as its leader sees them. No tile's work can use it: it is neither Send nor Sync.
+/// Threads that execute a step, from the leader's view. It is neither Send nor Sync, so the work on a tile cannot use
+/// it.
 pub(crate) struct Team<'a> {
-    others: Option<(&'a Board, Option<&'a Workers>)>,
-    leader_alone: PhantomData<*const ()>,
+    helpers: Option<(&'a Dispatcher, Option<&'a Workers>)>,
+    not_send: PhantomData<*const ()>,
 }
 
 impl Team<'static> {
-    /// The caller's thread.
+    /// A team of the caller's thread only.
     pub fn alone() -> Self {
         Self {
-            others: None,
-            leader_alone: PhantomData,
+            helpers: None,
+            not_send: PhantomData,
         }
     }
 }
 
 impl<'a> Team<'a> {
-    /// The leader, and those who follow this board; workers that sleep are woken.
+    /// A team of the leader and the followers of this dispatcher. Sleeping workers are woken for passes.
     ///
     /// # Safety
-    /// The only team of the board.
-    pub(super) unsafe fn of(board: &'a Board, workers: Option<&'a Workers>) -> Self {
+    /// The dispatcher must have no other team.
+    pub(super) unsafe fn with_dispatcher(dispatcher: &'a Dispatcher, workers: Option<&'a Workers>) -> Self {
         Self {
-            others: Some((board, workers)),
-            leader_alone: PhantomData,
+            helpers: Some((dispatcher, workers)),
+            not_send: PhantomData,
         }
     }
 
-    /// How many threads it has at most.
+    /// Maximum number of threads.
     pub fn count(&self) -> usize {
-        self.others.map_or(1, |(board, _)| board.count())
+        self.helpers.map_or(1, |(dispatcher, _)| dispatcher.count())
     }
 
-    /// Runs `work` once for every tile below `tiles` with that tile's part of `data`, on any thread and in any order;
-    /// returns when all are done. One tile is the leader's, and costs nothing more.
+    /// Runs `work` once for every tile below `tiles` with that tile's part of `data`, on any thread and in any order.
+    /// Returns when all tiles are done. A single tile runs on the leader without overhead.
     ///
-    /// Sharing takes about half a microsecond, and some more where others sleep: a tile should be worth that.
+    /// Distribution takes about half a microsecond, and more if threads sleep. A tile should take longer than that.
     ///
     /// # Panics
-    /// Where `data` has not as many parts as there are tiles, and where `work` panics.
+    /// If `data` does not have one part per tile, or if `work` panics.
     pub fn pass<D: Split>(&self, tiles: usize, data: D, work: impl Fn(usize, D::Part) + Sync) {
         assert!(data.fits(tiles), "the data of a pass has not {tiles} parts");
         assert!(tiles <= u32::MAX as usize, "a pass has {tiles} tiles");
         let run = |tile| {
-            // SAFETY: within the parts there are, and asked for once, whoever calls this.
+            // SAFETY: the tile is within the parts, and each part is requested once.
             work(tile, unsafe { data.part(tile) });
         };
-        match self.others {
-            Some((board, workers)) if tiles > 1 => {
-                let call = |seat| {
+        match self.helpers {
+            Some((dispatcher, workers)) if tiles > 1 => {
+                let wake = |thread_index| {
                     if let Some(workers) = workers {
-                        workers.wake(seat);
+                        workers.wake(thread_index);
                     }
                 };
-                // SAFETY: `run` cannot share this team, and there is no other.
-                unsafe { board.lead(tiles, &run, call) };
+                // SAFETY: `run` cannot use this team, and there is no other one.
+                unsafe { dispatcher.lead(tiles, &run, wake) };
             }
             _ => (0..tiles).for_each(run),
         }

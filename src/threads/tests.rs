@@ -1,4 +1,4 @@
-//! Every tile once, whoever comes to help.
+//! Every tile is processed once, for any number of helpers.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
@@ -29,7 +29,7 @@ fn on_threads(count: u32, task: Task) {
     });
 }
 
-/// Two at a time, the others when these have ended.
+/// Runs two tasks at a time.
 fn on_two_threads(count: u32, task: Task) {
     let next = AtomicU32::new(0);
     thread::scope(|scope| {
@@ -55,16 +55,16 @@ fn too_often(count: u32, task: Task) {
     }
 }
 
-fn everybody() -> Vec<Threads> {
+fn all_threads() -> Vec<Threads> {
     let workers = (1..=5).map(|count| Threads::new(count).expect("threads"));
     let systems: [TestJobs; 6] = [&in_order, &in_reverse, &on_threads, &on_two_threads, &never, &too_often];
-    let tasks = systems.map(|run| Threads::of_tasks(RunTasks::new(run), 3).expect("room"));
+    let tasks = systems.map(|run| Threads::with_tasks(RunTasks::new(run), 3).expect("room"));
     workers.chain(tasks).collect()
 }
 
 #[test]
-fn every_tile_of_every_pass_is_run_once_with_its_own_part() {
-    for mut threads in everybody() {
+fn every_tile_runs_once_per_pass_with_its_own_part() {
+    for mut threads in all_threads() {
         let name = format!("{threads:?}");
         let mut random = Random(7);
         for _ in 0..20 {
@@ -72,30 +72,30 @@ fn every_tile_of_every_pass_is_run_once_with_its_own_part() {
             let length = 1 + random.below(9);
             let results: Vec<Vec<usize>> = threads.lead(|team| {
                 let run = |&tiles: &usize| {
-                    let mut places = vec![0; tiles * length];
+                    let mut values = vec![0; tiles * length];
                     let mut runs = vec![0; tiles];
-                    let data = (Tiles::new(&mut places, length), Items::new(&mut runs));
+                    let data = (Tiles::new(&mut values, length), Items::new(&mut runs));
                     team.pass(tiles, data, |tile, (part, runs)| {
                         assert_eq!(part.len(), length);
-                        part.iter_mut().for_each(|place| *place += tile + 1);
+                        part.iter_mut().for_each(|value| *value += tile + 1);
                         *runs += 1;
                     });
                     assert_eq!(runs, vec![1; tiles], "{name}");
-                    places
+                    values
                 };
                 passes.iter().map(run).collect()
             });
-            for (places, tiles) in results.iter().zip(&passes) {
-                let expected: Vec<usize> = (0..tiles * length).map(|place| place / length + 1).collect();
-                assert_eq!(*places, expected, "{name}");
+            for (values, tiles) in results.iter().zip(&passes) {
+                let expected: Vec<usize> = (0..tiles * length).map(|value| value / length + 1).collect();
+                assert_eq!(*values, expected, "{name}");
             }
         }
     }
 }
 
 #[test]
-fn passes_see_what_the_one_before_has_written() {
-    for mut threads in everybody() {
+fn a_pass_sees_the_writes_of_the_previous_pass() {
+    for mut threads in all_threads() {
         let name = format!("{threads:?}");
         const TILES: usize = 7;
         let mut values = [[0_u64; TILES]; 2];
@@ -122,13 +122,13 @@ fn passes_see_what_the_one_before_has_written() {
 }
 
 #[test]
-fn workers_that_have_slept_come_back() {
+fn sleeping_workers_wake_up() {
     let mut threads = Threads::new(3).expect("threads");
     for round in 0..20 {
         let met = AtomicUsize::new(0);
         threads.lead(|team| {
-            // Each waits for the others, so that all three must come; a worker that falls asleep while a pass begins is
-            // woken by the next.
+            // Each tile waits for the others, so all three threads must take part. A worker that falls asleep while a
+            // pass begins is woken by the next one.
             while met.load(Ordering::Relaxed) < 3 {
                 met.store(0, Ordering::Relaxed);
                 team.pass(3, (), |_, ()| {
@@ -146,8 +146,8 @@ fn workers_that_have_slept_come_back() {
 }
 
 #[test]
-fn a_panic_goes_on_at_the_leader_and_the_threads_live_on() {
-    for mut threads in everybody() {
+fn a_panic_reaches_the_leader_and_the_threads_survive() {
+    for mut threads in all_threads() {
         let name = format!("{threads:?}");
         for bad in 0..12 {
             let running = AtomicUsize::new(0);
@@ -177,18 +177,18 @@ fn a_panic_goes_on_at_the_leader_and_the_threads_live_on() {
 }
 
 #[test]
-fn what_the_leader_answers_is_handed_on() {
-    for mut threads in everybody() {
+fn the_result_of_the_leader_is_returned() {
+    for mut threads in all_threads() {
         assert_eq!(threads.lead(|_| "once".to_owned()), "once");
     }
     let mut threads = Threads::new(3).expect("threads");
     assert_eq!((threads.lead(|team| team.count()), threads.count()), (3, 3));
-    let mut nobody = Threads::of_tasks(RunTasks::new(&never), 3).expect("room");
+    let mut nobody = Threads::with_tasks(RunTasks::new(&never), 3).expect("room");
     assert_eq!((nobody.lead(|team| team.count()), nobody.count()), (1, 3));
 }
 
 #[test]
-fn data_must_have_as_many_parts_as_there_are_tiles() {
+fn data_must_have_one_part_per_tile() {
     let team = Team::alone();
     let mut values = [0; 10];
     let mut refused = |tiles, length| {
@@ -212,7 +212,7 @@ fn data_must_have_as_many_parts_as_there_are_tiles() {
 }
 
 #[test]
-fn parts_are_what_they_are_said_to_be() {
+fn parts_cover_the_documented_ranges() {
     let mut threads = Threads::new(2).expect("threads");
     let mut ragged: Vec<usize> = vec![9; 12];
     let mut short = [[0_usize; 2]; 3];
@@ -246,8 +246,8 @@ fn too_many_threads_are_refused() {
     let cores = thread::available_parallelism().map_or(1, usize::from).min(256);
     assert_eq!(Threads::new(0).expect("threads").count(), cores);
     let run = RunTasks::new(&in_order);
-    assert_eq!(Threads::of_tasks(run, 256).expect("room").count(), 256);
-    for refused in [Threads::new(257), Threads::of_tasks(run, 257), Threads::new(u32::MAX)] {
+    assert_eq!(Threads::with_tasks(run, 256).expect("room").count(), 256);
+    for refused in [Threads::new(257), Threads::with_tasks(run, 257), Threads::new(u32::MAX)] {
         match refused {
             Err(Error::InvalidArgument(message)) => assert!(message.contains("thread_count"), "{message}"),
             other => panic!("{other:?}"),

@@ -1,48 +1,48 @@
-//! Threads of our own: they look for work as long as some comes, and sleep between steps that are far apart.
+//! The library's own threads. They spin while there is work, and sleep between steps that are far apart.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
 
-use super::board::{Apart, Board, Patience};
+use super::dispatcher::{CachePadded, Dispatcher, SpinWait};
 use super::team::Team;
 use crate::base::{Error, Result, memory};
 
-/// What the threads share.
+/// State that all workers share.
 struct Shared {
-    board: Board,
-    /// For each seat.
-    asleep: Vec<Apart<AtomicBool>>,
-    /// How many workers have begun.
-    begun: AtomicUsize,
-    state: Apart<IdleState>,
+    dispatcher: Dispatcher,
+    /// One flag per thread.
+    asleep: Vec<CachePadded<AtomicBool>>,
+    /// Number of workers that have started.
+    started: AtomicUsize,
+    state: CachePadded<IdleState>,
 }
 
-/// Looked at by workers that find nothing to do.
+/// State that idle workers poll.
 #[derive(Default)]
 struct IdleState {
     leading: AtomicBool,
     closing: AtomicBool,
 }
 
-/// Threads that end with this.
+/// Worker threads, joined when dropped.
 pub(super) struct Workers {
     shared: Arc<Shared>,
-    /// Of all seats but the leader's.
+    /// Handles of all threads except the leader's.
     handles: Vec<JoinHandle<()>>,
 }
 
 impl Workers {
-    /// `count` threads, of which the caller's is one.
+    /// Starts `count - 1` threads; the caller's is one more.
     pub fn start(count: usize) -> Result<Self> {
         let mut asleep = memory::reserved(count)?;
-        asleep.resize_with(count, Apart::default);
+        asleep.resize_with(count, CachePadded::default);
         let mut workers = Self {
             shared: Arc::new(Shared {
-                board: Board::new(count)?,
+                dispatcher: Dispatcher::new(count)?,
                 asleep,
-                begun: AtomicUsize::new(0),
-                state: Apart::default(),
+                started: AtomicUsize::new(0),
+                state: CachePadded::default(),
             }),
             handles: memory::reserved(count - 1)?,
         };
@@ -57,30 +57,30 @@ impl Workers {
                 ))
             })?);
         }
-        // What the system allocates as a thread begins is not to fall into a step.
-        while workers.shared.begun.load(Ordering::Relaxed) < count - 1 {
+        // Allocations of a starting thread must not fall into a step.
+        while workers.shared.started.load(Ordering::Relaxed) < count - 1 {
             thread::yield_now();
         }
         Ok(workers)
     }
 
-    pub fn board(&self) -> &Board {
-        &self.shared.board
+    pub fn dispatcher(&self) -> &Dispatcher {
+        &self.shared.dispatcher
     }
 
     pub fn lead<R>(&mut self, lead: impl FnOnce(&Team) -> R) -> R {
-        let leading = Leading(&self.shared.state.0.leading);
+        let leading = LeadingGuard(&self.shared.state.0.leading);
         leading.0.store(true, Ordering::Relaxed);
-        // SAFETY: this is borrowed mutably as long as the team lives.
-        lead(&unsafe { Team::of(&self.shared.board, Some(self)) })
+        // SAFETY: `self` is borrowed mutably while the team exists.
+        lead(&unsafe { Team::with_dispatcher(&self.shared.dispatcher, Some(self)) })
     }
 
-    /// Sees to it that the worker of this seat looks for work. One that falls asleep at this very moment may not be seen:
-    /// it is woken by the next pass.
-    pub fn wake(&self, seat: usize) {
-        let asleep = &self.shared.asleep[seat].0;
+    /// Wakes the worker of this index if it sleeps. A worker that falls asleep at the same time may be missed; the next
+    /// pass wakes it.
+    pub fn wake(&self, thread_index: usize) {
+        let asleep = &self.shared.asleep[thread_index].0;
         if asleep.load(Ordering::Relaxed) && asleep.swap(false, Ordering::Relaxed) {
-            self.handles[seat - 1].thread().unpark();
+            self.handles[thread_index - 1].thread().unpark();
         }
     }
 }
@@ -92,48 +92,48 @@ impl Drop for Workers {
             handle.thread().unpark();
         }
         for handle in self.handles.drain(..) {
-            // A worker does not panic, and its end is all that is wanted.
+            // Workers do not panic, so the result is irrelevant.
             drop(handle.join());
         }
     }
 }
 
-/// Ends with the step, however that ends.
-struct Leading<'a>(&'a AtomicBool);
+/// Clears the flag when the step ends, even by a panic.
+struct LeadingGuard<'a>(&'a AtomicBool);
 
-impl Drop for Leading<'_> {
+impl Drop for LeadingGuard<'_> {
     fn drop(&mut self) {
         self.0.store(false, Ordering::Relaxed);
     }
 }
 
 impl Shared {
-    /// What the worker of this seat does in its life.
-    fn work(&self, seat: usize) {
+    /// Main loop of a worker.
+    fn work(&self, thread_index: usize) {
         let IdleState { leading, closing } = &self.state.0;
-        self.begun.fetch_add(1, Ordering::Relaxed);
-        let mut seen = 0;
-        let mut patience = Patience::new();
+        self.started.fetch_add(1, Ordering::Relaxed);
+        let mut last_generation = 0;
+        let mut wait = SpinWait::new();
         while !closing.load(Ordering::Relaxed) {
-            if self.board.generation(seat) != seen {
-                seen = self.board.generation(seat);
-                self.board.follow(seat);
-                patience = Patience::new();
-            } else if patience.ends() {
+            if self.dispatcher.generation(thread_index) != last_generation {
+                last_generation = self.dispatcher.generation(thread_index);
+                self.dispatcher.follow(thread_index);
+                wait = SpinWait::new();
+            } else if wait.is_over() {
                 if leading.load(Ordering::Relaxed) {
                     thread::yield_now();
                 } else {
-                    self.sleep(seat, seen);
-                    patience = Patience::new();
+                    self.sleep(thread_index, last_generation);
+                    wait = SpinWait::new();
                 }
             }
         }
     }
 
-    fn sleep(&self, seat: usize, seen: u32) {
-        let asleep = &self.asleep[seat].0;
+    fn sleep(&self, thread_index: usize, last_generation: u32) {
+        let asleep = &self.asleep[thread_index].0;
         asleep.store(true, Ordering::Relaxed);
-        if self.board.generation(seat) == seen {
+        if self.dispatcher.generation(thread_index) == last_generation {
             thread::park();
         }
         asleep.store(false, Ordering::Relaxed);

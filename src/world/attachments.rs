@@ -1,18 +1,18 @@
-//! Attachments: what tools hold of bodies, and what bodies hold of each other, by their names.
+//! Attachments of bodies to tools and to each other, by their ids.
 
 use std::fmt::from_fn;
 
 use glam::{DVec3, Vec3};
 
-use super::{World, make_walks};
+use super::{World, reserve_coupling};
 use crate::base::{AttachmentId, BodyId, Error, Result, ToolId, ensure, memory};
 use crate::codec::{saved, saved_enum};
 use crate::def::{Anchor, SurfacePoint};
-use crate::deformable_contact::{BondPoint, Bonds, Thread, are_one};
-use crate::solver::Grip;
+use crate::deformable_contact::{AttachmentPoint, PointAttachments, SutureThread, are_one};
+use crate::solver::AttachPoint;
 use crate::solver::Outcome;
 
-/// Whose attachment it is.
+/// The two ends of an attachment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Attachment {
     body: BodyId,
@@ -21,17 +21,17 @@ pub(super) struct Attachment {
 
 saved! { Attachment { body, holder } }
 
-/// What it is attached to.
+/// What a body is attached to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Holder {
     Tool(ToolId),
-    /// This one, or another.
+    /// The same body or another one.
     Body(BodyId),
 }
 
 saved_enum!(Holder { 0 => Tool(it), 1 => Body(it) });
 
-/// Which argument it is, in messages: one of an array, or the only one, with what its name begins with.
+/// Names an argument in error messages: an element of an array, or a single value. `prefix` begins its name.
 #[derive(Clone, Copy)]
 pub(super) struct Which<'a> {
     pub prefix: &'a str,
@@ -52,33 +52,32 @@ impl Which<'_> {
     }
 }
 
-/// How far the sum of a point's weights may be from 1.
-const SUM_OFF: f32 = 1e-3;
+/// The sum of a point's weights may differ from 1 by this much.
+const WEIGHT_TOLERANCE: f32 = 1e-3;
 
 impl World {
-    /// Attaches a node of a body to a tool: [`World::attach_nodes`] for one.
+    /// Attaches one node of a body to a tool, as [`World::attach_nodes`] does for several.
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`World::attach_nodes`].
     pub fn attach_node(&mut self, body: BodyId, node: u32, tool: ToolId, force_limit: f32) -> Result<AttachmentId> {
         self.check_nodes(body, &[node], tool, |_| "node".into())?;
-        Ok(self.attach(body, tool, [Grip::of_node(node)].into_iter(), force_limit)?[0])
+        Ok(self.attach(body, tool, [AttachPoint::of_node(node)].into_iter(), force_limit)?[0])
     }
 
-    /// Attaches nodes of a body to a tool, each by an attachment of its own: where they lie they become part of the tool, which carries
-    /// them along and turns them, exactly and whatever the solver, until [`World::release`]. Their velocities become the tool's in the
-    /// next step.
+    /// Attaches nodes of a body to a tool, with one attachment for each node. The nodes move rigidly with the tool from their current positions,
+    /// with every solver, until [`World::release`]. In the next step they take the tool's velocity.
     ///
-    /// What it takes to hold them, with their mass and what damps them, is part of the tool's wrench. The tool does not touch them any
-    /// more, nor edges and faces that have one of them. `force_limit`, N: an attachment ends with the step in which its mean force was
-    /// larger, and the node goes on as it was led ([`World::slipped`]); 0 or infinite: it holds whatever comes.
+    /// The force on the nodes, with their inertia and damping, is part of the tool's wrench. The tool no longer collides with these nodes, nor
+    /// with edges and faces that contain one of them. An attachment breaks in a step whose mean force exceeds `force_limit`, N; the node keeps its
+    /// velocity ([`World::slipped`]). With 0 or infinity it never breaks.
     ///
-    /// An attached node cannot be pinned. Its position can be set: then it is attached where it was put. One tool may hold a node more than
-    /// once; then each attachment has its share of the force. An attachment ends with its body and with its tool.
+    /// An attached node cannot be pinned. If its position is set, it stays attached at the new position. A tool can hold a node several times; the
+    /// attachments then share the force. Destroying the body or the tool destroys the attachment.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there is no such node, it is pinned, without mass or held by another tool, or the
-    /// limit is negative or not a number. [`Error::OutOfMemory`]. Nothing is attached then.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a node does not exist, is pinned, massless or held by another tool, or the
+    /// limit is negative or not a number. [`Error::OutOfMemory`]. After an error nothing is attached.
     pub fn attach_nodes(
         &mut self,
         body: BodyId,
@@ -87,17 +86,17 @@ impl World {
         force_limit: f32,
     ) -> Result<Vec<AttachmentId>> {
         self.check_nodes(body, nodes, tool, |index| format!("nodes[{index}]"))?;
-        self.attach(body, tool, nodes.iter().copied().map(Grip::of_node), force_limit)
+        self.attach(body, tool, nodes.iter().copied().map(AttachPoint::of_node), force_limit)
     }
 
-    /// Attaches points of a body's surface to a tool, each by an attachment of its own: [`World::attach_nodes`] for the corners of the
-    /// point's triangle, but those whose weight is 0. So the patch about the point is bonded to the tool, and does not turn against it; a
-    /// point on an edge holds the edge, one in a corner the node.
+    /// Attaches points of a body's surface to a tool, with one attachment for each point. An attachment holds the corners of the point's triangle
+    /// as [`World::attach_nodes`] does, except corners of weight 0. The triangle therefore cannot rotate relative to the tool. A
+    /// point on an edge holds the edge; a point at a corner holds the node.
     ///
-    /// An attachment's force is that on all its corners. Points whose triangles share corners share what holds those, by their weights.
+    /// The force of an attachment is the force on all its corners. Attachments that share a corner share its force by their weights.
     ///
     /// # Errors
-    /// As there; [`Error::InvalidArgument`] too: there is no such triangle, or weights are negative, not finite or not 1 in sum.
+    /// Those of [`World::attach_nodes`]. [`Error::InvalidArgument`] also if a triangle does not exist, or if weights are negative, not finite or do not sum to 1.
     pub fn attach_points(
         &mut self,
         body: BodyId,
@@ -121,31 +120,31 @@ impl World {
         self.attach(body, tool, grips.into_iter(), force_limit)
     }
 
-    /// Refuses nodes that cannot be held by this tool, by these names.
+    /// Refuses nodes that this tool cannot hold. `name` names a node in the message.
     fn check_nodes(&self, body: BodyId, nodes: &[u32], tool: ToolId, name: impl Fn(usize) -> String) -> Result<()> {
         let body = self.bodies.get(body.0)?;
         self.check_kinematic(tool)?;
         for (index, &node) in nodes.iter().enumerate() {
             let name = from_fn(|to| to.write_str(&name(index)));
             body.check_node(&name, node)?;
-            body.system().check_graspable(&name, node, tool.0.index())?;
+            body.system().check_attachable(&name, node, tool.0.index())?;
         }
         Ok(())
     }
 
-    /// Attaches what was found fit for it.
+    /// Attaches points that have been checked.
     fn attach(
         &mut self,
         body: BodyId,
         tool: ToolId,
-        grips: impl ExactSizeIterator<Item = Grip>,
+        grips: impl ExactSizeIterator<Item = AttachPoint>,
         force_limit: f32,
     ) -> Result<Vec<AttachmentId>> {
         self.check_kinematic(tool)?;
         let held = self.bodies.get_mut(body.0)?;
         check_limit(force_limit)?;
         let mut ids = memory::reserved(grips.len())?;
-        // All may slip in one step.
+        // All can break in one step.
         let count = self.attachments.count() + grips.len();
         self.slipped.try_reserve(count)?;
         if grips.len() == 0 {
@@ -155,31 +154,31 @@ impl World {
         let count = grips.len();
         let answer = held
             .system_mut()
-            .reserve_grasps(count)
+            .reserve_tool_attachments(count)
             .and_then(|()| self.name(Attachment { body, holder }, count, &mut ids))
             .and_then(|()| {
                 let named = ids.iter().map(|id| id.0).zip(grips);
                 let system = self.bodies.get_mut(body.0)?.system_mut();
-                system.grasp(tool.0.index(), named, force_limit)
+                system.attach_to_tool(tool.0.index(), named, force_limit)
             });
         if let Err(error) = answer {
             for AttachmentId(id) in ids.into_iter().rev() {
-                self.attachments.take_back(id)?;
+                self.attachments.undo_insert(id)?;
             }
-            self.bodies.get_mut(body.0)?.system_mut().drop_room_for_grasps();
+            self.bodies.get_mut(body.0)?.system_mut().release_unused_attachments();
             return Err(error);
         }
         Ok(ids)
     }
 
-    /// Makes names for so many attachments, for which `ids` has room.
+    /// Creates the ids of `count` attachments; `ids` has room for them.
     fn name(&mut self, attachment: Attachment, count: usize, ids: &mut Vec<AttachmentId>) -> Result<()> {
         for _ in 0..count {
             match self.attachments.insert(attachment) {
                 Ok(id) => ids.push(AttachmentId(id)),
                 Err(error) => {
                     for AttachmentId(id) in ids.drain(..).rev() {
-                        self.attachments.take_back(id)?;
+                        self.attachments.undo_insert(id)?;
                     }
                     return Err(error);
                 }
@@ -188,26 +187,25 @@ impl World {
         Ok(())
     }
 
-    /// Attaches points of a body to as many points of another, or of the same, each pair by an attachment of its own: nodes, or points of
-    /// the surface. From the next step on the two are one point, whatever the solvers of the bodies; what is apart comes together within
-    /// some hundredths of a second, and no faster than at 0.25 m/s, however far that is. Each may turn about it as it likes: what shall not
-    /// turn takes three.
+    /// Attaches points of a body to points of another body, or of the same one, with one attachment for each pair. A point is a node or a point of
+    /// the surface. From the next step on the two points coincide, with every solver. Points that are apart are drawn together within a few hundredths of
+    /// a second, but at 0.25 m/s at most. Each body can rotate about the point; three attachments prevent rotation.
     ///
-    /// The bodies take their substeps together, those of [`Solver::Implicit`](crate::Solver::Implicit) and
-    /// [`Solver::Newton`](crate::Solver::Newton) of 0.25 ms at most and of order 1. No momentum is made; nor is any angular momentum, once the points have
-    /// come together. Where both points are held by pins or tools along an axis nothing is done along it. Features that share such a pair
-    /// of points do not touch each other.
+    /// The bodies take their substeps together. Those of [`Solver::Implicit`](crate::Solver::Implicit) and
+    /// [`Solver::Newton`](crate::Solver::Newton) are 0.25 ms at most and first-order accurate. Momentum is conserved; so is angular momentum once the points
+    /// coincide. Along an axis in which pins or tools hold both points the attachment does nothing. Features that share an attached pair
+    /// do not collide with each other.
     ///
-    /// `force_limit`, N: an attachment ends with the step in which its mean force was larger ([`World::slipped`]); 0 or infinite: it holds
-    /// whatever comes. [`World::attachment_force`] has the force on `body`. An attachment ends with either body.
+    /// An attachment breaks in a step whose mean force exceeds `force_limit`, N ([`World::slipped`]); with 0 or infinity it never
+    /// breaks. [`World::attachment_force`] returns the force on `body`. Destroying either body destroys the attachment.
     ///
-    /// Sequential impulses (Catto 2005): between bodies of [`Solver::Verlet`](crate::Solver::Verlet) SHAKE (Ryckaert, Ciccotti, Berendsen
-    /// 1977), with the other solvers a projection (Chorin 1968).
+    /// The method is sequential impulses (Catto 2005). Between bodies of [`Solver::Verlet`](crate::Solver::Verlet) this is SHAKE (Ryckaert, Ciccotti,
+    /// Berendsen 1977), with the other solvers a projection (Chorin 1968).
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there is no such node or triangle, weights are negative, not finite or not 1 in sum,
-    /// the two are one point, there are not as many of the one as of the other, or the limit is negative or not a number.
-    /// [`Error::OutOfMemory`]. Nothing is attached then.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a node or triangle does not exist, weights are negative, not finite or do not sum to 1,
+    /// the two points are the same, the two lists differ in length, or the limit is negative or not a number.
+    /// [`Error::OutOfMemory`]. After an error nothing is attached.
     pub fn attach_to_body(
         &mut self,
         body: BodyId,
@@ -231,57 +229,57 @@ impl World {
         self.bind([body, other], &pairs, force_limit, None)
     }
 
-    /// Joins what was found fit for it, by threads like this one or else as one point.
+    /// Joins pairs of points that have been checked: by sutures like `thread`, or as one point.
     pub(super) fn bind(
         &mut self,
         bodies: [BodyId; 2],
-        pairs: &[[BondPoint; 2]],
+        pairs: &[[AttachmentPoint; 2]],
         force_limit: f32,
-        thread: Option<Thread>,
+        thread: Option<SutureThread>,
     ) -> Result<Vec<AttachmentId>> {
-        let places = [self.bodies.place(bodies[0].0)?, self.bodies.place(bodies[1].0)?];
+        let places = [self.bodies.slot(bodies[0].0)?, self.bodies.slot(bodies[1].0)?];
         let mut ids = memory::reserved(pairs.len())?;
         if pairs.is_empty() {
             return Ok(ids);
         }
         self.slipped.try_reserve(self.attachments.count() + pairs.len())?;
         for place in places {
-            make_walks(&mut self.walks, place)?;
+            reserve_coupling(&mut self.coupled, place)?;
         }
-        memory::get_or_box(&mut self.tissue)?.reserve_bonds(places, pairs.len())?;
+        memory::get_or_box(&mut self.tissue)?.reserve_attachments(places, pairs.len())?;
         for id in bodies {
-            self.bodies.get_mut(id.0)?.system_mut().reserve_bonds()?;
+            self.bodies.get_mut(id.0)?.system_mut().reserve_tissue_attachments()?;
         }
         let [body, other] = bodies;
         let holder = Holder::Body(other);
         self.name(Attachment { body, holder }, pairs.len(), &mut ids)?;
         for id in bodies {
-            self.bodies.get_mut(id.0)?.system_mut().begin_bonds();
+            self.bodies.get_mut(id.0)?.system_mut().begin_tissue_attachments();
         }
-        if let Some(bonds) = self.bonds_mut() {
+        if let Some(point_attachments) = self.point_attachments_mut() {
             for (&AttachmentId(id), &pair) in ids.iter().zip(pairs) {
-                bonds.add(id, pair, force_limit, thread)?;
+                point_attachments.add(id, pair, force_limit, thread)?;
             }
-            bonds.settle();
+            point_attachments.rebuild_nodes();
         }
         Ok(ids)
     }
 
-    /// A point of a body by what its corners are there.
-    pub(super) fn bound(&self, id: BodyId, which: Which, anchor: &Anchor) -> Result<BondPoint> {
+    /// A point of a body as a weighted mean of simulation nodes.
+    pub(super) fn bound(&self, id: BodyId, which: Which, anchor: &Anchor) -> Result<AttachmentPoint> {
         let body = self.bodies.get(id.0)?;
         let grip = match anchor {
             Anchor::Node(node) => {
                 body.check_node(&from_fn(|to| to.write_str(&which.name("node", "nodes"))), *node)?;
-                Grip::of_node(*node)
+                AttachPoint::of_node(*node)
             }
             Anchor::Point(point) => grip_of(body.surface(), which, point)?,
         };
         let sum: f32 = grip.weights.iter().sum();
-        // All corners of a triangle are bound to nodes of one cell.
+        // All corners of a triangle belong to one cell, so that four nodes are enough.
         let mut nodes = [(0, 0.0); 4];
         for (&corner, weight) in grip.corners.iter().zip(grip.weights) {
-            for (node, part) in body.system().parts_of(corner) {
+            for (node, part) in body.system().weighted_nodes_of(corner) {
                 let is_its = |(known, share): &&mut (u32, f32)| *known == node || *share == 0.0;
                 if weight * part != 0.0
                     && let Some(place) = nodes.iter_mut().find(is_its)
@@ -290,94 +288,102 @@ impl World {
                 }
             }
         }
-        Ok(BondPoint {
-            body: self.bodies.place(id.0)?,
+        Ok(AttachmentPoint {
+            body: self.bodies.slot(id.0)?,
             anchor: Some(*anchor),
             nodes,
         })
     }
 
-    /// A point between the nodes of a cell of a body, in the caller's numbers.
-    pub(super) fn bound_inside(&self, id: BodyId, nodes: [u32; 4], weights: [f64; 4]) -> Result<BondPoint> {
+    /// A point inside a cell of a body. The nodes have the caller's numbers.
+    pub(super) fn bound_inside(&self, id: BodyId, nodes: [u32; 4], weights: [f64; 4]) -> Result<AttachmentPoint> {
         let body = self.bodies.get(id.0)?;
         let sum: f64 = weights.iter().sum();
-        let own = |node: u32| body.system().parts_of(node).next().map_or(0, |(own, _)| own);
-        Ok(BondPoint {
-            body: self.bodies.place(id.0)?,
+        let own = |node: u32| body.system().weighted_nodes_of(node).next().map_or(0, |(own, _)| own);
+        Ok(AttachmentPoint {
+            body: self.bodies.slot(id.0)?,
             anchor: None,
             nodes: std::array::from_fn(|k| (own(nodes[k]), (weights[k] / sum) as f32)),
         })
     }
 
-    pub(super) fn bonds_mut(&mut self) -> Option<&mut Bonds> {
-        self.tissue.as_mut().map(|tissue| &mut tissue.bonds)
+    pub(super) fn point_attachments_mut(&mut self) -> Option<&mut PointAttachments> {
+        self.tissue.as_mut().map(|tissue| &mut tissue.attachments)
     }
 
-    /// Refuses a body that is attached to a body.
+    /// Refuses a body that is attached to another.
     pub(super) fn check_not_attached(&self, body: BodyId) -> Result<()> {
-        let place = self.bodies.place(body.0)?;
+        let place = self.bodies.slot(body.0)?;
         ensure!(
-            !self.tissue.as_ref().is_some_and(|tissue| tissue.bonds.concern(place)),
+            !self
+                .tissue
+                .as_ref()
+                .is_some_and(|tissue| tissue.attachments.has_body(place)),
             "body is attached to a body: what holds it there moves with that one"
         );
         Ok(())
     }
 
-    /// Lets go of what is attached: it goes on as it was led in the last step.
+    /// Destroys an attachment. The nodes keep the velocity that they had in the last step.
     ///
     /// # Errors
-    /// [`Error::StaleId`]: it was let go already, or slipped, or a body or the tool is gone.
+    /// [`Error::StaleId`]: it was already released or broken, or a body or the tool was destroyed.
     pub fn release(&mut self, attachment: AttachmentId) -> Result<()> {
         let Attachment { body, holder } = self.attachments.remove(attachment.0)?;
         match (holder, &mut self.tissue) {
-            (Holder::Body(_), Some(tissue)) => tissue.bonds.end(&mut self.bodies, attachment.0),
-            _ => self.bodies.get_mut(body.0)?.system_mut().let_go(attachment.0),
+            (Holder::Body(_), Some(tissue)) => tissue.attachments.remove(&mut self.bodies, attachment.0),
+            _ => self.bodies.get_mut(body.0)?.system_mut().detach(attachment.0),
         }
         Ok(())
     }
 
-    /// The force by which what it is attached to holds a body, on the tissue, world axes, mean over the last step, N; 0 before the first.
-    /// Where the state of a body that tools hold was set to one of rest it is that which holds it there.
+    /// The force of an attachment on its body, world axes, mean over the last step, N; 0 before the first step.
+    /// After a body that tools hold was set to its static equilibrium, this is the force that holds it there.
     ///
     /// # Errors
     /// [`Error::StaleId`].
     pub fn attachment_force(&self, attachment: AttachmentId) -> Result<Vec3> {
         let Attachment { body, holder } = self.attachments.get(attachment.0)?;
         if let (Holder::Body(_), Some(tissue)) = (holder, &self.tissue) {
-            return Ok(tissue.bonds.force_of(attachment.0));
+            return Ok(tissue.attachments.force_of(attachment.0));
         }
         let body = self.bodies.get(body.0)?;
         let grasp = body
             .system()
-            .grasps
+            .tool_attachments
             .as_ref()
-            .and_then(|grasps| grasps.get(attachment.0));
+            .and_then(|tool_attachments| tool_attachments.get(attachment.0));
         Ok(grasp.map_or(Vec3::ZERO, |grasp| grasp.force))
     }
 
-    /// Shows both ends of what is attached, m: a tool and a node that it holds, or two points of tissue.
-    pub(crate) fn show_attached(&self, mut see: impl FnMut([Vec3; 2])) {
+    /// Visits both ends of each attachment, m: a tool and a node, or two points of bodies.
+    pub(crate) fn visit_attachments(&self, mut visit: impl FnMut([Vec3; 2])) {
         for (_, body) in self.bodies.iter() {
-            for (node, tool) in body.system().grasps.iter().flat_map(|grasps| grasps.held_nodes()) {
+            for (node, tool) in body
+                .system()
+                .tool_attachments
+                .iter()
+                .flat_map(|tool_attachments| tool_attachments.attached_nodes())
+            {
                 if let Some(tool) = self.tools.at(tool) {
-                    see([tool.pose.position, body.positions()[body.system().callers(node)]]);
+                    visit([tool.pose.position, body.positions()[body.system().caller_index(node)]]);
                 }
             }
         }
         if let Some(tissue) = &self.tissue {
             tissue
-                .bonds
-                .show_ends(&self.bodies, |ends| see(ends.map(|end| end.as_vec3())));
+                .attachments
+                .visit_points(&self.bodies, |ends| visit(ends.map(|end| end.as_vec3())));
         }
     }
 
-    /// The attachments that ended with the last step, because it took more to hold them than their limit. Their ids are stale.
+    /// The attachments that broke in the last step because their force exceeded their limit. Their ids are stale.
     pub fn slipped(&self) -> &[AttachmentId] {
         &self.slipped
     }
 
-    /// The force on some tools together, and the torque about a point, world axes, mean over the last step, N and N m: of the two jaws of
-    /// a forceps, say.
+    /// The total force on several tools, such as the two jaws of a forceps, and their torque about a point, world axes, mean over the last step,
+    /// N and N m.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a tool is named more than once, or the point is not finite.
@@ -395,7 +401,7 @@ impl World {
         Ok((finite(force), finite(torque)))
     }
 
-    /// A body is gone, and with it what is attached of it.
+    /// Removes the attachments of a destroyed body.
     pub(super) fn forget_attachments_of(&mut self, body: BodyId) {
         self.attachments
             .retain(|attachment| attachment.body != body && attachment.holder != Holder::Body(body));
@@ -406,11 +412,11 @@ impl World {
         self.attachments
             .retain(|attachment| attachment.holder != Holder::Tool(tool));
         for (_, body) in self.bodies.iter_mut() {
-            body.system_mut().let_go_of(tool.0.index());
+            body.system_mut().detach_tool(tool.0.index());
         }
     }
 
-    /// Ends what the last step was too much for.
+    /// Destroys the attachments that broke in the last step.
     pub(super) fn end_slipped(&mut self) {
         self.slipped.clear();
         let mut end = |id| {
@@ -420,11 +426,11 @@ impl World {
         };
         for (place, body) in self.bodies.iter_mut() {
             if let Some(Outcome::Done { .. }) = self.outcomes[place] {
-                body.system_mut().slip(&mut end);
+                body.system_mut().break_overloaded(&mut end);
             }
         }
         if let Some(tissue) = &mut self.tissue {
-            tissue.bonds.slip(&mut self.bodies, end);
+            tissue.attachments.remove_broken(&mut self.bodies, end);
         }
     }
 }
@@ -434,8 +440,8 @@ pub(super) fn check_limit(force_limit: f32) -> Result<()> {
     Ok(())
 }
 
-/// Refuses two points of one body that are one.
-pub(super) fn refuse_one_point(pair: &[BondPoint; 2], [first, second]: [Which; 2]) -> Result<()> {
+/// Refuses a pair of points that are the same point of one body.
+pub(super) fn refuse_one_point(pair: &[AttachmentPoint; 2], [first, second]: [Which; 2]) -> Result<()> {
     if !are_one(pair) {
         return Ok(());
     }
@@ -450,8 +456,8 @@ pub(super) fn refuse_one_point(pair: &[BondPoint; 2], [first, second]: [Which; 2
     )))
 }
 
-/// A point of a surface.
-fn grip_of(surface: &[[u32; 3]], which: Which, point: &SurfacePoint) -> Result<Grip> {
+/// The corners and weights of a checked point of a surface.
+fn grip_of(surface: &[[u32; 3]], which: Which, point: &SurfacePoint) -> Result<AttachPoint> {
     let SurfacePoint { triangle, weights } = *point;
     let Some(&corners) = surface.get(triangle as usize) else {
         return Err(Error::invalid(format!(
@@ -462,9 +468,9 @@ fn grip_of(surface: &[[u32; 3]], which: Which, point: &SurfacePoint) -> Result<G
     };
     let sum: f32 = weights.iter().sum();
     ensure!(
-        weights.iter().all(|&weight| weight >= 0.0) && (sum - 1.0).abs() <= SUM_OFF,
+        weights.iter().all(|&weight| weight >= 0.0) && (sum - 1.0).abs() <= WEIGHT_TOLERANCE,
         "{} are {weights:?}: must be at least 0, and 1 in sum",
         which.name("weights", "weights")
     );
-    Ok(Grip { corners, weights })
+    Ok(AttachPoint { corners, weights })
 }

@@ -1,31 +1,31 @@
-//! A blade: an edge that the caller moves, and the proxies of it that stand in tissue.
+//! A blade: an edge that the caller moves, with one proxy in each body that it cuts.
 
 use glam::{DVec3, Vec3};
 
 use super::resistance::Knot;
 use crate::base::{BodyId, Error, Result, SlotId, StateHasher, above_zero, ensure, memory};
-use crate::body::{CutReport, Stroke};
+use crate::body::{BladeStroke, CutReport};
 use crate::codec::saved;
 use crate::contact::Pose;
-use crate::cutting::Met;
+use crate::cutting::BladeContact;
 use crate::def::{CollisionFilter, finite_vector};
-use crate::deformable_contact::Lead;
-use crate::geometry::rotation::{turn_between, turned};
-use crate::mesh::FURTHEST;
+use crate::deformable_contact::LinearPath;
+use crate::geometry::rotation::{rotated, rotation_between};
+use crate::mesh::MAX_COORDINATE;
 
-/// A proxy is held at no more points: a blade through more layers of a body is held at some.
-pub(super) const MOST_HOLDS: usize = 8;
+/// The most points at which tissue holds a proxy. A blade through more layers of a body is held at some of them.
+pub(super) const MAX_HOLDS: usize = 8;
 
-/// Room for so many triangles near a blade from the beginning.
+/// The number of triangles near a blade for which room is reserved at creation.
 const ROOM: usize = 256;
 
-/// Points that lie closer to each other along an edge, as a part of it, do not tell how it is turned.
+/// Points closer together than this fraction of the edge do not determine its rotation.
 const SPREAD: f64 = 0.05;
 
-/// A blade that turns by more than this in a step, rad, is followed in parts of it.
-const MOST_TURN: f64 = 0.5;
+/// A step in which a blade turns by more than this angle is divided, rad.
+const MAX_ROTATION: f64 = 0.5;
 
-/// What a blade is. Plain data, used only during [`World::create_blade`](crate::World::create_blade).
+/// The definition of a blade. Plain data, used only during [`World::create_blade`](crate::World::create_blade).
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
@@ -42,19 +42,19 @@ const MOST_TURN: f64 = 0.5;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BladeDefinition {
-    /// Both ends of the cutting edge about the blade's own origin, m, each coordinate within 1e9 of 0; not at one place.
+    /// Both ends of the cutting edge, relative to the blade's origin, m. Each coordinate is within 1e9 of 0, and the ends differ.
     pub edge: [Vec3; 2],
-    /// The force, N, for each metre by which it is ahead of where tissue is cut, in each body; above 0 and finite. How blunt it is: tissue of
-    /// toughness T resists with some T, and gives way by T / `stiffness` first.
+    /// The stiffness of the coupling between the blade and its proxy in each body, N/m; above 0 and finite. Before cutting, tissue of
+    /// toughness T deforms by about T / `stiffness`: a lower value is a blunter blade.
     pub stiffness: f32,
-    /// Which bodies it meets.
+    /// Which bodies the blade cuts.
     pub filter: CollisionFilter,
-    /// Where it is at first.
+    /// The initial pose.
     pub pose: Pose,
 }
 
 impl BladeDefinition {
-    /// A blade with this edge at the origin, of 1000 N/m, that meets everything.
+    /// A blade with this edge at the origin and a stiffness of 1000 N/m that cuts all bodies.
     pub fn new(edge: [Vec3; 2]) -> Self {
         Self {
             edge,
@@ -65,7 +65,7 @@ impl BladeDefinition {
     }
 }
 
-/// What a blade did in the last step, and what was done to it.
+/// The cuts of a blade in the last step, and the force on it.
 ///
 /// ```
 /// # use glam::{Vec3, vec3};
@@ -89,23 +89,23 @@ pub struct BladeReport {
     pub force: Vec3,
     /// The torque on it about its position, world axes, mean over the step, N m.
     pub torque: Vec3,
-    /// What whoever moves it has spent on tissue in the step, J.
+    /// The work that moving the blade has done on tissue in the step, J.
     pub work: f64,
-    /// How long the cuts are that it made at the end of the step, in the rest shape, m; of solids on their skin.
+    /// The length of the cuts made at the end of the step, in the rest shape, m. For solids it is measured on the surface.
     pub length: f64,
-    /// How far it is ahead of where tissue is cut, m: 0 where nothing is in its way.
+    /// The distance from the proxy to the blade, m; 0 where no tissue resists.
     pub lag: f64,
-    /// Why what it went through was not cut: [`Error::Capacity`] or [`Error::OutOfMemory`]. It is tried again with the next step.
+    /// Why tissue on the path was not cut: [`Error::Capacity`] or [`Error::OutOfMemory`]. The next step tries again.
     pub refused: Option<Error>,
-    /// Of solids: how large the faces are that have opened, in the rest shape, m².
-    /// A cell in which the end of the edge passes holds: it does not open, and does not resist.
+    /// The area of the faces that have opened in solids, in the rest shape, m².
+    /// A cell that contains the end of the edge does not open and does not resist.
     pub area: f64,
 }
 
 saved! { BladeReport { force, torque, work, length, lag, refused, area } }
 
 impl BladeReport {
-    /// It has made a cut.
+    /// Adds a cut to the report.
     pub(super) fn add(&mut self, cut: &CutReport) {
         self.length += cut.length;
         self.area += cut.area;
@@ -119,68 +119,68 @@ pub(super) struct Blade {
     pub stiffness: f64,
     pub filter: CollisionFilter,
     pub pose: Pose,
-    /// Where the next step moves it.
+    /// The pose at the end of the next step.
     pub target: Option<Pose>,
     pub proxies: Vec<Proxy>,
     pub report: BladeReport,
     // For use within a step.
     pub near: Vec<u32>,
-    pub met: Vec<Met>,
+    pub met: Vec<BladeContact>,
     pub knots: Vec<Knot>,
 }
 
 saved! { Blade { edge, stiffness, filter, pose, target, proxies, report, near, met, knots } }
 
-/// Where a blade stands in a body: the edge that tissue is cut to.
+/// The proxy of a blade in a body: the edge up to which tissue is cut.
 #[derive(Debug, Default)]
 pub(super) struct Proxy {
     pub body: BodyId,
-    /// Where cuts go on.
-    pub stroke: Stroke,
-    /// The edge that the last cut came to, while it stands there.
+    /// Where the next cut continues.
+    pub stroke: BladeStroke,
+    /// The edge at which the last cut ended, while the blade is held there.
     pub last: Option<[Vec3; 2]>,
-    /// How far it has gone through tissue since that, or since it met the tissue, m, and from where.
+    /// The displacement through tissue since the last cut or the first contact: its length and its vector, m.
     pub uncut: f64,
     pub behind: DVec3,
-    /// What it is held by; none: nothing resists.
-    pub holds: Vec<Snag>,
-    /// The shortest edge of what it stands in, m.
+    /// The holds in tissue; without any, nothing resists.
+    pub holds: Vec<BladeHold>,
+    /// The shortest edge of the cells that the blade is in, m.
     pub size: f64,
-    /// What resists, N, and where to.
+    /// The resistance, N, and the direction of the cut.
     pub force: f64,
     pub forward: DVec3,
-    /// Whether the true edge was outside of the tissue as the last step ended; `None`: it is not known.
+    /// True if the true edge was outside the tissue at the end of the last step; `None` if unknown.
     pub was_outside: Option<bool>,
-    /// What it did to the blade in the last step, N, and where, m.
-    pub felt: DVec3,
-    pub felt_at: DVec3,
-    /// Whether it did anything to it then, and in the step before.
+    /// The force on the blade in the last step, N, and its point of application, m.
+    pub force_on_blade: DVec3,
+    pub force_point: DVec3,
+    /// True if tissue pressed the blade in the last step, and in the one before.
     pub touched: [bool; 2],
 }
 
-saved! { Proxy { body, stroke, last, uncut, behind, holds, size, force, forward, was_outside, felt, felt_at, touched } }
+saved! { Proxy { body, stroke, last, uncut, behind, holds, size, force, forward, was_outside, force_on_blade, force_point, touched } }
 
-/// A thread between tissue and the true edge.
+/// A hold: a suture-like constraint between tissue and the true edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Snag {
-    /// The thread's name.
+pub(super) struct BladeHold {
+    /// The id of the constraint.
     pub id: SlotId,
-    /// From the point of the proxy to that of the tissue, m.
+    /// From the proxy's point to the tissue's point, m.
     pub offset: DVec3,
-    /// The way of the point of the true edge that is next to it, in the last step or the next.
-    pub way: Lead,
+    /// The motion of the nearest point of the true edge, in the last step or the next.
+    pub motion: LinearPath,
 }
 
-saved! { Snag { id, offset, way } }
+saved! { BladeHold { id, offset, motion } }
 
-/// A point of the proxy, and the true edge next to it.
+/// A point of the proxy, and the nearest point of the true edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stand {
+pub(super) struct EdgePoint {
     /// m.
     pub point: DVec3,
-    /// How far along the edge, 0 to 1; beyond that it is not next to the edge any more.
+    /// The position along the edge, 0 to 1. Outside this range the nearest point is beyond an end of the edge.
     pub along: f64,
-    /// From there to the true edge, m.
+    /// From the point to the true edge, m.
     pub lag: DVec3,
 }
 
@@ -195,8 +195,8 @@ impl Blade {
         for (name, end) in ["edge[0]", "edge[1]"].into_iter().zip(edge) {
             finite_vector(name, end)?;
             ensure!(
-                end.abs().max_element() <= FURTHEST,
-                "{name} is {end}: must be within {FURTHEST:e} m of the origin along each axis"
+                end.abs().max_element() <= MAX_COORDINATE,
+                "{name} is {end}: must be within {MAX_COORDINATE:e} m of the origin along each axis"
             );
         }
         ensure!(edge[0] != edge[1], "edge has both ends at {}", edge[0]);
@@ -215,20 +215,20 @@ impl Blade {
         })
     }
 
-    /// Its edge before the next step and after it.
+    /// The edge before the next step and after it.
     pub fn edges(&self) -> [[Vec3; 2]; 2] {
         let poses = [self.pose, self.target.unwrap_or(self.pose)];
         poses.map(|pose| self.edge.map(|end| pose.position + pose.orientation * end))
     }
 
-    /// Its edge at places of the next step, which goes straight and turns evenly, from its beginning to its end: so many that it turns little
-    /// from each to the next.
-    pub fn ways(&self) -> (usize, impl Fn(usize) -> [Vec3; 2] + use<>) {
+    /// Positions of the edge over the next step, from start to end. The blade translates and rotates uniformly; the number of positions keeps the
+    /// rotation between two of them small.
+    pub fn edge_positions(&self) -> (usize, impl Fn(usize) -> [Vec3; 2] + use<>) {
         let (edge, from, to) = (self.edge, self.pose, self.target.unwrap_or(self.pose));
         let [start, end] = [from, to].map(|pose| pose.orientation.as_dquat().normalize());
-        let turn = turn_between(start, end);
-        // Of what is no number none is more.
-        let count = ((turn.length() / MOST_TURN).ceil() as usize).max(1);
+        let turn = rotation_between(start, end);
+        // NaN becomes 1.
+        let count = ((turn.length() / MAX_ROTATION).ceil() as usize).max(1);
         let [first, last] = self.edges();
         let at = move |index: usize| {
             if index == 0 {
@@ -238,20 +238,20 @@ impl Blade {
                 return last;
             }
             let part = index as f32 / count as f32;
-            let orientation = turned(start, turn * f64::from(part)).as_quat();
+            let orientation = rotated(start, turn * f64::from(part)).as_quat();
             edge.map(|end| from.position.lerp(to.position, part) + orientation * end)
         };
         (count, at)
     }
 
-    /// The proxy of a body, made where there is none; what it is held by has room.
+    /// The proxy of a body. It is created if the body has none, with room for its holds.
     pub fn proxy(&mut self, body: BodyId) -> Result<usize> {
         if let Some(known) = self.proxies.iter().position(|proxy| proxy.body == body) {
             return Ok(known);
         }
         let proxy = Proxy {
             body,
-            holds: memory::reserved(MOST_HOLDS)?,
+            holds: memory::reserved(MAX_HOLDS)?,
             ..Proxy::default()
         };
         memory::push(&mut self.proxies, proxy)?;
@@ -277,8 +277,8 @@ impl Blade {
     }
 }
 
-impl Snag {
-    /// One of this number, which is nowhere yet. No attachment has place 0.
+impl BladeHold {
+    /// A hold with this number and without a position yet. Slot 0 keeps its id distinct from those of attachments.
     pub fn new(number: u32) -> Self {
         Self {
             id: SlotId {
@@ -286,7 +286,7 @@ impl Snag {
                 generation: number,
             },
             offset: DVec3::ZERO,
-            way: Lead {
+            motion: LinearPath {
                 from: DVec3::ZERO,
                 to: DVec3::ZERO,
             },
@@ -295,44 +295,44 @@ impl Snag {
 }
 
 impl Proxy {
-    /// The direction that it came from where it is, m.
-    pub fn came_along(&self) -> DVec3 {
+    /// The vector along which the proxy reached its position, m.
+    pub fn travel(&self) -> DVec3 {
         if self.uncut > 0.0 { self.behind } else { self.forward }
     }
 }
 
-impl Stand {
-    /// The point next to another on the line of an edge.
+impl EdgePoint {
+    /// The point of an edge's line nearest to `point`.
     pub fn next_to(point: DVec3, edge: [Vec3; 2]) -> Self {
         let [from, to] = edge.map(|end| end.as_dvec3());
-        let way = to - from;
-        let along = (point - from).dot(way) / way.length_squared();
+        let edge = to - from;
+        let along = (point - from).dot(edge) / edge.length_squared();
         Self {
             point,
             along,
-            lag: from + along * way - point,
+            lag: from + along * edge - point,
         }
     }
 
-    /// Whether it is next to the edge itself.
-    pub fn is_beside(&self) -> bool {
+    /// True if the nearest point lies on the edge itself.
+    pub fn is_on_edge(&self) -> bool {
         (0.0..=1.0).contains(&self.along)
     }
 
-    /// Where the true edge is next to it, m.
-    pub fn foot(&self) -> DVec3 {
+    /// The nearest point of the true edge, m.
+    pub fn nearest(&self) -> DVec3 {
         self.point + self.lag
     }
 }
 
-/// The edge that lags behind the true one as it does at these points: linear along it (least squares).
-pub(super) fn edge_behind(stands: &[Stand], edge: [Vec3; 2]) -> [Vec3; 2] {
-    let count = stands.len() as f64;
-    let along = stands.iter().map(|stand| stand.along).sum::<f64>() / count;
-    let lag = stands.iter().map(|stand| stand.lag).sum::<DVec3>() / count;
-    let spread = stands.iter().map(|stand| (stand.along - along).powi(2)).sum::<f64>();
+/// The edge whose lag behind the true edge fits these points, linear along the edge (least squares).
+pub(super) fn lagging_edge(points: &[EdgePoint], edge: [Vec3; 2]) -> [Vec3; 2] {
+    let count = points.len() as f64;
+    let along = points.iter().map(|stand| stand.along).sum::<f64>() / count;
+    let lag = points.iter().map(|stand| stand.lag).sum::<DVec3>() / count;
+    let spread = points.iter().map(|stand| (stand.along - along).powi(2)).sum::<f64>();
     let turn = if spread > SPREAD * SPREAD * count {
-        let products = stands.iter().map(|stand| (stand.along - along) * (stand.lag - lag));
+        let products = points.iter().map(|stand| (stand.along - along) * (stand.lag - lag));
         products.sum::<DVec3>() / spread
     } else {
         DVec3::ZERO

@@ -1,28 +1,28 @@
 //! The bodies of a world.
 
 use super::attachments::Which;
-use super::{FRAME, World, make_walks};
+use super::{FRAME, World, reserve_coupling};
 #[cfg(doc)]
 use crate::base::Error;
 use crate::base::{BodyId, Result, SlotId, memory};
-use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
+use crate::body::{BladeStroke, Body, BodyContext, CutReport, MaterialPoint, StepSettings};
 use crate::cutting::Sweep;
 use crate::def::{Anchor, BodyDefinition};
-use crate::deformable_contact::Skin;
+use crate::deformable_contact::CollisionSurface;
 use crate::solver::{RestStateDefinition, RestStateReport};
 
 impl World {
     /// Adds a body.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: something in the definition is out of its range. [`Error::Unsupported`]: this version
+    /// [`Error::InvalidArgument`]: a value of the definition is out of range. [`Error::Unsupported`]: this version
     /// does not offer its storage or solver. [`Error::OutOfMemory`].
     pub fn create_body(&mut self, definition: &BodyDefinition) -> Result<BodyId> {
-        let needs = Needs {
+        let needs = BodyContext {
             tolerance: self.definition.tolerance > 0.0 && self.definition.substeps == 0,
             tools: self.tool_places(),
             kernel: self.kernel,
-            steps: Steps {
+            steps: StepSettings {
                 length: self.clock.mean_step().unwrap_or(FRAME),
                 substeps: self.definition.substeps,
                 max_substeps: self.definition.max_substeps,
@@ -30,120 +30,120 @@ impl World {
         };
         let mut body = Body::new(definition, needs)?;
         if let Some(contacts) = &mut body.system_mut().contacts {
-            contacts.reserve_dynamic(self.tools.places(), self.dynamic_count())?;
+            contacts.reserve_dynamic(self.tools.slot_count(), self.dynamic_count())?;
         }
-        self.outcomes.try_reserve(self.bodies.places() + 1)?;
+        self.outcomes.try_reserve(self.bodies.slot_count() + 1)?;
         let id = self.bodies.insert(body)?;
-        match self.join_tissue(id).and_then(|()| self.meet_blades(id)) {
+        match self.join_tissue(id).and_then(|()| self.add_to_blades(id)) {
             Ok(()) => Ok(BodyId(id)),
             Err(error) => {
-                self.leave_blades(BodyId(id));
-                self.bodies.take_back(id)?;
+                self.remove_from_blades(BodyId(id));
+                self.bodies.undo_insert(id)?;
                 Err(error)
             }
         }
     }
 
-    /// Lets a body that asks for it meet tissue.
+    /// Adds a body to deformable contact, if its definition enables it.
     pub(super) fn join_tissue(&mut self, id: SlotId) -> Result<()> {
-        let place = self.bodies.place(id)?;
+        let slot = self.bodies.slot(id)?;
         let body = self.bodies.get_mut(id)?;
-        if !body.system().meets_tissue() {
+        if !body.system().collides_with_tissue() {
             return Ok(());
         }
-        body.system_mut().reserve_pressed()?;
-        make_walks(&mut self.walks, place)?;
-        memory::get_or_box(&mut self.tissue)?.join(place, body.system())
+        body.system_mut().reserve_contact_history()?;
+        reserve_coupling(&mut self.coupled, slot)?;
+        memory::get_or_box(&mut self.tissue)?.add_body(slot, body.system())
     }
 
-    /// Removes a body, and with it what is attached of it.
+    /// Removes a body and its attachments.
     ///
     /// # Errors
     /// [`Error::StaleId`].
     pub fn destroy_body(&mut self, body: BodyId) -> Result<()> {
-        let place = self.bodies.place(body.0)?;
+        let slot = self.bodies.slot(body.0)?;
         self.bodies.remove(body.0)?;
         if let Some(tissue) = &mut self.tissue {
-            tissue.leave(&mut self.bodies, place);
+            tissue.remove_body(&mut self.bodies, slot);
         }
         self.forget_attachments_of(body);
-        self.leave_blades(body);
+        self.remove_from_blades(body);
         Ok(())
     }
 
-    /// Cuts a body where a blade's edge passed from one place to another, while its nodes are where they are.
+    /// Cuts a body along the surface swept by a blade's edge, at the current positions of the nodes.
     ///
-    /// Where the blade crosses an edge of the surface, or ends within a triangle, there is a point of the surface from then on: one that is there, or
-    /// on an edge that is there, if it lies within 5 % of the shortest edge of the triangle that is simulated there, in the rest shape. Between them
-    /// the surface is open. What is simulated stays as well shaped as it was: a triangle whose material fell apart is copied for each piece, with nodes
-    /// that are not drawn where its material is beyond the cut, and with its part of masses and stiffnesses; copies share nodes where their
-    /// material hangs together (Molino, Bao, Fedkiw 2004). Springs along no edge of a triangle are taken away where the blade passed through them.
+    /// The render surface gets a new point wherever the blade crosses one of its edges or ends within a triangle, and opens between these points. An
+    /// existing point or edge is used if it lies within 5 % of the shortest edge of the simulated triangle, in the rest shape. The simulation mesh keeps
+    /// its shape (virtual node algorithm: Molino, Bao, Fedkiw 2004). A triangle whose material has separated is copied for each piece, with its share of
+    /// masses and stiffnesses. Beyond the cut the copies have nodes that are not drawn; copies share nodes where their
+    /// material is connected. Springs that lie along no triangle edge are removed where the blade passes through them.
     ///
-    /// Of tetrahedra the edges that the blade crosses are divided in the same way, and faces between points on its way open once one of their
-    /// corners parts: at the latest when a tetrahedron's last edge is crossed. What was inside is drawn from then on. A body of springs alone loses
-    /// those that the blade passed through.
+    /// In tetrahedral bodies the crossed edges are divided in the same way. The faces between the new points open when one of their
+    /// corners separates, at the latest when the last edge of a tetrahedron is crossed. The inner surfaces are drawn from then on. A body of springs alone
+    /// loses the springs that the blade passes through.
     ///
-    /// A sweep that begins just where the last of the body ended goes on with it: it begins where the tissue that the blade stood in has gone
-    /// meanwhile. A blade that stays in tissue that moves so leaves no bridges.
+    /// A sweep that begins exactly where the body's last sweep ended continues it: it begins at the current position of the tissue in which the blade
+    /// stopped. A blade that rests in moving tissue therefore leaves no bridges.
     ///
-    /// Nodes keep their numbers, and new ones are numbered on: copies, which move as what they copied moved, and points of the surface between nodes,
-    /// which have no mass and go where their nodes go. Mass, momentum and energy stay what they were. What holds a node holds it where
-    /// it is drawn; copies of it beyond the cut are free, and have the mass of their material in the mean where it had none.
+    /// Nodes keep their numbers; new nodes are appended. They are copies, which move as their original did, and points of the surface between nodes,
+    /// which have no mass and follow their nodes. Mass, momentum and energy are conserved. A pin or an attachment holds a node where
+    /// it is drawn; copies beyond the cut are free. Copies of a massless node get the mean mass of their material.
     ///
-    /// Terms beside springs go on in parts: home springs with those of the nodes' masses, what goes by springs with those, fibres with the tetrahedra, and hinges of
-    /// bending by area, where pieces of both triangles still share the edge. A hinge whose edge is cut along is gone, with its energy, and so is what a cavity had that is cut open.
+    /// Other forces are divided too: anchor springs by the masses of their nodes, forces along springs with those, fibers with the tetrahedra, and bending
+    /// hinges by area where both triangles still share the edge. A hinge is removed if its edge is cut; an opened cavity loses its pressure.
     ///
-    /// Positions and triangles that were lent before are stale. [`Body::changes_since`] tells a renderer what has changed.
+    /// Positions and triangles that were borrowed before are stale. [`Body::changes_since`] lists the changes for a renderer.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::Unsupported`]: the body was made without [`BodyDefinition::spare_nodes`]. [`Error::InvalidArgument`]: an end of
-    /// the blade is not finite. [`Error::Capacity`]: there are not as many spare nodes left, or a node has no free place in a row of fixed
-    /// length. [`Error::OutOfMemory`]. Then nothing has changed.
+    /// [`Error::StaleId`]. [`Error::Unsupported`]: the body has no [`BodyDefinition::spare_nodes`]. [`Error::InvalidArgument`]: an end of
+    /// the blade is not finite. [`Error::Capacity`]: too few spare nodes are left, or a node has no free slot in a row of fixed
+    /// length. [`Error::OutOfMemory`]. After an error nothing has changed.
     pub fn cut(&mut self, body: BodyId, sweep: &Sweep) -> Result<CutReport> {
-        let report = self.change_topology(body, |it, skin| it.cut(sweep, skin))?;
-        self.bodies.get_mut(body.0)?.show_topology();
+        let report = self.change_topology(body, |content, skin| content.cut(sweep, skin))?;
+        self.bodies.get_mut(body.0)?.publish_topology();
         Ok(report)
     }
 
-    /// The same along a stroke of its own.
-    pub(super) fn cut_along(&mut self, body: BodyId, sweep: &Sweep, stroke: &mut Stroke) -> Result<CutReport> {
-        let report = self.change_topology(body, |it, skin| {
-            it.swap_stroke(stroke);
-            let report = it.cut(sweep, skin);
-            it.swap_stroke(stroke);
+    /// Cuts as [`World::cut`] does, but continues `stroke` instead of the body's own last sweep.
+    pub(super) fn cut_along(&mut self, body: BodyId, sweep: &Sweep, stroke: &mut BladeStroke) -> Result<CutReport> {
+        let report = self.change_topology(body, |content, skin| {
+            content.swap_stroke(stroke);
+            let report = content.cut(sweep, skin);
+            content.swap_stroke(stroke);
             report
         })?;
-        self.bodies.get_mut(body.0)?.show_topology();
+        self.bodies.get_mut(body.0)?.publish_topology();
         Ok(report)
     }
 
-    /// Lets a body change its topology, and what is attached of it follow.
+    /// Changes the topology of a body, and binds its attachments to the new topology.
     pub(super) fn change_topology<T>(
         &mut self,
         body: BodyId,
-        change: impl FnOnce(&mut Body, Option<&mut Skin>) -> Result<T>,
+        change: impl FnOnce(&mut Body, Option<&mut CollisionSurface>) -> Result<T>,
     ) -> Result<T> {
-        let place = self.bodies.place(body.0)?;
-        let carried = self.attached_points(body, place)?;
+        let slot = self.bodies.slot(body.0)?;
+        let carried = self.attached_points(body, slot)?;
         let mut moved = crate::base::memory::reserved(carried.len())?;
-        let it = self.bodies.get_mut(body.0)?;
-        let before = it.topology_version();
-        let skin = self.tissue.as_mut().and_then(|tissue| tissue.skin_mut(place));
-        let changed = change(it, skin)?;
-        if it.topology_version() == before {
+        let content = self.bodies.get_mut(body.0)?;
+        let before = content.topology_version();
+        let skin = self.tissue.as_mut().and_then(|tissue| tissue.surface_mut(slot));
+        let changed = change(content, skin)?;
+        if content.topology_version() == before {
             return Ok(changed);
         }
         for (anchor, point) in carried {
-            let it = self.bodies.get(body.0)?;
-            let now = point.and_then(|point| it.surface_point(&point, before));
+            let content = self.bodies.get(body.0)?;
+            let now = point.and_then(|point| content.surface_point(&point, before));
             let now = now.map_or(anchor, Anchor::Point);
-            // What cannot be bound anew stays bound as it was.
+            // A point that cannot be bound again stays bound as it was.
             if let Ok(bound) = self.bound(body, Which::ONLY, &now) {
                 moved.push((anchor, bound));
             }
         }
-        if let Some(bonds) = self.bonds_mut() {
-            bonds.rebind(place, |bound| {
+        if let Some(point_attachments) = self.point_attachments_mut() {
+            point_attachments.rebind(slot, |bound| {
                 let of = moved.iter().find(|(anchor, _)| Some(*anchor) == bound.anchor);
                 of.map(|(_, now)| *now)
             });
@@ -151,18 +151,18 @@ impl World {
         Ok(changed)
     }
 
-    /// What others are attached to of a body, points with their places in its material; there is room to bind them anew.
-    fn attached_points(&mut self, body: BodyId, place: usize) -> Result<Vec<(Anchor, Option<MaterialPoint>)>> {
+    /// The attached points of a body, with their material points. It reserves room to bind them again.
+    fn attached_points(&mut self, body: BodyId, slot: usize) -> Result<Vec<(Anchor, Option<MaterialPoint>)>> {
         let mut points = Vec::new();
-        let it = self.bodies.get(body.0)?;
+        let content = self.bodies.get(body.0)?;
         let Some(tissue) = &mut self.tissue else {
             return Ok(points);
         };
-        tissue.bonds.reserve_rebinding(place)?;
-        for bound in tissue.bonds.points_of(place) {
+        tissue.attachments.reserve_rebinding(slot)?;
+        for bound in tissue.attachments.points_of(slot) {
             let Some(anchor) = bound.anchor else { continue };
             let at = match &anchor {
-                Anchor::Point(point) => it.material_point(point),
+                Anchor::Point(point) => content.material_point(point),
                 Anchor::Node(_) => None,
             };
             crate::base::memory::push(&mut points, (anchor, at))?;
@@ -170,7 +170,7 @@ impl World {
         Ok(points)
     }
 
-    /// A body, to look at.
+    /// A body, for reading.
     ///
     /// # Errors
     /// [`Error::StaleId`].
@@ -178,7 +178,7 @@ impl World {
         self.bodies.get(body.0)
     }
 
-    /// A body, to change.
+    /// A body, for changing.
     ///
     /// # Errors
     /// [`Error::StaleId`].
@@ -186,21 +186,23 @@ impl World {
         self.bodies.get_mut(body.0)
     }
 
-    /// Moves the free nodes of a body, whatever its solver, to the nearest place downhill where it is at rest under gravity,
-    /// its pins where they are, and the forces applied since the last step, which stay pending. Velocities become zero and what
-    /// holds the pins is known. It is no step: it allocates and may take long. Tools are not taken into account.
+    /// Moves the free nodes of a body to static equilibrium under gravity, pins and the forces applied since the last step, with every solver.
     ///
-    /// A part of a body that hangs on no pin is moved too where the forces on it cancel; how it lies and is turned as a whole is
-    /// then as it happens to be.
+    /// It finds the nearest minimum of the energy that lies downhill. Velocities become zero, and the pin forces are known afterwards. The applied forces
+    /// stay pending. It is not a step: it allocates and can take long. It ignores tools.
+    ///
+    /// A connected component without pins is moved too if the net force on it is zero. Its rigid-body position and orientation are then
+    /// unspecified.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the tolerance is out of its range, or a part is pulled by a net force
-    /// along an axis along which no pin holds it, or the body is attached to a body. [`Error::NotConverged`]: not found in the iterations allowed. [`Error::OutOfMemory`]. Nothing has changed then.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the tolerance is out of range, a net force acts on a component
+    /// along an axis without pins, or the body is attached to a body. [`Error::NotConverged`]: no equilibrium within the allowed iterations.
+    /// [`Error::OutOfMemory`]. After an error nothing has changed.
     pub fn rest_state(&mut self, body: BodyId, definition: &RestStateDefinition) -> Result<RestStateReport> {
         self.check_not_attached(body)?;
         let gravity = self.definition.gravity;
         let body = self.bodies.get_mut(body.0)?;
-        let gravity = body.system().pull(gravity);
+        let gravity = body.system().body_acceleration(gravity);
         body.rest_state(gravity, definition)
     }
 

@@ -1,34 +1,34 @@
-//! Steps of bounded work, and of bounded time.
+//! Steps with a work budget or a time limit.
 //!
-//! A unit of work is one substep of every body of VERLET, or one product with the matrix of every body of IMPLICIT or NEWTON: about one
-//! pass over all springs and elements either way. Where explicit substeps do not suffice for the time that a step is to go on, it goes on for
-//! as long as they do, and the rest is carried to the next step. An equation is solved as far as its products go; what is left of it acts as a force in
-//! the next step. Every such step is a step like any other, so that contact, energy and finiteness hold as in those.
+//! A unit of work is one substep of every VERLET body, or one matrix-vector product of every IMPLICIT or NEWTON body: about one
+//! pass over all springs and elements. If the budget does not cover the explicit substeps of the whole step, the step simulates a shorter time and
+//! carries the rest to the next step. An implicit equation is solved as far as the budget allows; its residual acts as a force in
+//! the next step. Such a step has all guarantees of an ordinary one: contact, energy and finiteness.
 //!
-//! A clock decides how much work a step may do and nothing else: with the same work it does the same, on any machine.
+//! The clock decides only how much work a step may do. With the same work the result is the same on any machine.
 
 use std::time::Instant;
 
 use super::World;
 use crate::base::{Error, Result, StepReport, above_zero, check_clock, ensure};
 
-/// How often a step is tried over a shorter time, because its motion needs shorter substeps than were known.
+/// How often a step is retried over a shorter time because its motion needs shorter substeps than foreseen.
 const TRIES: u32 = 16;
 
-/// The part of the longest stable substep that is counted on.
+/// The fraction of the longest stable substep that is planned for.
 const USED: f64 = 0.79;
 
-/// The work of the first step whose time is bounded, and by how much it may grow from one to the next.
+/// The work of the first step with a time limit, and the largest factor from one step to the next.
 const FIRST_WORK: u32 = 8;
 const GROWTH: u32 = 4;
 
-/// The part of the time that work is planned for.
+/// The fraction of the time limit that is planned for.
 const PLANNED: f64 = 0.7;
 
-/// The pace is the second slowest of so many steps: one that something else on the machine held up is no measure of the next.
+/// The pace is the second slowest of this many steps, so that one step delayed by other programs does not count.
 const STEPS: usize = 8;
 
-/// What a step of bounded work did.
+/// The result of a step with a work budget.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -41,31 +41,31 @@ const STEPS: usize = 8;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BudgetReport {
-    /// What the step did.
+    /// The report of the step.
     pub step: StepReport,
-    /// The units of work that were allowed: [`World::step_with_budget`] with as many does the same.
+    /// The allowed units of work. [`World::step_with_budget`] with this number repeats the step exactly.
     pub work: u32,
-    /// Those that the step that was taken has done, by the body that did most. IMPLICIT may do twice as many as are allowed where something first
-    /// comes near a tool, and one for each millisecond in a grasp and near other tissue.
+    /// The units of work done by the body that did most. IMPLICIT can do twice the allowed work when a body first
+    /// comes near a tool, and one unit for each millisecond in a grasp or near other tissue.
     pub work_done: u32,
-    /// How long the world lags behind the sum of the steps, s.
+    /// The time that requested steps have not simulated yet, s.
     pub lag: f64,
-    /// How far nodes may be from where the equations of the step have them, m: root mean square by mass, the largest of all bodies, 0 for those of
-    /// VERLET. [`World::force_error`] tells what that means for a tool.
+    /// A bound on the position error of unsolved equations, m: mass-weighted root mean square of the worst body, 0 for
+    /// VERLET. [`World::force_error`] is the matching error of the force on a tool.
     pub error: f32,
 }
 
-/// How fast this machine has worked lately. It decides nothing but how much work is allowed.
+/// The recent speed of this machine. It decides only how much work is allowed.
 #[derive(Debug, Default)]
 pub(super) struct WorkPace {
-    /// How long a unit of work took in each of the last steps, s; 0: not known.
+    /// The time of a unit of work in each of the last steps, s; 0 if unknown.
     units: [f64; STEPS],
     next: usize,
     last_work: u32,
 }
 
 impl WorkPace {
-    /// How much work fits into so many seconds.
+    /// The work that fits into `seconds`.
     fn work(&self, seconds: f64) -> u32 {
         let mut units = self.units;
         units.sort_unstable_by(f64::total_cmp);
@@ -85,12 +85,12 @@ impl WorkPace {
 }
 
 impl World {
-    /// Steps everything by `dt` seconds and what earlier steps of this kind have left, as far as `work` units of work go; see
-    /// [`BudgetReport::work`]. Tools, pins and blades go all of their way, and forces act for as long as is simulated.
+    /// Steps the world by `dt` seconds plus the lag of earlier steps, as far as `work` units of work allow; see
+    /// [`BudgetReport::work`]. Tools, pins and blades complete their motion; applied forces act for the simulated time.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: `dt` or `work` is out of its range. [`Error::Unsupported`]: the world has fixed substeps or a tolerance.
-    /// [`Error::Unstable`]: as [`World::step`]; nothing has moved then, and nothing is added to what is left.
+    /// [`Error::InvalidArgument`]: `dt` or `work` is out of range. [`Error::Unsupported`]: the world has fixed substeps or a tolerance.
+    /// [`Error::Unstable`]: as [`World::step`]; nothing has moved then, and the lag stays as it was.
     pub fn step_with_budget(&mut self, dt: f32, work: u32) -> Result<BudgetReport> {
         above_zero("dt", dt)?;
         ensure!(work != 0, "work is 0: must be at least 1");
@@ -100,15 +100,28 @@ impl World {
                     .into(),
             ));
         }
-        let owed = self.lag + f64::from(dt);
+        let requested = self.lag + f64::from(dt);
         let fits = |stable_substep: f32| USED * f64::from(stable_substep) * f64::from(work);
-        let mut length = owed.min(fits(self.known_substep()));
+        let mut length = requested.min(fits(self.known_substep()));
         let mut tried = 0;
         let (step, length) = loop {
-            // In whole where it fits: what is left is exactly nothing then.
-            let taken = if length < owed { length as f32 } else { owed as f32 };
-            match self.step_of(taken, work) {
-                Ok(report) => break (report, if length < owed { f64::from(taken) } else { owed }),
+            // If the whole time fits, the remaining lag is exactly 0.
+            let duration = if length < requested {
+                length as f32
+            } else {
+                requested as f32
+            };
+            match self.step_of(duration, work) {
+                Ok(report) => {
+                    break (
+                        report,
+                        if length < requested {
+                            f64::from(duration)
+                        } else {
+                            requested
+                        },
+                    );
+                }
                 Err(Error::Unstable { report, .. }) if tried < TRIES => {
                     tried += 1;
                     length = (0.9 * length).min(fits(report.stable_substep));
@@ -116,7 +129,7 @@ impl World {
                 Err(error) => return Err(error),
             }
         };
-        self.lag = (owed - length).max(0.0);
+        self.lag = (requested - length).max(0.0);
         let reports = self.bodies.iter().map(|(_, body)| body.solver_report());
         let (products, error) = reports.fold((0, 0.0_f32), |(products, error), report| {
             (report.iterations.max(products), report.error.max(error))
@@ -130,13 +143,13 @@ impl World {
         })
     }
 
-    /// The same with as much work as fits into `seconds`, by what the last steps took: the report tells how much that was.
+    /// Steps as [`World::step_with_budget`] does, with the work that fits into `seconds` at the pace of the last steps. The report has this work.
     ///
-    /// Plan for a part of a frame. Work is measured in passes over all forces, not in time: a step may be late where the machine becomes
-    /// slower from one step to the next, or where it first meets a tool.
+    /// Plan for a part of a frame. Work is measured in passes over all forces, not in time. A step can be late if the machine becomes
+    /// slower, or when a body first touches a tool.
     ///
     /// # Errors
-    /// As [`World::step_with_budget`]; [`Error::InvalidArgument`]: `seconds` is out of its range; [`Error::Unsupported`]: the platform has no clock.
+    /// As [`World::step_with_budget`]. [`Error::InvalidArgument`]: `seconds` is out of range. [`Error::Unsupported`]: the platform has no clock.
     pub fn step_within(&mut self, dt: f32, seconds: f64) -> Result<BudgetReport> {
         above_zero("seconds", seconds)?;
         check_clock("step_within")?;
@@ -147,17 +160,17 @@ impl World {
         Ok(report)
     }
 
-    /// How long the world lags behind what steps with a budget were to simulate, s.
+    /// The time that steps with a budget have not simulated yet, s.
     pub fn lag(&self) -> f64 {
         self.lag
     }
 
-    /// Gives up what steps with a budget have left: that time is not simulated, and the next step covers its own alone.
+    /// Discards the lag of steps with a budget: the next step simulates only its own time.
     pub fn drop_lag(&mut self) {
         self.lag = 0.0;
     }
 
-    /// Steps by `dt` seconds with so much work.
+    /// Steps by `dt` seconds with at most `work` units of work.
     pub(super) fn step_of(&mut self, dt: f32, work: u32) -> Result<StepReport> {
         self.work = work;
         let result = self.step(dt);
@@ -165,7 +178,7 @@ impl World {
         result
     }
 
-    /// The longest explicit substep that is known to be stable and to keep the energy, s; infinity where nothing is known.
+    /// The longest explicit substep known to be stable and to conserve energy, s; infinity if none is known.
     fn known_substep(&self) -> f32 {
         let explicit = self
             .bodies

@@ -1,4 +1,4 @@
-//! What a caller reads of a world, of its tools and blades, and keeps with them.
+//! Getters of a world, its tools and blades, and user data.
 
 use super::World;
 use crate::base::{AttachmentId, BladeId, BodyId, Result, ToolId};
@@ -6,37 +6,37 @@ use crate::contact::Pose;
 use crate::def::CollisionFilter;
 
 impl World {
-    /// The sum of the lengths of the steps that were taken, s.
+    /// The simulated time: the sum of all step lengths, s.
     pub fn time(&self) -> f64 {
         self.clock.time
     }
 
-    /// How many steps were taken.
+    /// The number of steps taken.
     pub fn step_count(&self) -> u64 {
         self.clock.step
     }
 
-    /// Whether a body is there: not destroyed, and of this world as far as its id tells.
+    /// True if the body exists in this world.
     pub fn has_body(&self, body: BodyId) -> bool {
         self.bodies.get(body.0).is_ok()
     }
 
-    /// Whether a tool is there.
+    /// True if the tool exists.
     pub fn has_tool(&self, tool: ToolId) -> bool {
         self.tools.get(tool.0).is_ok()
     }
 
-    /// Whether a blade is there.
+    /// True if the blade exists.
     pub fn has_blade(&self, blade: BladeId) -> bool {
         self.blades.get(blade.0).is_ok()
     }
 
-    /// Whether an attachment or a suture holds: not released, broken, or gone with what it held.
+    /// True if an attachment or suture exists: not released, broken, or destroyed with a body or tool.
     pub fn has_attachment(&self, attachment: AttachmentId) -> bool {
         self.attachments.get(attachment.0).is_ok()
     }
 
-    /// The Coulomb coefficient of a tool.
+    /// The Coulomb friction coefficient of a tool.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId).
@@ -44,7 +44,7 @@ impl World {
         Ok(self.tools.get(tool.0)?.friction)
     }
 
-    /// The largest force that moves a tool, N; infinity: unlimited.
+    /// The largest force that moves a tool, N; infinity without a limit.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId).
@@ -52,7 +52,7 @@ impl World {
         Ok(self.tools.get(tool.0)?.force_limit)
     }
 
-    /// What a tool meets.
+    /// Which bodies a tool collides with.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId).
@@ -60,7 +60,7 @@ impl World {
         Ok(self.tools.get(tool.0)?.filter)
     }
 
-    /// Where a blade is.
+    /// The pose of a blade.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId).
@@ -68,17 +68,17 @@ impl World {
         Ok(self.blades.get(blade.0)?.pose)
     }
 
-    /// What the caller keeps with the world: 0 unless it was set, and after a snapshot.
+    /// The user data of the world; 0 unless set, and 0 after loading a snapshot.
     pub fn user_data(&self) -> usize {
         self.user_data
     }
 
-    /// Keeps a number or a pointer of the caller's with the world; it changes no motion.
+    /// Sets the user data of the world: a number or pointer that the library does not use.
     pub fn set_user_data(&mut self, data: usize) {
         self.user_data = data;
     }
 
-    /// What the caller keeps with a tool: 0 unless it was set, and after a snapshot.
+    /// The user data of a tool; 0 unless set, and 0 after loading a snapshot.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId).
@@ -86,7 +86,7 @@ impl World {
         Ok(self.tools.get(tool.0)?.user_data)
     }
 
-    /// Keeps a number or a pointer of the caller's with a tool; it changes no motion.
+    /// Sets the user data of a tool: a number or pointer that the library does not use.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId).

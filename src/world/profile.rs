@@ -1,4 +1,4 @@
-//! What the stages of a step took, for whoever asks for it.
+//! The times of the stages of a step.
 
 use super::World;
 use crate::base::{Count, Profile, Result, Stage, Stopwatch, check_clock, memory};
@@ -7,7 +7,7 @@ use crate::solver::Outcome;
 /// Times and counts of the last step, whether it was taken or refused.
 ///
 /// Times are in seconds. `step` is the time of the whole step. The other times are sums over the threads that took part, so several threads
-/// can exceed `step` together; with one thread the sum of the stages is less than `step`. What is left is checks and choices of substeps.
+/// can exceed `step` together; with one thread the sum of the stages is less than `step`. The rest is checks and the choice of substeps.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -30,13 +30,13 @@ pub struct StepProfile {
     pub forces: f64,
     /// Bodies of [`Solver::Implicit`](crate::Solver::Implicit) and [`Solver::Newton`](crate::Solver::Newton): their equations, with the forces.
     pub solver: f64,
-    /// The search for what is near a tool or other tissue.
+    /// The search for features near a tool or near another surface.
     pub broad_phase: f64,
-    /// The search for contacts among what is near.
+    /// The search for contacts among those features.
     pub narrow_phase: f64,
     /// Impulses of contacts, attachments and sutures.
     pub contact_solver: f64,
-    /// Taking over the new state, sleep, and what readers and haptic handles see.
+    /// Committing the new state, sleep, and publishing to readers and haptic handles.
     pub publish: f64,
     /// Blades and tears.
     pub cutting: f64,
@@ -44,22 +44,22 @@ pub struct StepProfile {
     pub bodies: u64,
     /// Bodies that slept as a whole.
     pub sleeping_bodies: u64,
-    /// How often the step was tried: more than once where a tool presses harder than its limit.
+    /// The attempts of the step: more than one if a tool exceeds its force limit.
     pub tries: u64,
     /// Substeps of the step that was taken, summed over the bodies.
     pub substeps: u64,
-    /// Products of a matrix and a vector, of the bodies of the solvers that have one.
+    /// Matrix-vector products of implicit solvers, summed over the bodies.
     pub iterations: u64,
-    /// Nodes, edges and faces near tools, summed over all substeps that were tried.
+    /// Nodes, edges and faces near tools, summed over all attempted substeps.
     pub candidates: u64,
-    /// Contacts with tools, summed likewise.
+    /// Contacts with tools, summed over all attempted substeps.
     pub tool_contacts: u64,
-    /// Contacts of tissue with tissue, summed likewise.
+    /// Contacts of bodies with bodies, summed over all attempted substeps.
     pub tissue_contacts: u64,
 }
 
 impl World {
-    /// Times and counts the stages of each step from the next one on, or no longer. A step that is not profiled reads no clock.
+    /// Turns profiling of steps on or off, from the next step on. Without profiling a step reads no clock.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory); [`Error::Unsupported`](crate::Error::Unsupported): the platform has no clock.
@@ -73,7 +73,7 @@ impl World {
         Ok(())
     }
 
-    /// What the last step took; zeros before the first, `None` where steps are not profiled.
+    /// The profile of the last step; zeros before the first, `None` without profiling.
     pub fn profile(&self) -> Option<StepProfile> {
         let profile = self.profile.as_deref()?;
         let seconds = |stage| profile.seconds(stage);
@@ -99,7 +99,7 @@ impl World {
         })
     }
 
-    /// A step begins.
+    /// Clears the profile and starts the time of a step.
     pub(super) fn begin_profile(&self) -> Stopwatch {
         if let Some(profile) = &self.profile {
             profile.begin();
@@ -107,11 +107,11 @@ impl World {
         Stopwatch::start(self.profile.as_deref())
     }
 
-    /// Counts what became of the bodies in a step that was taken.
+    /// Counts the outcomes of the bodies after a step.
     pub(super) fn count_outcomes(&self) {
         let Some(profile) = &self.profile else { return };
-        for (place, body) in self.bodies.iter() {
-            match self.outcomes[place] {
+        for (slot, body) in self.bodies.iter() {
+            match self.outcomes[slot] {
                 Some(Outcome::Asleep) => profile.count(Count::Sleeping, 1),
                 Some(Outcome::Done { substeps, .. }) => {
                     profile.count(Count::Bodies, 1);

@@ -5,12 +5,12 @@ use crate::base::{BodyId, Result};
 use crate::readers::BodyReader;
 
 impl World {
-    /// Makes a reader of a body, for a thread that reads it while the world steps: any number of threads, each with a reader of its own. No more
-    /// than 126 of one body live at a time.
+    /// Creates a reader of a body, for a thread that reads the body while the world steps. Each thread needs its own reader. A body has at most 126
+    /// readers.
     ///
-    /// Each step that moves the body shows it to its readers when it has been taken, and so does what moves or cuts it between steps, at once. A step that
-    /// is refused is never seen, nor one that is not complete. A body that has no readers takes no time or memory for them; one that has keeps two
-    /// copies of its positions more than it has readers, writes one of them each step, and copies its triangles when cuts or tears have changed them.
+    /// Readers see a body after each completed step, and immediately after a call that moves or cuts it. They never see a refused or incomplete step. A
+    /// body without readers uses no time or memory for them. With readers a body keeps two more copies of its positions than it has
+    /// readers. Each step writes one copy; the triangles are copied after cuts and tears.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId). [`Error::Capacity`](crate::Error::Capacity): the body has 126 readers.

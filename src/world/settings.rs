@@ -7,28 +7,28 @@ use crate::soa::PerNode;
 use crate::solver::CoarseStep;
 
 impl World {
-    /// The substeps of a step, 0: as many as stability needs, and how many are allowed then.
+    /// The number of substeps per step, 0 for as many as stability needs, and the largest number then allowed.
     pub fn substeps(&self) -> [u32; 2] {
         [self.definition.substeps, self.definition.max_substeps]
     }
 
-    /// Takes steps in so many substeps from the next on, 0: as many as stability needs, up to `max_substeps`.
+    /// Sets the number of substeps per step, from the next step on. With 0 a step takes as many as stability needs, up to `max_substeps`.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: `max_substeps` is 0. [`Error::OutOfMemory`]. Nothing has changed then.
+    /// [`Error::InvalidArgument`]: `max_substeps` is 0. [`Error::OutOfMemory`]. After an error nothing has changed.
     pub fn set_substeps(&mut self, substeps: u32, max_substeps: u32) -> Result<()> {
         ensure!(max_substeps != 0, "max_substeps is 0: must be at least 1");
         if self.definition.tolerance > 0.0 && substeps == 0 {
-            // What a tolerance compares is kept from now on.
+            // A tolerance compares with a coarse step, which needs its own state.
             let bodies = || self.bodies.iter().filter(|(_, body)| body.system().coarse.is_none());
             let mut made = memory::reserved(bodies().count())?;
-            for (place, body) in bodies() {
+            for (slot, body) in bodies() {
                 let mut coarse = CoarseStep::new(body.node_count())?;
                 coarse.reserve_nodes(body.node_count() + body.system().spare_nodes())?;
-                made.push((place, coarse));
+                made.push((slot, coarse));
             }
-            for (place, coarse) in made {
-                if let Some(body) = self.bodies.at_mut(place) {
+            for (slot, coarse) in made {
+                if let Some(body) = self.bodies.at_mut(slot) {
                     body.system_mut().coarse = Some(coarse);
                 }
             }
@@ -37,15 +37,15 @@ impl World {
         Ok(())
     }
 
-    /// Gives a body other settings from the next step on. What is nearer than a new thickness is pushed off; what passes through other
-    /// tissue that it is to meet counts as crossings, and is led out where that is closed. What sleeps wakes.
+    /// Changes the settings of a body, from the next step on, and wakes it. Surfaces closer than a new thickness are pushed apart. Parts that
+    /// interpenetrate bodies with which the body now collides count as crossings, and are pushed out of closed bodies.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is out of its range. [`Error::Unsupported`]: the body was cut, and what it is
-    /// to meet changes, other than to nothing. [`Error::OutOfMemory`]. Nothing has changed then.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is out of range. [`Error::Unsupported`]: the body was cut, and its collision flags
+    /// change without both becoming 0. [`Error::OutOfMemory`]. After an error nothing has changed.
     pub fn set_body_settings(&mut self, body: BodyId, settings: BodySettings) -> Result<()> {
-        let it = self.bodies.get(body.0)?;
-        let before = it.system().contact;
+        let content = self.bodies.get(body.0)?;
+        let before = content.system().contact;
         let contact = BodyContact {
             thickness: settings.thickness,
             friction: settings.friction,
@@ -53,48 +53,52 @@ impl World {
         };
         contact.check()?;
         settings.sleep.check()?;
-        let sleeps = it.settings().sleep;
-        self.set_meets(body, settings.with_bodies, settings.with_itself)?;
-        if sleeps != settings.sleep
+        let sleep_before = content.settings().sleep;
+        self.set_collisions(body, settings.with_bodies, settings.with_itself)?;
+        if sleep_before != settings.sleep
             && let Err(error) = self.bodies.get_mut(body.0)?.set_sleep(settings.sleep)
         {
-            self.set_meets(body, before.with_bodies, before.with_itself)?;
+            self.set_collisions(body, before.with_bodies, before.with_itself)?;
             return Err(error);
         }
-        let it = self.bodies.get_mut(body.0)?;
+        let content = self.bodies.get_mut(body.0)?;
         if (contact.thickness, contact.friction) != (before.thickness, before.friction) {
-            it.set_contact(BodyContact {
+            content.set_contact(BodyContact {
                 thickness: contact.thickness,
                 friction: contact.friction,
-                ..it.system().contact
+                ..content.system().contact
             });
         }
         Ok(())
     }
 
-    /// Has a body meet other bodies that want it too, or itself, or no longer.
-    fn set_meets(&mut self, body: BodyId, with_bodies: bool, with_itself: bool) -> Result<()> {
-        let place = self.bodies.place(body.0)?;
-        let it = self.bodies.get_mut(body.0)?;
-        let before = it.system().contact;
+    /// Sets whether a body collides with other bodies, and with itself.
+    fn set_collisions(&mut self, body: BodyId, with_bodies: bool, with_itself: bool) -> Result<()> {
+        let slot = self.bodies.slot(body.0)?;
+        let content = self.bodies.get_mut(body.0)?;
+        let before = content.system().contact;
         if (before.with_bodies, before.with_itself) == (with_bodies, with_itself) {
             return Ok(());
         }
-        // A surface that is taken anew would not know which sides were parted.
+        // A new collision surface would not know which sides a cut has separated.
         ensure!(
-            !(with_bodies || with_itself) || it.topology_version() == 0,
+            !(with_bodies || with_itself) || content.topology_version() == 0,
             Error::Unsupported(
                 "meets_bodies and meets_itself of a body that was cut or torn can only both become 0".into(),
             )
         );
-        it.system_mut().contact = BodyContact {
+        content.system_mut().contact = BodyContact {
             with_bodies,
             with_itself,
             ..before
         };
-        it.wake();
-        if let Some(tissue) = self.tissue.as_mut().filter(|_| !it.system().meets_tissue()) {
-            tissue.shed(place);
+        content.wake();
+        if let Some(tissue) = self
+            .tissue
+            .as_mut()
+            .filter(|_| !content.system().collides_with_tissue())
+        {
+            tissue.remove_surface(slot);
         }
         let joined = self.join_tissue(body.0);
         if joined.is_err() {

@@ -1,4 +1,4 @@
-//! A world to bytes and back.
+//! Snapshots: a world as bytes, and back.
 
 use super::{World, WorldDefinition};
 use crate::base::{Error, Result, WorldTag, ensure, memory};
@@ -18,7 +18,7 @@ saved! { WorldDefinition {
     gravity, substeps, max_substeps, tolerance, kernel } leaves { thread_count: 1, tasks: None,
 } }
 
-/// Of everything that is written.
+/// The hash of the layout of all saved types.
 const SHAPE: u64 = {
     let shape = shape_with(WorldDefinition::SHAPE, Body::SHAPE);
     let shape = shape_with(shape, Tool::SHAPE);
@@ -29,15 +29,15 @@ const SHAPE: u64 = {
 };
 
 impl World {
-    /// The world as bytes, of which [`World::load`] makes one that goes on just as this one does, to the bit: with bodies as they were cut and torn,
-    /// contacts, what is held and sewn, blades in mid stroke, what was applied for the next step, and ids, which name the same things there.
+    /// The world as bytes. [`World::load`] restores a world that continues bitwise identically: with cuts and tears, contacts, attachments, sutures,
+    /// blades within a stroke, and forces applied for the next step. Ids are valid in the restored world.
     ///
-    /// What is not of the world is not in it: threads, [`BodyReader`](crate::BodyReader)s and [`Embedding`](crate::Embedding)s, which are made again.
-    /// The bytes are for this version of the library alone, and are the same for any number of threads. Two worlds that were made alike differ
-    /// in the tag of their ids, by which another world refuses them: their states are compared by [`World::state_hash`].
+    /// A snapshot does not contain threads, [`BodyReader`](crate::BodyReader)s and [`Embedding`](crate::Embedding)s; create them again.
+    /// The bytes can be loaded by this version of the library only. They do not depend on the number of threads. The snapshots of two worlds created alike differ
+    /// in the tag of their ids; compare states by [`World::state_hash`].
     ///
     /// # Errors
-    /// [`Error::Unsupported`]: a [`HapticHandle`](crate::HapticHandle) leads a tool, or more room is kept for what may come than bytes can ask for.
+    /// [`Error::Unsupported`]: a [`HapticHandle`](crate::HapticHandle) moves a tool, or the world has reserved more memory than a snapshot can describe.
     /// [`Error::OutOfMemory`].
     pub fn save(&self) -> Result<Vec<u8>> {
         let size = self.snapshot_size()?;
@@ -46,12 +46,12 @@ impl World {
         Ok(bytes)
     }
 
-    /// How many bytes [`World::save_into`] writes.
+    /// The number of bytes that [`World::save_into`] writes.
     ///
     /// # Errors
-    /// [`Error::Unsupported`], as [`World::save`].
+    /// [`Error::Unsupported`], as for [`World::save`].
     pub fn snapshot_size(&self) -> Result<usize> {
-        if let Some(tool) = self.led_by_hand() {
+        if let Some(tool) = self.haptic_tool() {
             return Err(Error::Unsupported(format!(
                 "a haptic handle leads tool {}: its thread cannot be saved, destroy the handle first",
                 tool.0
@@ -69,10 +69,10 @@ impl World {
         Ok(count.size())
     }
 
-    /// The same as [`World::save`] into `bytes`, which are as many as [`World::snapshot_size`] tells.
+    /// Saves the world as [`World::save`] does, into `bytes` of length [`World::snapshot_size`].
     ///
     /// # Errors
-    /// [`Error::Unsupported`], as [`World::save`], and [`Error::InvalidArgument`]: there are more or fewer bytes. Then nothing is written.
+    /// [`Error::Unsupported`], as for [`World::save`]. [`Error::InvalidArgument`]: the length of `bytes` differs. After an error nothing is written.
     pub fn save_into(&self, bytes: &mut [u8]) -> Result<()> {
         let size = self.snapshot_size()?;
         ensure!(
@@ -85,7 +85,7 @@ impl World {
         Ok(())
     }
 
-    /// The same in place of what is in `bytes`, also while a haptic handle leads a tool, as far as that was led.
+    /// Replaces the contents of `bytes` by a snapshot, also while a haptic handle moves a tool.
     pub(super) fn save_again(&self, bytes: &mut Vec<u8>) -> Result<()> {
         let mut count = Writer::new(None);
         self.write(&mut count);
@@ -112,7 +112,7 @@ impl World {
             paths: _,
             dynamic: _,
             tissue,
-            walks,
+            coupled,
             outcomes: _,
             attachments,
             slipped,
@@ -132,7 +132,7 @@ impl World {
             definition.save(to);
             tag.generation().save(to);
             kernel.kernel().save(to);
-            walks.len().save(to);
+            coupled.len().save(to);
             slipped.save(to);
             holds_made.save(to);
             clock.save(to);
@@ -145,20 +145,20 @@ impl World {
         write_section(to, *b"TISS", |to| tissue.save(to));
     }
 
-    /// A world of the bytes that [`World::save`] made, with so many threads, or the caller's job system, as in [`WorldDefinition`].
-    /// Ids of the world that was saved are its own: the two do not refuse each other's.
+    /// Restores a world from a snapshot, with this number of threads or the caller's job system, as in [`WorldDefinition`].
+    /// Ids of the saved world are valid in it.
     ///
-    /// It goes on to the bit where this processor offers the kernel that the world was stepped with; else [`Kernel::Best`] is the best of
-    /// this one. What was cut short, has changed or never was a world is refused as a whole.
+    /// It continues bitwise identically if this processor supports the SIMD level of the saved world. Otherwise [`Kernel::Best`] becomes the best level of
+    /// this processor. Bytes that are truncated, changed or not a snapshot are refused.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: the bytes are no world, or there are too many threads. [`Error::Unsupported`]: they are of another version of the
-    /// library, or this processor does not offer the kernel that the world was created with, or the system not so many threads.
+    /// [`Error::InvalidArgument`]: the bytes are not a snapshot, or `thread_count` is too large. [`Error::Unsupported`]: the snapshot is of another version
+    /// of the library, this processor does not support the SIMD level that the world was created with, or the system cannot start so many threads.
     /// [`Error::OutOfMemory`].
     pub fn load(bytes: &[u8], thread_count: u32, tasks: Option<RunTasks>) -> Result<Self> {
         let portable = Kernel::Portable.choose()?;
         let mut bytes = opened(bytes, SHAPE)?;
-        let (mut world, walk_count) = read_section(&mut bytes, *b"WRLD", portable, |from| {
+        let (mut world, coupled_body_count) = read_section(&mut bytes, *b"WRLD", portable, |from| {
             let definition = WorldDefinition {
                 thread_count,
                 tasks,
@@ -175,7 +175,7 @@ impl World {
             };
             let mut world = Self::with_tag(of_this_kernel, tag)?;
             world.definition.kernel = definition.kernel;
-            let walk_count = usize::load(from)?;
+            let coupled_body_count = usize::load(from)?;
             world.slipped = Saved::load(from)?;
             world.holds_made = Saved::load(from)?;
             world.clock = Saved::load(from)?;
@@ -183,7 +183,7 @@ impl World {
             if !(world.lag >= 0.0 && world.lag.is_finite()) {
                 return Err(from.refusal("a lag that is none"));
             }
-            Ok((world, walk_count))
+            Ok((world, coupled_body_count))
         })?;
         let (kernel, tag) = (world.kernel, world.tag);
         world.bodies = read_section(&mut bytes, *b"BODY", kernel, |from| Slots::load("body", tag, from))?;
@@ -198,12 +198,12 @@ impl World {
             "bytes are no world: something is behind its last section"
         );
         ensure!(
-            walk_count <= world.bodies.places(),
+            coupled_body_count <= world.bodies.slot_count(),
             "bytes are no world: bodies that are not there go together"
         );
-        world.walks = memory::filled(None, walk_count)?;
-        world.outcomes = memory::reserved(world.bodies.places() + 1)?;
-        world.paths = memory::reserved(world.tools.places() + 1)?;
+        world.coupled = memory::filled(None, coupled_body_count)?;
+        world.outcomes = memory::reserved(world.bodies.slot_count() + 1)?;
+        world.paths = memory::reserved(world.tools.slot_count() + 1)?;
         world.reserve_dynamic(world.dynamic_count())?;
         Ok(world)
     }

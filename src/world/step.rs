@@ -1,32 +1,32 @@
-//! A step of a world: plan the tools' ways, attempt every body, then commit all or nothing.
+//! A step of a world: plans the motion of the tools, attempts the step of every body, and commits all bodies or none.
 
 use glam::{DVec3, Vec3};
 
 use super::World;
-use super::rest::{rest_islands, rouse_groups, wake_islands};
+use super::rest::{put_islands_to_sleep, wake_groups_near_tools, wake_islands};
 use crate::base::{
     BodyId, Count, Error, LimitKind, Result, Stage, StepLimit, StepReport, Stopwatch, SubstepLimit, above_zero,
 };
 use crate::body::Body;
-use crate::contact::{TRIES, ToolPath};
+use crate::contact::{MAX_FORCE_LIMIT_TRIES, ToolPath};
 use crate::def::ChoiceReason;
 use crate::deformable_contact::CoupledGroup;
 use crate::slots::Slots;
 use crate::solver::{Outcome, RESERVE, StepRequest, attempt};
 use crate::threads::{Items, Team};
 
-/// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
+/// All threads share a body of at least this many nodes. For a smaller body, waiting for the threads costs more than it saves.
 const SHARED_FROM: usize = 8192;
 
-/// Small bodies of fewer nodes in all are not worth waking anybody.
+/// The least number of nodes of all small bodies group for which other threads are woken.
 const WORTH_SHARING: usize = 1024;
 
 impl World {
-    /// Steps everything by `dt` seconds, above 0.
+    /// Advances all bodies and tools by `dt` seconds, above 0.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: `dt` is out of its range. [`Error::Unstable`]: some body needs more substeps than are
-    /// allowed. Nothing has moved then, pending forces and poses stay pending.
+    /// [`Error::InvalidArgument`]: `dt` is out of range. [`Error::Unstable`]: a body needs more substeps than
+    /// [`max_substeps`](crate::WorldDefinition::max_substeps) allows. Nothing has moved then; pending forces and poses stay pending.
     pub fn step(&mut self, dt: f32) -> Result<StepReport> {
         above_zero("dt", dt)?;
         let watch = self.begin_profile();
@@ -46,27 +46,27 @@ impl World {
             self.step_with(dt, &Team::alone())?
         };
         self.timed(Stage::Cutting, Self::tear);
-        self.timed(Stage::Publish, |world| world.publish_to_hands(dt));
+        self.timed(Stage::Publish, |world| world.publish_haptics(dt));
         Ok(report)
     }
 
-    /// Does something that is timed as this stage.
+    /// Calls `act` and adds its time to the profile of this stage.
     fn timed(&mut self, stage: Stage, act: impl FnOnce(&mut Self)) {
         let watch = Stopwatch::start(self.profile.as_deref());
         act(self);
         watch.stop(self.profile.as_deref(), stage);
     }
 
-    /// The step, with the threads that help.
+    /// Takes the step with the threads of `team`.
     fn step_with(&mut self, dt: f32, team: &Team) -> Result<StepReport> {
-        self.lead_by_hand();
+        self.apply_haptic_poses();
         self.record(|recorder, world| recorder.begin(world, dt));
         self.timed(Stage::Plan, |world| {
-            world.tools.iter_mut().for_each(|(_, tool)| tool.set_out());
-            world.lead_blades();
+            world.tools.iter_mut().for_each(|(_, tool)| tool.begin_step());
+            world.move_holds();
         });
-        self.divide_as_before();
-        let (mut left, mut rounds) = (TRIES, 0);
+        self.divide_masses();
+        let (mut tries_left, mut attempts) = (MAX_FORCE_LIMIT_TRIES, 0);
         let crossings = loop {
             self.timed(Stage::Plan, |world| {
                 world.plan_tools();
@@ -74,12 +74,12 @@ impl World {
             });
             match self.attempt(dt, team) {
                 Ok(crossings) => {
-                    self.press_pinned(dt);
-                    let are_within = left == 0 || self.are_within_limits(dt, left == 1);
-                    if self.are_divided(rounds) && are_within {
+                    self.add_pinned_forces(dt);
+                    let are_within = tries_left == 0 || self.are_within_limits(dt, tries_left == 1);
+                    if self.are_masses_divided(attempts) && are_within {
                         break crossings;
                     }
-                    rounds += 1;
+                    attempts += 1;
                     self.put_back();
                 }
                 Err(report) => {
@@ -95,7 +95,7 @@ impl World {
                     });
                 }
             }
-            left = left.saturating_sub(1);
+            tries_left = tries_left.saturating_sub(1);
         };
         let report = StepReport {
             crossing_body: self.most_crossing(crossings),
@@ -107,8 +107,7 @@ impl World {
         Ok(report)
     }
 
-    /// Lets every body try the step: how many edges pass through tissue then, or what the step would come to where a body cannot
-    /// take it.
+    /// Attempts the step of every body. Returns the number of interpenetrating edges, or the report of a step that some body cannot take.
     fn attempt(&mut self, dt: f32, team: &Team) -> std::result::Result<u32, StepReport> {
         let Self {
             definition,
@@ -117,7 +116,7 @@ impl World {
             dynamic,
             outcomes,
             tissue,
-            walks,
+            coupled,
             profile,
             work,
             ..
@@ -132,8 +131,8 @@ impl World {
             substeps: definition.substeps,
             max_substeps: definition.max_substeps.min(*work),
             work: *work,
-            relieves: *work == u32::MAX,
-            // Fixed substeps are taken as they are.
+            may_add_mass: *work == u32::MAX,
+            // With fixed substeps nothing adapts to a tolerance.
             tolerance: if definition.substeps == 0 {
                 definition.tolerance
             } else {
@@ -146,53 +145,59 @@ impl World {
         };
         let Some(tissue) = tissue else {
             attempt_bodies(bodies, outcomes, &request, |_| true, team);
-            return reported(bodies, outcomes).map(|()| 0);
+            return refuse_unstable(bodies, outcomes).map(|()| 0);
         };
         let watch = Stopwatch::start(profile);
-        rouse_groups(tissue, bodies, request.tools);
+        wake_groups_near_tools(tissue, bodies, request.tools);
         tissue.plan(bodies, dt);
         watch.stop(profile, Stage::BroadPhase);
         let islands = &tissue.islands;
-        attempt_bodies(bodies, outcomes, &request, |place| !islands.has(place), team);
+        attempt_bodies(
+            bodies,
+            outcomes,
+            &request,
+            |body_index| !islands.contains(body_index),
+            team,
+        );
         loop {
             let watch = Stopwatch::start(profile);
             wake_islands(tissue, bodies, outcomes);
             tissue.find_crossings(bodies, false);
             watch.stop(profile, Stage::NarrowPhase);
-            let mut together = CoupledGroup {
-                tissue,
-                walks,
+            let mut group = CoupledGroup {
+                contact: tissue,
+                coupled_bodies: coupled,
                 request: &request,
                 team,
             };
-            together.attempt(bodies, outcomes);
-            if !tissue.plan_again(bodies, dt) {
+            group.attempt(bodies, outcomes);
+            if !tissue.replan(bodies, dt) {
                 break;
             }
         }
-        reported(bodies, outcomes)?;
+        refuse_unstable(bodies, outcomes)?;
         let watch = Stopwatch::start(profile);
         let crossings = tissue.find_crossings(bodies, true);
         watch.stop(profile, Stage::NarrowPhase);
         Ok(crossings)
     }
 
-    /// The body of which most edges pass through tissue, where any do.
+    /// The body with most interpenetrating edges, if there are any.
     fn most_crossing(&self, crossings: u32) -> Option<BodyId> {
         let tissue = self.tissue.as_ref().filter(|_| crossings > 0)?;
         self.bodies.id_at(tissue.most_crossing()?).map(BodyId)
     }
 
-    /// Has what is pinned press the tools that the tried step leads into it.
-    fn press_pinned(&mut self, dt: f32) {
-        for (place, body) in self.bodies.iter_mut() {
-            if let Some(Outcome::Done { substeps, .. }) = self.outcomes[place] {
-                body.system_mut().press_pinned(&self.paths, (substeps, dt));
+    /// Applies the forces of pinned tissue to the tools that have moved into it in the attempted step.
+    fn add_pinned_forces(&mut self, dt: f32) {
+        for (body_index, body) in self.bodies.iter_mut() {
+            if let Some(Outcome::Done { substeps, .. }) = self.outcomes[body_index] {
+                body.system_mut().add_pinned_forces(&self.paths, (substeps, dt));
             }
         }
     }
 
-    /// What the step in progress failed by: of the body that needs most substeps.
+    /// Why the attempted step failed, for the body that needs most substeps.
     fn limit(&self, dt: f32) -> Option<StepLimit> {
         let failed = self.bodies.iter_ids().filter_map(|(id, body)| {
             let Some(Outcome::Unstable { stable_substep, error }) = self.outcomes[id.index()] else {
@@ -212,66 +217,67 @@ impl World {
             body: BodyId(id),
             of,
             is_chosen: body.solver_choice().reason != ChoiceReason::Given,
-            // Less what rounding makes of a whole number.
+            // The factor keeps rounding from adding a substep to a whole number.
             needed: (dt / (RESERVE * stable_substep) * (1.0 - 1e-6)).ceil() as u32,
         })
     }
 
-    /// Takes back what bodies have tried.
+    /// Discards the attempted step of all bodies.
     fn put_back(&mut self) {
         self.bodies
             .iter_mut()
-            .for_each(|(_, body)| body.system_mut().put_back());
+            .for_each(|(_, body)| body.system_mut().rollback());
     }
 
-    /// No step was taken: bodies and blades touch what they touched.
+    /// Keeps the contact events of the last step after a refused one.
     fn keep_touching(&mut self) {
         if let Some(tissue) = &mut self.tissue {
-            tissue.touching.stay();
+            tissue.touching_pairs.keep_previous();
         }
         for proxy in self.blades.iter_mut().flat_map(|(_, blade)| &mut blade.proxies) {
             proxy.touched = [proxy.touched[0]; 2];
         }
     }
 
-    /// Makes the step that was tried the current state.
+    /// Makes the attempted step the current state.
     fn commit(&mut self, dt: f32, team: &Team) {
         self.clock.tick(dt);
         self.bodies.iter_mut().for_each(|(_, body)| body.set_clock(self.clock));
-        let moved_by = (&*self.paths, self.definition.gravity);
+        let motion = (&*self.paths, self.definition.gravity);
         let islands = self.tissue.as_ref().map(|tissue| &tissue.islands);
-        let goes_alone = |place: usize| islands.is_none_or(|islands| !islands.has(place));
-        commit_bodies(&mut self.bodies, &self.outcomes, moved_by, (dt, goes_alone), team);
+        let is_uncoupled = |body_index: usize| islands.is_none_or(|islands| !islands.contains(body_index));
+        commit_bodies(&mut self.bodies, &self.outcomes, motion, (dt, is_uncoupled), team);
         for (index, (_, tool)) in self.tools.iter_mut().enumerate() {
             let [force, torque] = wrench(&self.bodies, &self.outcomes, (index, &self.paths[index]), dt);
-            // Finite, whatever the step's length.
+            // A very short step must not make the force infinite.
             tool.force = force.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
             tool.torque = torque.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
             tool.force_error = force_error(&self.bodies, &self.outcomes, index);
             tool.pose = self.paths[index].end();
-            tool.led_to = tool.target.take().unwrap_or(tool.pose);
-            tool.reach = None;
+            tool.last_target = tool.target.take().unwrap_or(tool.pose);
+            tool.limit_search = None;
         }
         self.end_flights(dt);
         if let Some(tissue) = &mut self.tissue {
-            tissue.bonds.commit(&self.outcomes, dt);
-            tissue.pushes.commit();
-            tissue.touches.commit();
-            let is_asleep = |place: usize| matches!(self.outcomes.get(place), Some(Some(Outcome::Asleep)));
-            tissue.touching.commit(is_asleep);
-            let took = |place: usize| matches!(self.outcomes.get(place), Some(Some(Outcome::Done { .. })));
-            rest_islands(tissue, &mut self.bodies, took);
+            tissue.attachments.commit(&self.outcomes, dt);
+            tissue.warm_start.commit();
+            tissue.contact_reports.commit();
+            let is_asleep = |body_index: usize| matches!(self.outcomes.get(body_index), Some(Some(Outcome::Asleep)));
+            tissue.touching_pairs.commit(is_asleep);
+            let was_taken =
+                |body_index: usize| matches!(self.outcomes.get(body_index), Some(Some(Outcome::Done { .. })));
+            put_islands_to_sleep(tissue, &mut self.bodies, was_taken);
         }
         self.end_slipped();
     }
 
-    /// Whether no tool presses harder than it can; else those that do go less far in the next try, which may be the `last`.
+    /// True if no tool exceeds its force limit. A tool that does moves less far in the next attempt; `last` is true if that is the last one.
     fn are_within_limits(&mut self, dt: f32, last: bool) -> bool {
         let mut are_within = true;
         for (index, (_, tool)) in self.tools.iter_mut().enumerate() {
-            if let Some(reach) = &mut tool.reach {
+            if let Some(reach) = &mut tool.limit_search {
                 let [force, _] = wrench(&self.bodies, &self.outcomes, (index, &self.paths[index]), dt);
-                are_within &= reach.is_allowed(force.length() as f32, tool.force_limit, last);
+                are_within &= reach.accept(force.length() as f32, tool.force_limit, last);
             }
         }
         are_within
@@ -280,17 +286,17 @@ impl World {
     fn plan_tools(&mut self) {
         let mut paths = std::mem::take(&mut self.paths);
         paths.clear();
-        for (place, tool) in self.tools.iter() {
-            let mut path = ToolPath::new(place, tool);
-            // A hand that goes on with what it felt in the last step would tremble on what is so much stiffer than it holds the tool.
-            path.meets_pinned = tool.force_limit < f32::INFINITY || !self.is_in_hand(place);
+        for (slot, tool) in self.tools.iter() {
+            let mut path = ToolPath::new(slot, tool);
+            // Pinned tissue is much stiffer than the coupling to a haptic device, whose force lags one step: the tool would oscillate.
+            path.collides_with_pinned = tool.force_limit < f32::INFINITY || !self.is_in_hand(slot);
             paths.push(path);
         }
         self.paths = paths;
     }
 }
 
-/// The mean force and torque on a tool, by its place among the ways, in the step that was tried, N and N m.
+/// The mean force and torque on a tool in the attempted step, N and N m; `index` counts the tools' paths.
 fn wrench(
     bodies: &Slots<Body>,
     outcomes: &[Option<Outcome>],
@@ -298,11 +304,11 @@ fn wrench(
     dt: f32,
 ) -> [DVec3; 2] {
     let mut wrench = [DVec3::ZERO; 2];
-    for (place, body) in bodies.iter() {
+    for (body_index, body) in bodies.iter() {
         let system = body.system();
-        let (time, [force, torque]) = match outcomes[place] {
+        let (time, [force, torque]) = match outcomes[body_index] {
             Some(Outcome::Asleep) => (system.last_step(), [DVec3::ZERO; 2]),
-            Some(Outcome::Done { substeps, .. }) => (dt, system.pull_of(path.slot, substeps)),
+            Some(Outcome::Done { substeps, .. }) => (dt, system.attachment_wrench(path.slot, substeps)),
             _ => continue,
         };
         if let Some(contacts) = &system.contacts {
@@ -314,16 +320,16 @@ fn wrench(
     wrench
 }
 
-/// By how much, at most, the force on a tool is off in the step that was tried, N.
+/// A bound on the error of the force on a tool in the attempted step, N.
 fn force_error(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], index: usize) -> f32 {
-    let took = |place: usize| matches!(outcomes[place], Some(Outcome::Asleep | Outcome::Done { .. }));
-    let all = bodies.iter().filter(|(place, _)| took(*place));
+    let was_taken = |body_index: usize| matches!(outcomes[body_index], Some(Outcome::Asleep | Outcome::Done { .. }));
+    let all = bodies.iter().filter(|(body_index, _)| was_taken(*body_index));
     let errors = all.filter_map(|(_, body)| Some(body.system().contacts.as_ref()?.loads()[index].force_error));
     errors.sum::<f64>() as f32
 }
 
-/// What the step would come to where a body cannot take it.
-fn reported(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::Result<(), StepReport> {
+/// The report of the attempted step as an error, if some body cannot take it.
+fn refuse_unstable(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::Result<(), StepReport> {
     let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
     if outcomes.iter().flatten().any(unstable) {
         return Err(report(bodies, outcomes, 0));
@@ -331,23 +337,23 @@ fn reported(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::
     Ok(())
 }
 
-/// Whether there is work for more than one thread.
+/// True if there is enough work for more than one thread.
 fn is_worth_sharing(bodies: &Slots<Body>) -> bool {
     let awake = || bodies.iter().filter(|(_, body)| !body.system().is_asleep());
     let sizes = || awake().map(|(_, body)| body.node_count());
     sizes().any(|size| size >= SHARED_FROM) || (sizes().count() > 1 && sizes().sum::<usize>() >= WORTH_SHARING)
 }
 
-/// Attempts the step of every body: the small ones are shared among the threads, the large ones each by all threads.
+/// Attempts the step of every body. Each thread takes some of the small bodies; all threads share each large body.
 fn attempt_bodies(
     bodies: &mut Slots<Body>,
     outcomes: &mut Vec<Option<Outcome>>,
     request: &StepRequest,
-    goes_alone: impl Fn(usize) -> bool + Sync,
+    is_uncoupled: impl Fn(usize) -> bool + Sync,
     team: &Team,
 ) {
     outcomes.clear();
-    outcomes.resize(bodies.places(), None);
+    outcomes.resize(bodies.slot_count(), None);
     let small = bodies
         .iter()
         .filter(|(_, body)| body.node_count() < SHARED_FROM)
@@ -357,21 +363,21 @@ fn attempt_bodies(
         team.pass(
             outcomes.len(),
             (contents, Items::new(outcomes)),
-            |place, (slot, outcome)| {
+            |body_index, (slot, outcome)| {
                 if let Some(body) = slot.content_mut()
                     && body.node_count() < SHARED_FROM
-                    && goes_alone(place)
+                    && is_uncoupled(body_index)
                 {
                     *outcome = Some(attempt(body.system_mut(), request, &Team::alone()));
                 }
             },
         );
     }
-    for (place, body) in bodies.iter_mut() {
-        if outcomes[place].is_none() && goes_alone(place) {
+    for (body_index, body) in bodies.iter_mut() {
+        if outcomes[body_index].is_none() && is_uncoupled(body_index) {
             let alone = Team::alone();
             let team = if body.node_count() < SHARED_FROM { &alone } else { team };
-            outcomes[place] = Some(attempt(body.system_mut(), request, team));
+            outcomes[body_index] = Some(attempt(body.system_mut(), request, team));
         }
     }
 }
@@ -388,9 +394,9 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) ->
         restored_body: None,
         crossing_body: None,
     };
-    for (place, body) in bodies.iter() {
-        let id = || bodies.id_at(place).map(BodyId);
-        let stable_substep = match outcomes[place] {
+    for (body_index, body) in bodies.iter() {
+        let id = || bodies.id_at(body_index).map(BodyId);
+        let stable_substep = match outcomes[body_index] {
             Some(Outcome::Done { substeps, carry, error }) => {
                 if substeps > report.substeps {
                     (report.substeps, report.substeps_body) = (substeps, id());
@@ -418,27 +424,27 @@ fn commit_bodies(
     bodies: &mut Slots<Body>,
     outcomes: &[Option<Outcome>],
     (tools, gravity): (&[ToolPath], Vec3),
-    (dt, goes_alone): (f32, impl Fn(usize) -> bool),
+    (dt, is_uncoupled): (f32, impl Fn(usize) -> bool),
     team: &Team,
 ) {
-    for (place, body) in bodies.iter_mut() {
-        match outcomes[place] {
+    for (body_index, body) in bodies.iter_mut() {
+        match outcomes[body_index] {
             Some(Outcome::Done { substeps, carry, .. }) => {
                 let alone = Team::alone();
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit((substeps, dt), carry, tools, team);
                 let system = body.system_mut();
                 system.fade(dt, team);
-                if goes_alone(place) {
-                    system.doze(dt, (tools, system.pull(gravity)), team);
+                if is_uncoupled(body_index) {
+                    system.update_sleep(dt, (tools, system.body_acceleration(gravity)), team);
                 } else {
-                    system.doze_together(dt);
+                    system.update_sleep_coupled(dt);
                 }
                 body.find_tears(team);
             }
-            Some(Outcome::Asleep) => body.system_mut().sleep_on(),
+            Some(Outcome::Asleep) => body.system_mut().step_asleep(),
             _ => {
-                body.system_mut().stay();
+                body.system_mut().keep_previous();
                 body.find_tears(team);
             }
         }

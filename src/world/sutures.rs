@@ -1,12 +1,12 @@
-//! Sutures: threads between two points, which pull only.
+//! Sutures: threads that pull two points together and never push.
 
 use super::World;
 use super::attachments::{Which, check_limit, refuse_one_point};
 use crate::base::{AttachmentId, BodyId, Error, Result, ensure};
 use crate::def::Anchor;
-use crate::deformable_contact::{Thread, distance};
+use crate::deformable_contact::{SutureThread, distance};
 
-/// What a suture is like.
+/// The definition of a suture.
 ///
 /// ```
 /// # use glam::{Quat, Vec3};
@@ -25,11 +25,11 @@ use crate::deformable_contact::{Thread, distance};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SutureDefinition {
-    /// How long the thread is between its points while nothing pulls, m, at least 0; `None`: as long as they are apart.
+    /// The rest length of the thread, m, at least 0; `None` for the distance between its points.
     pub length: Option<f32>,
-    /// By what force it is longer, N/m, above 0; infinite, the default: it does not stretch.
+    /// The stiffness of the thread, N/m, above 0. With the default, infinity, it does not stretch.
     pub stiffness: f32,
-    /// The force at which it is pulled through the tissue, N, at least 0; 0, the default, or infinite: it holds whatever comes.
+    /// The force at which the suture breaks out of the tissue, N, at least 0. With 0, the default, or infinity it never breaks.
     pub force_limit: f32,
 }
 
@@ -43,7 +43,7 @@ impl Default for SutureDefinition {
     }
 }
 
-/// How a suture is now.
+/// The current state of a suture.
 ///
 /// ```
 /// # use glam::{Quat, Vec3};
@@ -53,7 +53,7 @@ impl Default for SutureDefinition {
 /// # let (left, right) = (left?, right?);
 /// # world.body_mut(right)?.transform(0.11 * Vec3::X, Quat::IDENTITY, None)?;
 /// # let suture = world.suture(left, &Anchor::Node(4), right, &Anchor::Node(0), &SutureDefinition::default())?;
-/// // The points are 1 cm apart, and the thread is just as long.
+/// // The points are 1 cm separation, and the thread is just as long.
 /// let report = world.suture_report(suture)?;
 /// assert!((report.distance - 0.01).abs() < 1e-6);
 /// assert_eq!(report.length, report.distance);
@@ -61,32 +61,31 @@ impl Default for SutureDefinition {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SutureReport {
-    /// How long its thread is while nothing pulls, m.
+    /// The rest length of the thread, m.
     pub length: f32,
-    /// How far apart its points are, m: further than that where it pulls.
+    /// The distance between its points, m. The suture pulls if this exceeds `length`.
     pub distance: f32,
-    /// What the thread stores, J; 0 where it does not stretch. That of bodies is without it.
+    /// The elastic energy of the thread, J; 0 if it cannot stretch. The energy of bodies does not include it.
     pub energy: f64,
 }
 
 impl World {
-    /// Sutures a point of a body to one of another, or of the same: a thread between them, which pulls them together where they are further apart
-    /// than it is long, and never pushes. Each may turn about its point as it likes. What the thread joins still touches.
+    /// Creates a suture between a point of a body and a point of another body, or of the same one. The thread pulls the points together while their distance
+    /// exceeds its length, and never pushes. Each body can rotate about its point. The joined surfaces still collide.
     ///
-    /// It is one of the attachments: [`World::release`] cuts it, [`World::attachment_force`] has the force on `body`, and one that is
-    /// pulled through the tissue is among those that have [slipped](World::slipped): with the step in which its mean force was larger than
-    /// [`SutureDefinition::force_limit`]. It ends with either body. The bodies take their substeps together, as with
-    /// [`World::attach_to_body`]; no stiffness makes them shorter.
+    /// A suture is an attachment: [`World::release`] cuts it, and [`World::attachment_force`] returns the force on `body`. It breaks in a step whose mean
+    /// force exceeds [`SutureDefinition::force_limit`], and is then listed by [`World::slipped`]. Destroying either body destroys it. The bodies
+    /// take their substeps together, as with [`World::attach_to_body`]; the stiffness does not shorten them.
     ///
-    /// A thread that is to be shorter than its points are apart is drawn in as with [`World::set_suture_length`]. No momentum is made; nor
-    /// is any angular momentum, unless points of a thread of next to no length pass each other. Nor is energy, but by drawing it in; what takes
-    /// up a thread that becomes taut within a substep is lost, as is some of what sways along a stiff one.
+    /// A thread shorter than the distance of its points is drawn in as by [`World::set_suture_length`]. Momentum is conserved. So is angular momentum, unless
+    /// the points of a very short thread pass each other. Energy grows only by drawing a thread in. A thread that becomes taut within a substep
+    /// dissipates energy, and so do oscillations along a stiff thread.
     ///
-    /// A compliant constraint by implicit Euler steps (Macklin, Müller, Chentanez 2016) along the thread.
+    /// The method is a compliant constraint along the thread, by implicit Euler steps (Macklin, Müller, Chentanez 2016).
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there is no such node or triangle, weights are negative, not finite or not 1 in sum,
-    /// the two are one point, or a number of the definition is out of its range. [`Error::OutOfMemory`]. Nothing is sutured then.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a node or triangle does not exist, weights are negative, not finite or do not sum to 1,
+    /// the two points are the same, or a number of the definition is out of range. [`Error::OutOfMemory`]. After an error there is no suture.
     pub fn suture(
         &mut self,
         body: BodyId,
@@ -108,37 +107,39 @@ impl World {
         let [own, others] = ["", "other_"].map(|prefix| Which { prefix, index: None });
         let pair = [self.bound(body, own, anchor)?, self.bound(other, others, other_anchor)?];
         refuse_one_point(&pair, [own, others])?;
-        let apart = distance(&self.bodies, &pair);
-        let target = length.map_or(apart, f64::from);
-        let thread = Thread::new(apart.max(target), target, 1.0 / f64::from(stiffness));
+        let separation = distance(&self.bodies, &pair);
+        let target = length.map_or(separation, f64::from);
+        let thread = SutureThread::new(separation.max(target), target, 1.0 / f64::from(stiffness));
         let ids = self.bind([body, other], &[pair], force_limit, Some(thread))?;
         Ok(ids[0])
     }
 
-    /// Tightens a suture, or gives it slack: its thread becomes so long, m, at least 0, evenly over the next step; where it is to become
-    /// shorter no faster than by 0.25 m/s, over as many steps as that takes.
+    /// Tightens or loosens a suture: its rest length becomes `length`, m, at least 0, uniformly over the next step. It shortens by
+    /// 0.25 m/s at most, over several steps if necessary.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: it is no suture, or `length` is out of its range.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the attachment is not a suture, or `length` is out of range.
     pub fn set_suture_length(&mut self, suture: AttachmentId, length: f32) -> Result<()> {
         self.attachments.get(suture.0)?;
         check_length(length)?;
-        let thread = self.bonds_mut().and_then(|bonds| bonds.thread_mut(suture.0));
-        thread.ok_or_else(no_suture)?.target = f64::from(length);
+        let thread = self
+            .point_attachments_mut()
+            .and_then(|point_attachments| point_attachments.thread_mut(suture.0));
+        thread.ok_or_else(no_suture)?.target_length = f64::from(length);
         Ok(())
     }
 
-    /// How a suture is now.
+    /// The current state of a suture.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: it is no suture.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the attachment is not a suture.
     pub fn suture_report(&self, suture: AttachmentId) -> Result<SutureReport> {
         self.attachments.get(suture.0)?;
-        let bonds = self.tissue.as_ref().map(|tissue| &tissue.bonds);
-        let found = bonds.and_then(|bonds| bonds.thread(&self.bodies, suture.0));
+        let point_attachments = self.tissue.as_ref().map(|tissue| &tissue.attachments);
+        let found = point_attachments.and_then(|point_attachments| point_attachments.thread(&self.bodies, suture.0));
         let (thread, distance) = found.ok_or_else(no_suture)?;
         Ok(SutureReport {
-            length: thread.length as f32,
+            length: thread.rest_length as f32,
             distance: distance.min(f64::from(f32::MAX)) as f32,
             energy: thread.energy(distance),
         })

@@ -1,38 +1,37 @@
-//! What a step has stretched too far tears when it has ended.
+//! Tearing of overstretched tissue at the end of a step.
 
 use super::World;
 use crate::base::{BodyId, Result};
-use crate::body::{Body, Torn};
-use crate::def::Withheld;
+use crate::body::{Body, TearOutcome};
+use crate::def::TearRefusal;
 
 impl World {
-    /// Tears bodies, one after the other, at the springs that the step has left beyond what they bear. A tear for which there is no room is
-    /// not made.
+    /// Tears bodies, one after the other, at the springs whose limits the step has exceeded. A tear without room is skipped.
     pub(super) fn tear(&mut self) {
-        for place in 0..self.bodies.places() {
-            while let Some(spring) = self.bodies.at_mut(place).and_then(Body::next_tear) {
-                let why = match self.tear_body(place, spring) {
-                    Ok(Torn::Made) => continue,
-                    Ok(Torn::Not(why)) => why,
-                    Err(_) => Withheld::NoRoom,
+        for slot in 0..self.bodies.slot_count() {
+            while let Some(spring) = self.bodies.at_mut(slot).and_then(Body::next_tear) {
+                let why = match self.tear_body(slot, spring) {
+                    Ok(TearOutcome::Made) => continue,
+                    Ok(TearOutcome::Refused(why)) => why,
+                    Err(_) => TearRefusal::NoRoom,
                 };
-                if let Some(body) = self.bodies.at_mut(place) {
-                    body.withhold_tear(spring, why);
+                if let Some(body) = self.bodies.at_mut(slot) {
+                    body.refuse_tear(spring, why);
                 }
             }
-            if let Some(body) = self.bodies.at_mut(place) {
-                body.show_topology();
+            if let Some(body) = self.bodies.at_mut(slot) {
+                body.publish_topology();
             }
         }
     }
 
-    fn tear_body(&mut self, place: usize, spring: [u32; 2]) -> Result<Torn> {
+    fn tear_body(&mut self, slot: usize, spring: [u32; 2]) -> Result<TearOutcome> {
         let mut ids = self.bodies.iter_ids().map(|(id, _)| id);
-        let id = ids.find(|id| id.index() == place);
+        let id = ids.find(|id| id.index() == slot);
         drop(ids);
         match id {
             Some(id) => self.change_topology(BodyId(id), |body, skin| body.tear(spring, skin)),
-            None => Ok(Torn::Not(Withheld::NoWay)),
+            None => Ok(TearOutcome::Refused(TearRefusal::NoPath)),
         }
     }
 }

@@ -7,8 +7,8 @@ use super::World;
 use crate::base::Error;
 use crate::base::{BladeId, BodyId, Result, ToolId};
 use crate::contact::{
-    BladeContactChange, BodyContactChange, Contact, ContactChange, Contacts, Pose, Tool, ToolDefinition, ToolPath,
-    ToolPlaces,
+    BladeContactChange, BodyContactChange, Contact, ContactChange, Contacts, Pose, Tool, ToolCapacity, ToolDefinition,
+    ToolPath,
 };
 use crate::def::CollisionFilter;
 
@@ -16,13 +16,13 @@ impl World {
     /// Adds a tool.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: something in the definition is out of its range. [`Error::Unsupported`]: this version
+    /// [`Error::InvalidArgument`]: a value of the definition is out of range. [`Error::Unsupported`]: this version
     /// does not offer its detection. [`Error::OutOfMemory`].
     pub fn create_tool(&mut self, definition: &ToolDefinition) -> Result<ToolId> {
         let tool = Tool::new(definition)?;
-        let count = self.tools.places() + 1;
+        let count = self.tools.slot_count() + 1;
         let has_meshes = tool.is_mesh() || self.tools.iter().any(|(_, tool)| tool.is_mesh());
-        let tools = ToolPlaces { count, has_meshes };
+        let tools = ToolCapacity { count, has_meshes };
         self.paths.try_reserve(count)?;
         let made = self
             .bodies
@@ -39,37 +39,37 @@ impl World {
         Ok(id)
     }
 
-    /// What bodies keep of contacts with tools.
+    /// The tool contacts of all bodies.
     pub(super) fn contacts_mut(&mut self) -> impl Iterator<Item = &mut Contacts> {
         let bodies = self.bodies.iter_mut();
         bodies.filter_map(|(_, body)| body.system_mut().contacts.as_deref_mut())
     }
 
-    /// How many tools come before this one.
+    /// The number of tools before this one.
     fn tool_index(&self, tool: ToolId) -> Result<usize> {
-        let slot = self.tools.place(tool.0)?;
-        Ok(self.tools.iter().take_while(|&(place, _)| place < slot).count())
+        let slot = self.tools.slot(tool.0)?;
+        Ok(self.tools.iter().take_while(|&(other, _)| other < slot).count())
     }
 
-    /// Wakes what a tool meets and is near to.
+    /// Wakes the tissue near a tool that collides with it.
     pub(super) fn wake_near(&mut self, tool: ToolId) -> Result<()> {
-        let path = ToolPath::new(self.tools.place(tool.0)?, self.tools.get(tool.0)?);
+        let path = ToolPath::new(self.tools.slot(tool.0)?, self.tools.get(tool.0)?);
         let bodies = self.bodies.iter_mut();
         bodies.for_each(|(_, body)| body.system_mut().wake_near(&path));
         Ok(())
     }
 
-    /// Removes a tool. What is attached to it is let go.
+    /// Removes a tool and its attachments.
     ///
     /// # Errors
     /// [`Error::StaleId`].
     pub fn destroy_tool(&mut self, tool: ToolId) -> Result<()> {
-        let (slot, index) = (self.tools.place(tool.0)?, self.tool_index(tool)?);
+        let (slot, index) = (self.tools.slot(tool.0)?, self.tool_index(tool)?);
         self.wake_near(tool)?;
         self.tools.remove(tool.0)?;
-        // They share what a mesh takes.
+        // The paths share the memory of a mesh.
         self.paths.clear();
-        self.leave_haptics(tool);
+        self.remove_haptics_of(tool);
         self.release_all_of(tool);
         if self.tool_places().is_none() {
             self.drop_contacts();
@@ -79,26 +79,26 @@ impl World {
         Ok(())
     }
 
-    /// What contacts need for tools; `None`: there are none.
-    pub(super) fn tool_places(&self) -> Option<ToolPlaces> {
-        self.tools.iter().next().map(|_| ToolPlaces {
-            count: self.tools.places(),
+    /// The room that contacts need for the tools; `None` without tools.
+    pub(super) fn tool_places(&self) -> Option<ToolCapacity> {
+        self.tools.iter().next().map(|_| ToolCapacity {
+            count: self.tools.slot_count(),
             has_meshes: self.tools.iter().any(|(_, tool)| tool.is_mesh()),
         })
     }
 
-    /// A world without tools keeps nothing for them.
+    /// Frees the tool contacts of all bodies.
     fn drop_contacts(&mut self) {
         let bodies = self.bodies.iter_mut();
         bodies.for_each(|(_, body)| body.system_mut().contacts = None);
     }
 
-    /// Moves a tool to `position`, in metres, over the next step, and turns it to `orientation`, `None`: it stays as it
-    /// is. Tissue gives way. What of its way a tool of limited force has not gone in that step is forgotten: it is sent again.
+    /// Moves a tool to `position`, m, over the next step, and rotates it to `orientation`; `None` keeps its orientation. Tissue gives
+    /// way. If the force limit stops the tool short, the rest of the motion is dropped; call `set_pose` again to continue.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is not finite, a coordinate is further than 1e9 m from 0, or the
-    /// orientation is zero, a [`HapticHandle`](crate::HapticHandle) leads the tool, or it is dynamic.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is not finite, a coordinate is further than 1e9 m from 0, the
+    /// orientation is zero, a [`HapticHandle`](crate::HapticHandle) moves the tool, or it is dynamic.
     pub fn set_pose(&mut self, tool: ToolId, position: Vec3, orientation: Option<Quat>) -> Result<()> {
         self.check_not_led(tool)?;
         self.check_kinematic(tool)?;
@@ -108,7 +108,7 @@ impl World {
         Ok(())
     }
 
-    /// Gives a tool this Coulomb coefficient of friction, at least 0, from the next step on.
+    /// Sets the Coulomb friction coefficient of a tool, at least 0, from the next step on.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: it is below 0 or not finite.
@@ -117,7 +117,7 @@ impl World {
         self.wake_near(tool)
     }
 
-    /// Has this force, N, at least 0, where 0 and infinity mean no limit, be the largest that moves a tool, from the next step on.
+    /// Sets the largest force that moves a tool, N, at least 0, from the next step on. With 0 or infinity there is no limit.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: it is below 0 or not a number.
@@ -125,20 +125,21 @@ impl World {
         self.tools.get_mut(tool.0)?.set_force_limit(limit)
     }
 
-    /// Has a tool meet what this filter says, from the next step on. Tissue that lies within it then is pushed out.
+    /// Sets which bodies a tool collides with, from the next step on. Tissue inside the tool is then pushed out.
     ///
     /// # Errors
     /// [`Error::StaleId`].
     pub fn set_collision_filter(&mut self, tool: ToolId, filter: CollisionFilter) -> Result<()> {
-        // What it has met may be let go, and what it has not may be pushed.
+        // Tissue under the old filter can be released, and tissue under the new one can be pushed.
         self.wake_near(tool)?;
         self.tools.get_mut(tool.0)?.filter = filter;
         self.wake_near(tool)?;
-        self.contacts_mut().for_each(|contacts| contacts.look_again());
+        self.contacts_mut()
+            .for_each(|contacts| contacts.invalidate_candidates());
         Ok(())
     }
 
-    /// Where a tool is.
+    /// The pose of a tool.
     ///
     /// # Errors
     /// [`Error::StaleId`].
@@ -146,13 +147,13 @@ impl World {
         Ok(self.tools.get(tool.0)?.pose)
     }
 
-    /// Where the last step led a tool: where it is, but for one of limited force. Sent there by [`World::set_pose`] step by step, it does the same in
-    /// another world: so what a [`HapticHandle`](crate::HapticHandle) did can be taken down and done again.
+    /// The pose that the last step moved a tool to. It differs from the tool's pose only if a force limit has stopped the tool. Passing these poses
+    /// to [`World::set_pose`] step by step repeats the motion in another world, such as the motion by a [`HapticHandle`](crate::HapticHandle).
     ///
     /// # Errors
     /// [`Error::StaleId`].
     pub fn tool_target(&self, tool: ToolId) -> Result<Pose> {
-        Ok(self.tools.get(tool.0)?.led_to)
+        Ok(self.tools.get(tool.0)?.last_target)
     }
 
     /// The force and the torque on a tool about its position, world axes, mean over the last step, N and N m.
@@ -164,8 +165,8 @@ impl World {
         Ok((tool.force, tool.torque))
     }
 
-    /// How far the force on a tool may be, at most, from what the equations of the last step ask for, N; 0 where bodies of VERLET press it alone, which
-    /// solve none. It says nothing of what the mesh and the step's length cost.
+    /// A bound on the error of the force on a tool from unsolved equations of the last step, N. It is 0 if only VERLET bodies press the tool. It does not
+    /// include the errors of the mesh and of the step length.
     ///
     /// # Errors
     /// [`Error::StaleId`].
@@ -182,33 +183,33 @@ impl World {
         self.tools.iter().map(|(_, tool)| tool)
     }
 
-    /// Where a tool pressed bodies when the last step ended.
+    /// The contacts of a tool with bodies at the end of the last step.
     ///
     /// # Errors
     /// [`Error::StaleId`].
     pub fn contacts(&self, tool: ToolId) -> Result<impl Iterator<Item = Contact>> {
-        let slot = self.tools.place(tool.0)?;
+        let slot = self.tools.slot(tool.0)?;
         let bodies = self.bodies.iter_ids();
         Ok(bodies.flat_map(move |(id, body)| body.contacts_with(slot, BodyId(id))))
     }
 
-    /// Where a body was pressed by other bodies, or by itself, when the last step ended, as if it were a tool: with points of the others and
-    /// forces on it. Bodies that sleep have none.
+    /// The contacts of a body with other bodies and with itself at the end of the last step. Points belong to the other body; forces act
+    /// on this one. Sleeping bodies have no contacts.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId).
     pub fn tissue_contacts(&self, body: BodyId) -> Result<impl Iterator<Item = Contact>> {
-        let place = self.bodies.place(body.0)?;
-        let touches = self.tissue.iter().flat_map(|tissue| tissue.touches.iter());
+        let slot = self.bodies.slot(body.0)?;
+        let touches = self.tissue.iter().flat_map(|tissue| tissue.contact_reports.iter());
         Ok(touches.flat_map(move |touch| {
             let sides = [(0, 1.0), (1, -1.0)].into_iter();
             sides.filter_map(move |(own, sign)| {
                 let other = &touch.sides[1 - own];
-                if touch.sides[own].body != place {
+                if touch.sides[own].body != slot {
                     return None;
                 }
                 let (id, content) = (self.bodies.id_at(other.body)?, self.bodies.at(other.body)?);
-                // A snapshot may hold any number.
+                // A snapshot can contain any number.
                 let are_there = other.nodes.iter().all(|&node| (node as usize) < content.node_count());
                 are_there.then(|| Contact {
                     normal: touch.normal * -sign,
@@ -219,24 +220,24 @@ impl World {
         }))
     }
 
-    /// The bodies that a blade pressed in the last step: the mean of the points that it held, without nodes, and the force on the blade.
+    /// The bodies that a blade pressed in the last step, with the mean of their hold points and the force on the blade. They have no nodes.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId).
     pub fn blade_contacts(&self, blade: BladeId) -> Result<impl Iterator<Item = Contact>> {
         let pressed = self.blades.get(blade.0)?.proxies.iter();
-        let pressed = pressed.filter(|proxy| proxy.felt != DVec3::ZERO);
+        let pressed = pressed.filter(|proxy| proxy.force_on_blade != DVec3::ZERO);
         Ok(pressed.map(|proxy| Contact {
             body: proxy.body,
             nodes: [u32::MAX; 3],
             weights: [0.0; 3],
-            point: proxy.felt_at.as_vec3(),
+            point: proxy.force_point.as_vec3(),
             normal: Vec3::ZERO,
-            force: proxy.felt.as_vec3().clamp(Vec3::MIN, Vec3::MAX),
+            force: proxy.force_on_blade.as_vec3().clamp(Vec3::MIN, Vec3::MAX),
         }))
     }
 
-    /// The tools and bodies that began or ceased to touch in the last step: with a tool or body that was destroyed nothing ceases.
+    /// The pairs of tool and body whose contact began or ended in the last step. Destroying a tool or body ends no contact.
     pub fn contact_changes(&self) -> impl Iterator<Item = ContactChange> {
         self.bodies.iter_ids().flat_map(move |(body, content)| {
             self.tools.iter_ids().filter_map(move |(tool, _)| {
@@ -251,12 +252,12 @@ impl World {
         })
     }
 
-    /// The bodies that began or ceased to touch each other in the last step. Bodies that sleep go on touching; with one that was destroyed nothing
-    /// ceases.
+    /// The pairs of bodies whose contact began or ended in the last step. Sleeping bodies stay in contact. Destroying a body ends no
+    /// contact.
     pub fn body_contact_changes(&self) -> impl Iterator<Item = BodyContactChange> {
-        let pairs = self.tissue.iter().flat_map(|tissue| tissue.touching.changes());
+        let pairs = self.tissue.iter().flat_map(|tissue| tissue.touching_pairs.changes());
         pairs.filter_map(|pair| {
-            let [one, other] = pair.bodies.map(|place| self.bodies.id_at(place).map(BodyId));
+            let [one, other] = pair.bodies.map(|slot| self.bodies.id_at(slot).map(BodyId));
             Some(BodyContactChange {
                 bodies: [one?, other?],
                 has_begun: pair.touched[0],
@@ -264,7 +265,7 @@ impl World {
         })
     }
 
-    /// The blades and bodies of which contact began or ceased in the last step: with a blade or body that was destroyed nothing ceases.
+    /// The pairs of blade and body whose contact began or ended in the last step. Destroying a blade or body ends no contact.
     pub fn blade_contact_changes(&self) -> impl Iterator<Item = BladeContactChange> {
         self.blades.iter_ids().flat_map(|(blade, content)| {
             let changed = content

@@ -5,26 +5,15 @@ use std::fs;
 use std::path::Path;
 
 /// Names that several types have, in modules that do not meet.
-const SHARED: [&str; 20] = [
-    "Changes",
+const SHARED: [&str; 9] = [
     "EdgeInside",
-    "Form",
-    "Frame",
-    "Goal",
-    "Link",
-    "Motion",
     "Overlap",
-    "Parts",
     "PointInside",
     "Product",
     "Shape",
-    "Solved",
-    "Spring",
     "Substep",
     "Surface",
-    "Sweep",
     "Symmetric",
-    "Tangent",
     "View",
 ];
 
@@ -61,4 +50,40 @@ fn a_name_stands_for_one_type() {
         .map(|(name, _)| name)
         .collect();
     assert_eq!(shared, SHARED);
+}
+
+/// Rust files of the repository, by their paths.
+fn rust_files(folder: &Path, files: &mut Vec<String>) {
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("a file").path();
+        let name = path.file_name().expect("a name").to_string_lossy();
+        if path.is_dir() && name != "target" && !name.starts_with('.') {
+            rust_files(&path, files);
+        } else if name.ends_with(".rs") || name.ends_with(".md") {
+            files.push(path.to_string_lossy().into_owned());
+        }
+    }
+}
+
+#[test]
+fn source_files_named_in_documents_and_comments_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    rust_files(root, &mut files);
+    let mut named = 0;
+    for file in files
+        .iter()
+        .filter(|file| !file.ends_with("CHANGELOG.md") && !file.contains("/docs/decisions/"))
+    {
+        let text = fs::read_to_string(file).expect("text");
+        for name in text.split('`').skip(1).step_by(2).filter(|name| name.ends_with(".rs")) {
+            let is_path = name
+                .chars()
+                .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '/' | '.'));
+            let exists = || files.iter().any(|file| file.ends_with(&format!("/{name}")));
+            assert!(!is_path || exists(), "{file} names {name}, which does not exist");
+            named += usize::from(is_path);
+        }
+    }
+    assert!(named > 100, "{named} names");
 }

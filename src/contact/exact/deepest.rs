@@ -1,47 +1,48 @@
-//! The least of a distance along an edge or over a face, by cutting planes (Kelley 1960).
+//! Minimum of the signed distance along an edge or over a face, by cutting planes (Kelley 1960).
 
 use glam::{DVec3, Vec3};
 
-/// Places that are looked at, at most.
-const CUTS: usize = 12;
+/// Maximum number of evaluations.
+const MAX_CUTS: usize = 12;
 
-/// It ends where nothing can be deeper by more than this part of the depth.
-const CLOSE: f64 = 1e-3;
+/// Relative depth tolerance at which the search ends.
+const TOLERANCE: f64 = 1e-3;
 
-/// A point is at a feature's border where a weight is no more.
+/// Largest weight at which a point counts as lying on a feature's border.
 const BORDER: f64 = 1e-6;
 
-/// A point's signed distance from a solid, and the direction away from it.
+/// Signed distance of a point from a solid, and the direction away from it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Signed {
+pub(super) struct SignedDistance {
     pub distance: f64,
     pub normal: DVec3,
 }
 
-/// The deepest point of an edge or face, as weights of its corners.
+/// Deepest point of an edge or face, with barycentric weights.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Deepest {
+pub(super) struct DeepestPoint {
     pub weights: [f64; 3],
-    pub signed: Signed,
+    pub signed: SignedDistance,
 }
 
-/// The deepest point of a feature (2 or 3 corners) from `start` on: exact where the solid is convex, to a thousandth; elsewhere the deepest
-/// of those looked at, and rather one between the ends.
+/// Finds the deepest point of a feature (2 or 3 corners), starting from `start`. For a convex solid it is accurate to
+/// 0.1 %. Otherwise it is the deepest point evaluated, with a preference for the interior.
 ///
-/// Each look gives a plane below which the distance from a convex solid does not lie; the next is where the highest of them is lowest.
+/// Each evaluation gives a plane that bounds the distance from a convex solid from below. The next point is the
+/// minimum of the planes' upper envelope.
 pub(super) fn deepest(
     corners: &[Vec3],
     start: [f64; 3],
-    mut measure: impl FnMut(Vec3) -> Option<Signed>,
-) -> Option<Deepest> {
+    mut measure: impl FnMut(Vec3) -> Option<SignedDistance>,
+) -> Option<DeepestPoint> {
     let count = corners.len();
-    let mut cuts = Cuts::none(count);
-    let mut best: Option<Deepest> = None;
-    // The deepest between the ends, for where the planes prove wrong.
-    let mut inner: Option<Deepest> = None;
+    let mut cuts = CuttingPlanes::none(count);
+    let mut best: Option<DeepestPoint> = None;
+    // Deepest interior point, in case the solid is not convex.
+    let mut interior: Option<DeepestPoint> = None;
     let mut is_convex = true;
     let mut weights = start;
-    while cuts.count < CUTS {
+    while cuts.count < MAX_CUTS {
         let point: DVec3 = corners
             .iter()
             .zip(weights)
@@ -51,45 +52,50 @@ pub(super) fn deepest(
             break;
         };
         if best.is_none_or(|best| signed.distance < best.signed.distance) {
-            best = Some(Deepest { weights, signed });
+            best = Some(DeepestPoint { weights, signed });
         }
-        if signed.distance < inner.map_or(0.0, |inner| inner.signed.distance) && lies_between(&weights[..count]) {
-            inner = Some(Deepest { weights, signed });
+        if signed.distance < interior.map_or(0.0, |interior| interior.signed.distance) && is_interior(&weights[..count])
+        {
+            interior = Some(DeepestPoint { weights, signed });
         }
-        is_convex &= signed.distance >= cuts.bound - CLOSE * cuts.bound.abs();
+        is_convex &= signed.distance >= cuts.bound - TOLERANCE * cuts.bound.abs();
         let heights = corners
             .iter()
             .map(|corner| signed.distance + signed.normal.dot(corner.as_dvec3() - point));
         cuts.add(heights);
-        let found = best.map_or(0.0, |best| best.signed.distance);
-        if cuts.bound >= found - CLOSE * found.abs() {
+        let depth = best.map_or(0.0, |best| best.signed.distance);
+        if cuts.bound >= depth - TOLERANCE * depth.abs() {
             break;
         }
         weights = cuts.lowest;
     }
-    let at_border = best.is_some_and(|best| !lies_between(&best.weights[..count]));
-    if at_border && !is_convex { inner.or(best) } else { best }
+    let at_border = best.is_some_and(|best| !is_interior(&best.weights[..count]));
+    if at_border && !is_convex {
+        interior.or(best)
+    } else {
+        best
+    }
 }
 
-/// Whether a point with these weights lies within its feature, and not at its border.
-pub(super) fn lies_between(weights: &[f64]) -> bool {
+/// Returns true if a point with these weights lies in its feature's interior.
+pub(super) fn is_interior(weights: &[f64]) -> bool {
     weights.iter().all(|&weight| weight > BORDER)
 }
 
-/// Planes above which the distance from a convex solid lies, and where the highest of them is lowest.
-struct Cuts {
-    /// Their heights at the feature's corners.
-    planes: [[f64; 3]; CUTS],
+/// Lower bounds of the distance from a convex solid, and the minimum of their upper envelope.
+struct CuttingPlanes {
+    /// Heights of the planes at the feature's corners.
+    planes: [[f64; 3]; MAX_CUTS],
     count: usize,
     corners: usize,
     lowest: [f64; 3],
     bound: f64,
 }
 
-impl Cuts {
+impl CuttingPlanes {
     fn none(corners: usize) -> Self {
         Self {
-            planes: [[0.0; 3]; CUTS],
+            planes: [[0.0; 3]; MAX_CUTS],
             count: 0,
             corners,
             lowest: [0.0; 3],
@@ -97,23 +103,23 @@ impl Cuts {
         }
     }
 
-    /// Adds one with these heights. Where it is above what was lowest, that is on it now: at a corner, or where it meets another over an edge, or
-    /// two others.
+    /// Adds a plane with these heights. If it cuts off the minimum, the new minimum lies on it: at a corner, at its
+    /// intersection with another plane over an edge, or with two others.
     fn add(&mut self, heights: impl Iterator<Item = f64>) {
         let (others, free) = self.planes.split_at_mut(self.count);
         let plane = &mut free[0];
         plane.iter_mut().zip(heights).for_each(|(to, height)| *to = height);
         let (plane, corners) = (*plane, self.corners);
-        let over = |plane: &[f64; 3], at: [f64; 3]| plane[0] * at[0] + plane[1] * at[1] + plane[2] * at[2];
+        let height = |plane: &[f64; 3], at: [f64; 3]| plane[0] * at[0] + plane[1] * at[1] + plane[2] * at[2];
         self.count += 1;
-        if over(&plane, self.lowest) <= self.bound {
+        if height(&plane, self.lowest) <= self.bound {
             return;
         }
         let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
-        let mut look = |weights: [f64; 3]| {
+        let mut consider = |weights: [f64; 3]| {
             if weights.iter().all(|&weight| weight >= 0.0) {
-                let heights = others.iter().map(|plane| over(plane, weights));
-                let here = heights.fold(over(&plane, weights), f64::max);
+                let heights = others.iter().map(|plane| height(plane, weights));
+                let here = heights.fold(height(&plane, weights), f64::max);
                 if here < best.1 {
                     best = (weights, here);
                 }
@@ -122,27 +128,27 @@ impl Cuts {
         for corner in 0..corners {
             let mut weights = [0.0; 3];
             weights[corner] = 1.0;
-            look(weights);
+            consider(weights);
         }
-        let apart = |other: &[f64; 3]| DVec3::from_array(plane) - DVec3::from_array(*other);
+        let difference = |other: &[f64; 3]| DVec3::from_array(plane) - DVec3::from_array(*other);
         for (index, other) in others.iter().enumerate() {
-            let first = apart(other);
+            let first = difference(other);
             for [i, j] in [[0, 1], [1, 2], [2, 0]] {
                 if i.max(j) < corners && first[i] * first[j] < 0.0 {
                     let mut weights = [0.0; 3];
                     weights[i] = first[j] / (first[j] - first[i]);
                     weights[j] = 1.0 - weights[i];
-                    look(weights);
+                    consider(weights);
                 }
             }
             if corners < 3 {
                 continue;
             }
             for second in &others[..index] {
-                let weights = first.cross(apart(second));
+                let weights = first.cross(difference(second));
                 let sum = weights.element_sum();
                 if sum != 0.0 {
-                    look((weights / sum).to_array());
+                    consider((weights / sum).to_array());
                 }
             }
         }

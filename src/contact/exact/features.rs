@@ -1,32 +1,32 @@
-//! How nodes, edges and faces are closest to a solid.
+//! Closest points between a solid and nodes, edges and faces.
 
 use glam::{DVec3, Vec3};
 
-use super::coarse::Between;
-use super::deepest::{Deepest, deepest, lies_between};
+use super::deepest::{DeepestPoint, deepest, is_interior};
+use super::distance_cache::DistanceRange;
 use super::separating_planes::SeparatingPlanes;
 use super::{ExactSolid, ROUNDING, TOUCHING};
 use crate::contact::closest::Closest;
-use crate::geometry::Bounds;
-use crate::geometry::nearest::{Spot, nearest_of_segments, nearest_on_triangle, weighted};
+use crate::geometry::Aabb;
+use crate::geometry::nearest::{TriangleFeature, nearest_on_segments, nearest_on_triangle, weighted};
 use crate::geometry::predicates::pierce;
 
-/// Where a way that begins on the surface is on it no more.
-const BEGUN: f64 = 1e-6;
+/// Least fraction of a path that begins on the surface, after which it is off the surface.
+const START_TOLERANCE: f64 = 1e-6;
 
-/// Crossings of one edge that are looked at, at most.
-const CROSSINGS: usize = 16;
+/// Maximum number of crossings considered for an edge.
+const MAX_CROSSINGS: usize = 16;
 
-/// Crossings of one face that a search within the solid starts from, at most.
-const STARTS: usize = 4;
+/// Maximum number of crossings of a face from which the search inside the solid starts.
+const MAX_STARTS: usize = 4;
 
-/// A pair of closest points of a feature and a part of the solid.
+/// A pair of closest points of a feature and of an edge or corner of the solid.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
     weights: [f64; 3],
     /// From the solid to the feature.
     offset: DVec3,
-    squared: f64,
+    distance_squared: f64,
 }
 
 impl Pair {
@@ -34,24 +34,24 @@ impl Pair {
         Self {
             weights,
             offset,
-            squared: offset.length_squared(),
+            distance_squared: offset.length_squared(),
         }
     }
 }
 
-/// The closest pairs of a feature so far.
+/// The closest pairs found for a feature.
 #[derive(Clone, Copy, Debug)]
 struct ClosestPairs {
-    /// Between the feature's ends.
+    /// In the feature's interior.
     inner: Option<Pair>,
-    /// At its border.
+    /// At the feature's border.
     border: Option<Pair>,
     limit: f64,
 }
 
 impl ExactSolid {
-    /// The closest that a node, edge or face (1, 2 or 3 corners) comes; `None` where it is outside and further than `within`, or
-    /// closest at its border to something that is closer to a smaller feature.
+    /// Returns the closest point of a node, edge or face (1, 2 or 3 corners); `None` if it is further outside than
+    /// `within`, or if its closest point lies on its border, where a smaller feature is closer.
     pub fn closest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
         match *corners {
             [point] => self.closest_to_point(point, within),
@@ -74,62 +74,64 @@ impl ExactSolid {
     fn closest_to_edge(&self, corners: [Vec3; 2], within: f32) -> Option<Closest> {
         let middle = (corners[0] + corners[1]) * 0.5;
         let radius = corners[0].distance(corners[1]) * 0.5;
-        let known = self.between(middle);
-        if known.least > (radius + within) * (1.0 + ROUNDING) {
+        let range = self.distance_range(middle);
+        if range.min > (radius + within) * (1.0 + ROUNDING) {
             return None;
         }
         let ends = corners.map(|corner| corner.as_dvec3());
         let mut pairs = ClosestPairs::within(within);
-        let mut crossings = [(0.0, false); CROSSINGS];
+        let mut crossings = [(0.0, false); MAX_CROSSINGS];
         let mut count = 0;
-        let bounds = Bounds::of(corners.into_iter());
+        let bounds = Aabb::of(corners.into_iter());
         let mut distance = within;
         let planes = SeparatingPlanes::edge(corners);
-        self.tree.near(&bounds, pairs.limit as f32, |place| {
-            let placed = self.tree.placed(place);
-            if placed.is_beside(&corners, distance) || planes.is_beyond(&placed.corners, distance) {
+        self.tree.near(&bounds, pairs.limit as f32, |slot| {
+            let placed = self.tree.placed(slot);
+            if placed.is_beside(&corners, distance) || planes.separates(&placed.corners, distance) {
                 return pairs.limit as f32;
             }
-            if count < CROSSINGS
+            if count < MAX_CROSSINGS
                 && !placed.is_beside(&corners, 0.0)
-                && let Some(crossing) = self.crossing(ends, place)
+                && let Some(crossing) = self.crossing(ends, slot)
             {
                 crossings[count] = crossing;
                 count += 1;
             }
-            for edge in self.facets.salient_edges(place) {
-                let others = self.facets.ends(edge);
-                let (along, other) = nearest_of_segments(ends[0], ends[1], others[0], others[1]);
-                let offset = ends[0].lerp(ends[1], along) - others[0].lerp(others[1], other);
-                let pair = Pair::new([1.0 - along, along, 0.0], offset);
-                let between = along > 0.0 && along < 1.0 && (0.0..=1.0).contains(&other);
-                let at_end = other == 0.0 || other == 1.0;
-                let across = || {
-                    let way = others[1] - others[0];
-                    let along = offset.dot(way);
-                    !at_end || along * along <= 1e-12 * offset.length_squared() * way.length_squared()
+            for edge in self.facets.convex_edges(slot) {
+                let solid_ends = self.facets.ends(edge);
+                let (parameter, solid_parameter) = nearest_on_segments(ends[0], ends[1], solid_ends[0], solid_ends[1]);
+                let offset = ends[0].lerp(ends[1], parameter) - solid_ends[0].lerp(solid_ends[1], solid_parameter);
+                let pair = Pair::new([1.0 - parameter, parameter, 0.0], offset);
+                let is_interior = parameter > 0.0 && parameter < 1.0 && (0.0..=1.0).contains(&solid_parameter);
+                let at_end = solid_parameter == 0.0 || solid_parameter == 1.0;
+                let is_perpendicular = || {
+                    let edge = solid_ends[1] - solid_ends[0];
+                    let component = offset.dot(edge);
+                    !at_end || component * component <= 1e-12 * offset.length_squared() * edge.length_squared()
                 };
-                pairs.see(pair, || between && across() && self.facets.leads_off_edge(edge, offset));
+                pairs.add(pair, || {
+                    is_interior && is_perpendicular() && self.facets.is_in_edge_cone(edge, offset)
+                });
             }
-            for node in self.facets.salient_nodes(place) {
+            for node in self.facets.convex_nodes(slot) {
                 let position = self.facets.position(node);
-                let way = ends[1] - ends[0];
-                let along = ((position - ends[0]).dot(way) / way.length_squared()).clamp(0.0, 1.0);
-                let along = if along >= 0.0 { along } else { 0.0 };
-                let offset = ends[0].lerp(ends[1], along) - position;
-                let pair = Pair::new([1.0 - along, along, 0.0], offset);
-                pairs.see(pair, || {
-                    along > 0.0 && along < 1.0 && self.facets.leads_off_node(node, offset)
+                let edge = ends[1] - ends[0];
+                let parameter = ((position - ends[0]).dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+                let parameter = if parameter >= 0.0 { parameter } else { 0.0 };
+                let offset = ends[0].lerp(ends[1], parameter) - position;
+                let pair = Pair::new([1.0 - parameter, parameter, 0.0], offset);
+                pairs.add(pair, || {
+                    parameter > 0.0 && parameter < 1.0 && self.facets.is_in_node_cone(node, offset)
                 });
             }
             distance = (pairs.limit as f32).sqrt() * (1.0 + ROUNDING);
             pairs.limit as f32
         });
         if count > 0 {
-            let start = longest_within(&mut crossings[..count]);
-            return self.deepest_of(&corners, [1.0 - start, start, 0.0], &pairs);
+            let start = middle_of_longest_inside(&mut crossings[..count]);
+            return self.deepest_or_outside(&corners, [1.0 - start, start, 0.0], &pairs);
         }
-        self.apart_or_within(&corners, middle, known, &pairs)
+        self.closest_on_one_side(&corners, middle, range, &pairs)
     }
 
     fn closest_to_face(&self, corners: [Vec3; 3], within: f32) -> Option<Closest> {
@@ -137,46 +139,48 @@ impl ExactSolid {
         let radius = corners
             .iter()
             .fold(0.0_f32, |radius, corner| radius.max(corner.distance(middle)));
-        let known = self.between(middle);
-        if known.least > (radius + within) * (1.0 + ROUNDING) {
+        let range = self.distance_range(middle);
+        if range.min > (radius + within) * (1.0 + ROUNDING) {
             return None;
         }
         let face = corners.map(|corner| corner.as_dvec3());
         let mut pairs = ClosestPairs::within(within);
-        let mut crossed = [None; STARTS];
+        let mut crossings = [None; MAX_STARTS];
         let mut count = 0;
-        let bounds = Bounds::of(corners.into_iter());
+        let bounds = Aabb::of(corners.into_iter());
         let planes = SeparatingPlanes::face(corners);
-        self.tree.near(&bounds, pairs.limit as f32, |place| {
-            if planes.is_beyond(&self.tree.placed(place).corners, within) {
+        self.tree.near(&bounds, pairs.limit as f32, |slot| {
+            if planes.separates(&self.tree.placed(slot).corners, within) {
                 return pairs.limit as f32;
             }
-            if count < STARTS {
-                crossed[count] = self.crossed(corners, &planes, place);
-                count += usize::from(crossed[count].is_some());
+            if count < MAX_STARTS {
+                crossings[count] = self.face_crossing(corners, &planes, slot);
+                count += usize::from(crossings[count].is_some());
             }
-            for node in self.facets.salient_nodes(place) {
+            for node in self.facets.convex_nodes(slot) {
                 let position = self.facets.position(node);
-                let (weights, part) = nearest_on_triangle(position, face);
+                let (weights, spot) = nearest_on_triangle(position, face);
                 let offset = weighted(face, weights) - position;
                 let pair = Pair::new(weights, offset);
-                pairs.see(pair, || part == Spot::Face && self.facets.leads_off_node(node, offset));
+                pairs.add(pair, || {
+                    spot == TriangleFeature::Face && self.facets.is_in_node_cone(node, offset)
+                });
             }
             pairs.limit as f32
         });
         if count == 0 {
-            return self.apart_or_within(&corners, middle, known, &pairs);
+            return self.closest_on_one_side(&corners, middle, range, &pairs);
         }
         let mut best: Option<Closest> = None;
-        let starts = crossed.into_iter().flatten();
-        let starts = starts.map(|(weights, normals)| self.start_within(face, weights, normals));
-        // What passes through a sharp or folded edge may start outside: then from elsewhere, and from corners.
+        let starts = crossings.into_iter().flatten();
+        let starts = starts.map(|(weights, normals)| self.interior_start(face, weights, normals));
+        // A crossing of a sharp or folded edge may give a start outside. Further starts are the corners.
         for start in starts.chain([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]) {
-            let found = self.deepest_of(&corners, start, &pairs);
-            if let Some(found) = found
-                && best.is_none_or(|best| found.distance < best.distance)
+            let candidate = self.deepest_or_outside(&corners, start, &pairs);
+            if let Some(candidate) = candidate
+                && best.is_none_or(|best| candidate.distance < best.distance)
             {
-                best = Some(found);
+                best = Some(candidate);
             }
             if best.is_some_and(|best| best.distance < 0.0) {
                 break;
@@ -185,33 +189,36 @@ impl ExactSolid {
         best
     }
 
-    /// A point, as weights, where a face, which lies between these planes, and the border of the triangle at a place pass through each other, and
-    /// the normals of what meets there.
-    pub(super) fn crossed(
+    /// Returns a point of a face, as weights, where it crosses the border of the triangle at a tree slot, and the
+    /// normals of the solid's faces there. `planes` are those of the face.
+    pub(super) fn face_crossing(
         &self,
         corners: [Vec3; 3],
         planes: &SeparatingPlanes,
-        place: usize,
+        slot: usize,
     ) -> Option<([f64; 3], [DVec3; 2])> {
-        let placed = self.tree.placed(place);
-        // Most are told apart before rounding would decide.
-        if placed.is_beside(&corners, 0.0) || planes.is_beyond(&placed.corners, 0.0) {
+        let placed = self.tree.placed(slot);
+        // Most pairs are separated clearly, so that rounding does not matter.
+        if placed.is_beside(&corners, 0.0) || planes.separates(&placed.corners, 0.0) {
             return None;
         }
         let (triangle, face) = (placed.exact(), corners.map(|corner| corner.as_dvec3()));
-        if lies_beside(triangle, face) || lies_beside(face, triangle) {
+        if is_on_one_side(triangle, face) || is_on_one_side(face, triangle) {
             return None;
         }
-        let normal = self.facets.normal(place, Spot::Face);
-        for ([p, q], others) in self.facets.edges(place) {
+        let normal = self.facets.normal(slot, TriangleFeature::Face);
+        for ([p, q], other_normals) in self.facets.edges(slot) {
             let (p, q) = (p.as_dvec3(), q.as_dvec3());
             if let Some((fraction, _)) = pierce(p, q, face, [0, 1, 2]) {
-                return Some((nearest_on_triangle(p.lerp(q, fraction), face).0, [normal, others]));
+                return Some((
+                    nearest_on_triangle(p.lerp(q, fraction), face).0,
+                    [normal, other_normals],
+                ));
             }
         }
         for side in 0..3 {
             let next = (side + 1) % 3;
-            if let Some((fraction, _)) = self.crossing([face[side], face[next]], place) {
+            if let Some((fraction, _)) = self.crossing([face[side], face[next]], slot) {
                 let mut weights = [0.0; 3];
                 weights[side] = 1.0 - fraction;
                 weights[next] = fraction;
@@ -221,67 +228,75 @@ impl ExactSolid {
         None
     }
 
-    /// A point of a face within the solid, found from one of its points on the surface on, where that has these normals: midway between them, so
-    /// that it stays within a sharp edge.
-    fn start_within(&self, face: [DVec3; 3], weights: [f64; 3], normals: [DVec3; 2]) -> [f64; 3] {
-        let across = (face[1] - face[0]).cross(face[2] - face[0]);
-        let [one, other] = normals.map(|normal| normal.reject_from(across).normalize_or_zero());
+    /// Returns a point of a face inside the solid, starting from a point on the surface with these normals. It lies
+    /// midway between two surfaces, so that it stays inside a sharp edge.
+    fn interior_start(&self, face: [DVec3; 3], weights: [f64; 3], normals: [DVec3; 2]) -> [f64; 3] {
+        let face_normal = (face[1] - face[0]).cross(face[2] - face[0]);
+        let [one, other] = normals.map(|normal| normal.reject_from(face_normal).normalize_or_zero());
         let inward = -(one + other);
-        // How fast each weight grows on the way, and where the first is used up.
-        let rate = |from: usize, to: usize| across.dot((face[to] - face[from]).cross(inward)) / across.length_squared();
+        // Rates of change of the weights along the path; the path ends at the first weight that reaches 0.
+        let rate = |from: usize, to: usize| {
+            face_normal.dot((face[to] - face[from]).cross(inward)) / face_normal.length_squared()
+        };
         let rates = [rate(1, 2), rate(2, 0), rate(0, 1)];
-        let furthest = (0..3).fold(f64::INFINITY, |furthest: f64, corner| {
+        let path_length = (0..3).fold(f64::INFINITY, |path_length: f64, corner| {
             if rates[corner] < 0.0 {
-                furthest.min(weights[corner] / -rates[corner])
+                path_length.min(weights[corner] / -rates[corner])
             } else {
-                furthest
+                path_length
             }
         });
-        if !(furthest > 0.0 && furthest.is_finite()) {
+        if !(path_length > 0.0 && path_length.is_finite()) {
             return weights;
         }
         let from = weighted(face, weights);
-        let ends = [from, from + inward * furthest];
-        let mut leaves = 1.0_f64;
-        let bounds = Bounds::of(ends.map(|end| end.as_vec3()).into_iter());
-        self.tree.near(&bounds, 0.0, |place| {
-            if let Some((fraction, false)) = self.crossing(ends, place)
-                && fraction > BEGUN
+        let ends = [from, from + inward * path_length];
+        let mut exit = 1.0_f64;
+        let bounds = Aabb::of(ends.map(|end| end.as_vec3()).into_iter());
+        self.tree.near(&bounds, 0.0, |slot| {
+            if let Some((fraction, false)) = self.crossing(ends, slot)
+                && fraction > START_TOLERANCE
             {
-                leaves = leaves.min(fraction);
+                exit = exit.min(fraction);
             }
             0.0
         });
-        std::array::from_fn(|corner| weights[corner] + rates[corner] * furthest * 0.5 * leaves)
+        std::array::from_fn(|corner| weights[corner] + rates[corner] * path_length * 0.5 * exit)
     }
 
-    /// The answer of an edge or face that passes through no triangle.
-    fn apart_or_within(&self, corners: &[Vec3], middle: Vec3, known: Between, pairs: &ClosestPairs) -> Option<Closest> {
-        // All of it is on one side: that of any of its points.
-        let is_inside = if known.least > 0.0 || known.most < 0.0 {
-            known.most < 0.0
+    /// Returns the closest point of an edge or face that crosses no triangle.
+    fn closest_on_one_side(
+        &self,
+        corners: &[Vec3],
+        middle: Vec3,
+        range: DistanceRange,
+        pairs: &ClosestPairs,
+    ) -> Option<Closest> {
+        // The whole feature is on one side, that of any of its points.
+        let is_inside = if range.min > 0.0 || range.max < 0.0 {
+            range.max < 0.0
         } else if let Some(pair) = pairs.inner {
-            let reach = pair.squared.sqrt() as f32 * (1.0 + ROUNDING) + (TOUCHING * self.size) as f32;
-            let nearest = self.nearest_from(point_of(corners, pair.weights), reach, None);
-            nearest.is_some_and(|nearest| self.signed(&nearest).distance < 0.0)
+            let limit = pair.distance_squared.sqrt() as f32 * (1.0 + ROUNDING) + (TOUCHING * self.size) as f32;
+            let nearest = self.nearest_from(point_of(corners, pair.weights), limit, None);
+            nearest.is_some_and(|nearest| self.signed_distance(&nearest).distance < 0.0)
         } else {
-            self.nearest_from(middle, known.reach(), known.hint)
-                .is_some_and(|nearest| self.signed(&nearest).distance < 0.0)
+            self.nearest_from(middle, range.max_distance(), range.hint)
+                .is_some_and(|nearest| self.signed_distance(&nearest).distance < 0.0)
         };
         if is_inside {
-            let part = 1.0 / corners.len() as f64;
-            let start = std::array::from_fn(|corner| if corner < corners.len() { part } else { 0.0 });
-            return self.deepest_of(corners, start, pairs);
+            let weight = 1.0 / corners.len() as f64;
+            let start = std::array::from_fn(|corner| if corner < corners.len() { weight } else { 0.0 });
+            return self.deepest_or_outside(corners, start, pairs);
         }
-        self.answer(corners, pairs)
+        self.closest_outside(corners, pairs)
     }
 
-    /// The closest pair between the ends of a feature outside, or else at its border.
-    fn answer(&self, corners: &[Vec3], pairs: &ClosestPairs) -> Option<Closest> {
+    /// Returns the closest pair in the interior of a feature outside, or else on its border.
+    fn closest_outside(&self, corners: &[Vec3], pairs: &ClosestPairs) -> Option<Closest> {
         let pair = pairs.inner.or(pairs.border)?;
-        let distance = pair.squared.sqrt();
-        if self.facets.are_doubtful() && pairs.inner.is_some() {
-            // Where triangles are folded, what looks closest may be behind another.
+        let distance = pair.distance_squared.sqrt();
+        if self.facets.are_normals_unreliable() && pairs.inner.is_some() {
+            // Where triangles are folded, another one may hide the closest pair.
             let closer = (distance - TOUCHING * self.size) as f32 * (1.0 - ROUNDING);
             let nearest = self.nearest(point_of(corners, pair.weights), closer.max(0.0));
             if nearest.is_some() && closer > 0.0 {
@@ -292,7 +307,7 @@ impl ExactSolid {
             pair.offset / distance
         } else {
             let nearest = self.nearest(point_of(corners, pair.weights), f32::INFINITY)?;
-            self.signed(&nearest).normal
+            self.signed_distance(&nearest).normal
         };
         Some(Closest {
             weights: pair.weights.map(|weight| weight as f32),
@@ -302,26 +317,26 @@ impl ExactSolid {
         })
     }
 
-    fn deepest_of(&self, corners: &[Vec3], start: [f64; 3], pairs: &ClosestPairs) -> Option<Closest> {
+    fn deepest_or_outside(&self, corners: &[Vec3], start: [f64; 3], pairs: &ClosestPairs) -> Option<Closest> {
         self.deepest_from(corners, start)
-            .or_else(|| self.answer(corners, pairs))
+            .or_else(|| self.closest_outside(corners, pairs))
     }
 
     fn deepest_from(&self, corners: &[Vec3], start: [f64; 3]) -> Option<Closest> {
-        // What was closest to the last point may be to the next.
+        // The triangle closest to the last point may be closest to the next one.
         let mut hint = None;
         let measure = |point: Vec3| {
-            let known = self.between(point);
-            let nearest = self.nearest_from(point, known.reach(), hint.or(known.hint))?;
-            hint = Some(nearest.place as u32);
-            Some(self.signed(&nearest))
+            let range = self.distance_range(point);
+            let nearest = self.nearest_from(point, range.max_distance(), hint.or(range.hint))?;
+            hint = Some(nearest.slot as u32);
+            Some(self.signed_distance(&nearest))
         };
-        let Deepest { weights, signed } = deepest(corners, start, measure)?;
+        let DeepestPoint { weights, signed } = deepest(corners, start, measure)?;
         Some(Closest {
             weights: weights.map(|weight| weight as f32),
             distance: signed.distance as f32,
             normal: signed.normal.as_vec3(),
-            inside: lies_between(&weights[..corners.len()]),
+            inside: is_interior(&weights[..corners.len()]),
         })
     }
 }
@@ -335,18 +350,24 @@ impl ClosestPairs {
         }
     }
 
-    /// Takes a pair where it is closer. Between the ends of the feature it counts where nothing of the solid beside it is closer.
+    /// Adds a pair if it is closer. It counts as interior if no adjacent part of the solid is closer.
     #[inline]
-    fn see(&mut self, pair: Pair, is_inner: impl FnOnce() -> bool) {
-        if !(pair.squared <= self.limit) {
+    fn add(&mut self, pair: Pair, is_inner: impl FnOnce() -> bool) {
+        if !(pair.distance_squared <= self.limit) {
             return;
         }
         if is_inner() {
-            if self.inner.is_none_or(|inner| pair.squared < inner.squared) {
-                self.limit = pair.squared;
+            if self
+                .inner
+                .is_none_or(|inner| pair.distance_squared < inner.distance_squared)
+            {
+                self.limit = pair.distance_squared;
                 self.inner = Some(pair);
             }
-        } else if self.border.is_none_or(|border| pair.squared < border.squared) {
+        } else if self
+            .border
+            .is_none_or(|border| pair.distance_squared < border.distance_squared)
+        {
             self.border = Some(pair);
         }
     }
@@ -360,20 +381,20 @@ fn point_of(corners: &[Vec3], weights: [f64; 3]) -> Vec3 {
         .as_vec3()
 }
 
-/// Whether all of the first triangle lies on one side of the second's plane.
-fn lies_beside(triangle: [DVec3; 3], [a, b, c]: [DVec3; 3]) -> bool {
+/// Returns true if all of the first triangle lies on one side of the second's plane.
+fn is_on_one_side(triangle: [DVec3; 3], [a, b, c]: [DVec3; 3]) -> bool {
     let normal = (b - a).cross(c - a);
     let heights = triangle.map(|corner| normal.dot(corner - a));
     heights.iter().all(|&height| height > 0.0) || heights.iter().all(|&height| height < 0.0)
 }
 
-/// The middle of the longest stretch that lies inside, of an edge with these crossings.
-fn longest_within(crossings: &mut [(f64, bool)]) -> f64 {
+/// Returns the middle of the longest part inside the solid of an edge with these crossings.
+fn middle_of_longest_inside(crossings: &mut [(f64, bool)]) -> f64 {
     crossings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut best = (f64::NEG_INFINITY, 0.5);
     let mut entered = 0.0;
     for (index, &(fraction, enters)) in crossings.iter().enumerate() {
-        let mut look = |from: f64, to: f64| {
+        let mut consider = |from: f64, to: f64| {
             if to - from > best.0 {
                 best = (to - from, 0.5 * (from + to));
             }
@@ -381,10 +402,10 @@ fn longest_within(crossings: &mut [(f64, bool)]) -> f64 {
         if enters {
             entered = fraction;
             if index + 1 == crossings.len() {
-                look(fraction, 1.0);
+                consider(fraction, 1.0);
             }
         } else {
-            look(entered, fraction);
+            consider(entered, fraction);
         }
     }
     best.1

@@ -1,167 +1,170 @@
-//! EXACT: closest points of nodes, edges and faces and a solid's triangles, with the side they are on.
+//! EXACT detection: signed closest points between features (nodes, edges, faces) and a solid's triangles.
 //!
-//! A tree finds the triangles that are near. The side is that of the pseudonormal of the face, edge or corner that is closest (Baerentzen,
-//! Aanaes 2005). An edge outside is closest to a convex edge or corner of the solid, a face to a corner, or else at their borders.
+//! A tree finds nearby triangles. The sign is that of the angle-weighted pseudonormal of the closest face, edge or
+//! corner (Baerentzen, Aanaes 2005). The closest point of an edge outside the solid lies on a convex edge or corner,
+//! that of a face on a corner, or else on the border of the feature.
 
-pub(super) mod coarse;
 mod deepest;
+pub(super) mod distance_cache;
 mod facets;
 mod features;
 pub(crate) mod overlap;
-pub(super) mod pierced;
 mod separating_planes;
+pub(super) mod separation;
 #[cfg(test)]
 pub(super) mod tests;
 
 use glam::{DVec3, Vec3};
 
-use self::coarse::{Between, CoarseField};
-use self::deepest::Signed;
+use self::deepest::SignedDistance;
+use self::distance_cache::{DistanceCache, DistanceRange};
 use self::facets::Facets;
 use crate::base::Result;
-use crate::geometry::Bounds;
-use crate::geometry::nearest::{Spot, nearest_on_triangle, weighted};
+use crate::geometry::Aabb;
+use crate::geometry::bvh::Bvh;
+use crate::geometry::nearest::{TriangleFeature, nearest_on_triangle, weighted};
 use crate::geometry::predicates::pierce;
-use crate::geometry::tree::Tree;
 use crate::mesh::ClosedSurface;
 
-/// What is closer than this part of the solid's size looks the way that its surface does.
+/// Distance below which a point counts as lying on the surface, relative to the solid's size. The direction is then
+/// the surface normal.
 const TOUCHING: f64 = 1e-9;
 
-/// The rounding of a radius, as a part of it.
+/// Relative rounding error of a radius.
 const ROUNDING: f32 = 1e-5;
 
-/// A solid that answers exactly.
+/// A solid with exact distance queries.
 #[derive(Debug)]
 pub(crate) struct ExactSolid {
-    tree: Tree,
+    tree: Bvh,
     facets: Facets,
-    /// None where the solid changes its shape.
-    coarse: Option<CoarseField>,
-    /// The largest of its coordinates.
+    /// `None` for a deformable solid.
+    cache: Option<DistanceCache>,
+    /// Largest coordinate.
     size: f64,
 }
 
-/// The point of a surface that is closest to some point.
+/// A closest point of a surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nearest {
-    place: usize,
-    part: Spot,
+    slot: usize,
+    spot: TriangleFeature,
     /// From the surface to the point.
     offset: DVec3,
-    squared: f64,
+    distance_squared: f64,
     point: Vec3,
 }
 
-/// Where a segment passes through the surface.
+/// An intersection of a segment with the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Crossing {
-    /// How far along it, 0 to 1.
+    /// Position along the segment, 0 to 1.
     pub fraction: f64,
-    /// Whether it goes in there.
+    /// True if the segment enters the solid there.
     pub enters: bool,
     pub triangle: u32,
 }
 
 impl ExactSolid {
-    /// A solid that keeps its shape.
+    /// Creates a rigid solid.
     pub fn new(surface: &ClosedSurface) -> Result<Self> {
         let mut solid = Self::changing(surface)?;
         let count = solid.tree.triangle_count();
-        let coarse = CoarseField::new(solid.tree.bounds(), count, |point, hint| {
+        let cache = DistanceCache::new(solid.tree.bounds(), count, |point, hint| {
             let nearest = solid.nearest_from(point, f32::INFINITY, Some(hint));
-            let sample = |nearest: Nearest| (solid.signed(&nearest).distance as f32, nearest.place as u32);
+            let sample = |nearest: Nearest| (solid.signed_distance(&nearest).distance as f32, nearest.slot as u32);
             nearest.map_or((0.0, 0), sample)
         })?;
-        solid.coarse = Some(coarse);
+        solid.cache = Some(cache);
         Ok(solid)
     }
 
-    /// A solid that may change its shape.
+    /// Creates a deformable solid.
     pub fn changing(surface: &ClosedSurface) -> Result<Self> {
         let (positions, triangles) = (surface.positions(), surface.triangles());
         let corners = |triangle: u32| triangles[triangle as usize].map(|node| positions[node as usize]);
-        let tree = Tree::new(triangles.len(), corners)?;
+        let tree = Bvh::new(triangles.len(), corners)?;
         let mut solid = Self {
             facets: Facets::new(surface, &tree)?,
             tree,
-            coarse: None,
+            cache: None,
             size: 0.0,
         };
-        solid.find_size();
+        solid.update_size();
         Ok(solid)
     }
 
-    /// Takes its nodes where they are now. Whether they still enclose a solid is not asked.
+    /// Updates the node positions. The surface is not checked for self-intersection.
     pub fn refit(&mut self, position: impl Fn(usize) -> Vec3) {
-        self.coarse = None;
+        self.cache = None;
         self.facets.refit(&position);
         let facets = &self.facets;
         self.tree
-            .refit_places(|place| facets.nodes(place).map(|node| position(node as usize)));
-        self.find_size();
+            .refit_slots(|slot| facets.nodes(slot).map(|node| position(node as usize)));
+        self.update_size();
     }
 
-    fn find_size(&mut self) {
+    fn update_size(&mut self) {
         let bounds = self.tree.bounds();
         self.size = f64::from(bounds.magnitudes().max_element());
     }
 
-    pub fn bounds(&self) -> Bounds {
+    pub fn bounds(&self) -> Aabb {
         self.tree.bounds()
     }
 
-    /// Whether a point lies within the solid.
+    /// Returns true if a point lies within the solid.
     pub fn is_inside(&self, point: Vec3) -> bool {
-        let known = self.between(point);
-        if known.least > 0.0 || known.most < 0.0 {
-            return known.most < 0.0;
+        let range = self.distance_range(point);
+        if range.min > 0.0 || range.max < 0.0 {
+            return range.max < 0.0;
         }
-        self.nearest_from(point, known.reach(), known.hint)
-            .is_some_and(|nearest| self.signed(&nearest).distance < 0.0)
+        self.nearest_from(point, range.max_distance(), range.hint)
+            .is_some_and(|nearest| self.signed_distance(&nearest).distance < 0.0)
     }
 
-    /// The signed distance of a point, and the direction away from the solid there; `None` further outside than `within`.
+    /// Returns the signed distance of a point and the direction away from the solid; `None` if it is further outside
+    /// than `within`.
     pub fn measure(&self, point: Vec3, within: f32) -> Option<(f32, Vec3)> {
-        let known = self.between(point);
-        if known.least > within {
+        let range = self.distance_range(point);
+        if range.min > within {
             return None;
         }
-        let reach = if known.least > 0.0 {
+        let limit = if range.min > 0.0 {
             within
         } else {
-            known.reach().max(within)
+            range.max_distance().max(within)
         };
-        let signed = self.signed(&self.nearest_from(point, reach, known.hint)?);
+        let signed = self.signed_distance(&self.nearest_from(point, limit, range.hint)?);
         (signed.distance <= f64::from(within)).then(|| (signed.distance as f32, signed.normal.as_vec3()))
     }
 
-    /// The point of the surface that is closest to `point`, within a distance of it.
+    /// Returns the closest point of the surface within a distance of `point`.
     pub fn nearest(&self, point: Vec3, within: f32) -> Option<Nearest> {
-        self.nearest_from(point, within, self.between(point).hint)
+        self.nearest_from(point, within, self.distance_range(point).hint)
     }
 
-    /// The same, with the place of a triangle that may be closest.
+    /// As [`ExactSolid::nearest`], with the tree slot of a triangle that may be closest.
     fn nearest_from(&self, point: Vec3, within: f32, hint: Option<u32>) -> Option<Nearest> {
         let exact = point.as_dvec3();
         let mut limit = f64::from(within) * f64::from(within);
-        let mut found = None;
-        let mut look = |place: usize, distance: f32| {
-            let placed = self.tree.placed(place);
-            if placed.is_beside(&[point], distance) {
+        let mut nearest = None;
+        let mut consider = |slot: usize, distance: f32| {
+            let triangle = self.tree.placed(slot);
+            if triangle.is_beside(&[point], distance) {
                 return None;
             }
-            let corners = placed.exact();
-            let (weights, part) = nearest_on_triangle(exact, corners);
+            let corners = triangle.exact();
+            let (weights, spot) = nearest_on_triangle(exact, corners);
             let offset = exact - weighted(corners, weights);
-            let squared = offset.length_squared();
-            if squared < limit || found.is_none() && squared == limit {
-                limit = squared;
-                found = Some(Nearest {
-                    place,
-                    part,
+            let distance_squared = offset.length_squared();
+            if distance_squared < limit || nearest.is_none() && distance_squared == limit {
+                limit = distance_squared;
+                nearest = Some(Nearest {
+                    slot,
+                    spot,
                     offset,
-                    squared,
+                    distance_squared,
                     point,
                 });
                 return Some(limit as f32);
@@ -170,27 +173,27 @@ impl ExactSolid {
         };
         let mut limit_squared = within * within;
         if let Some(hint) = hint {
-            limit_squared = look(hint as usize, f32::INFINITY).unwrap_or(limit_squared);
+            limit_squared = consider(hint as usize, f32::INFINITY).unwrap_or(limit_squared);
         }
         let mut distance = limit_squared.sqrt() * (1.0 + ROUNDING);
-        let bounds = Bounds { min: point, max: point };
-        self.tree.near(&bounds, limit_squared, |place| {
-            if let Some(closer) = look(place, distance) {
+        let bounds = Aabb { min: point, max: point };
+        self.tree.near(&bounds, limit_squared, |slot| {
+            if let Some(closer) = consider(slot, distance) {
                 limit_squared = closer;
                 distance = closer.sqrt() * (1.0 + ROUNDING);
             }
             limit_squared
         });
-        found
+        nearest
     }
-    /// Shows all places where the segment passes through the surface, in no order. As if it were shifted by next to nothing, in one
-    /// direction for all triangles: where it meets an edge or a corner it passes through as many triangles as it should.
-    pub fn crossings(&self, from: Vec3, to: Vec3, mut see: impl FnMut(Crossing)) {
+    /// Visits all intersections of the segment with the surface, unordered. A symbolic perturbation, the same for all
+    /// triangles, keeps the count consistent where the segment meets an edge or a corner.
+    pub fn crossings(&self, from: Vec3, to: Vec3, mut visit: impl FnMut(Crossing)) {
         let ends = [from, to].map(|end| end.as_dvec3());
-        self.tree.along(from, to - from, 1.0, |place| {
-            if let Some((fraction, enters)) = self.crossing(ends, place) {
-                let triangle = self.tree.triangle(place);
-                see(Crossing {
+        self.tree.along(from, to - from, 1.0, |slot| {
+            if let Some((fraction, enters)) = self.crossing(ends, slot) {
+                let triangle = self.tree.triangle(slot);
+                visit(Crossing {
                     fraction,
                     enters,
                     triangle,
@@ -200,69 +203,71 @@ impl ExactSolid {
         });
     }
 
-    fn crossing(&self, [p, q]: [DVec3; 2], place: usize) -> Option<(f64, bool)> {
-        let corners = self.tree.placed(place).exact();
-        pierce(p, q, corners, self.facets.nodes(place))
+    fn crossing(&self, [p, q]: [DVec3; 2], slot: usize) -> Option<(f64, bool)> {
+        let corners = self.tree.placed(slot).exact();
+        pierce(p, q, corners, self.facets.nodes(slot))
     }
 
-    /// What is known of a point without looking for what is closest.
-    fn between(&self, point: Vec3) -> Between {
-        if let Some(known) = self.coarse.as_ref().and_then(|coarse| coarse.between(point)) {
-            return known;
+    /// Returns bounds of the distance of a point without a search.
+    fn distance_range(&self, point: Vec3) -> DistanceRange {
+        if let Some(range) = self.cache.as_ref().and_then(|cache| cache.distance_range(point)) {
+            return range;
         }
         let bounds = self.tree.bounds();
-        let apart = (bounds.min - point).max(point - bounds.max);
-        let gap = apart.max(Vec3::ZERO).length();
-        Between {
-            least: if gap > 0.0 {
+        let outside = (bounds.min - point).max(point - bounds.max);
+        let gap = outside.max(Vec3::ZERO).length();
+        DistanceRange {
+            min: if gap > 0.0 {
                 gap * (1.0 - ROUNDING)
             } else {
                 f32::NEG_INFINITY
             },
-            most: f32::INFINITY,
+            max: f32::INFINITY,
             hint: None,
         }
     }
 
-    /// The side that a point lies on, by what it is closest to.
-    fn signed(&self, nearest: &Nearest) -> Signed {
-        let normal = self.facets.normal(nearest.place, nearest.part);
-        let is_inside = if self.facets.are_doubtful() {
-            self.is_wound_about(nearest.point)
+    /// Returns the signed distance of a point from its closest point.
+    fn signed_distance(&self, nearest: &Nearest) -> SignedDistance {
+        let normal = self.facets.normal(nearest.slot, nearest.spot);
+        let is_inside = if self.facets.are_normals_unreliable() {
+            self.has_positive_winding(nearest.point)
         } else {
             nearest.offset.dot(normal) < 0.0
         };
         let side = if is_inside { -1.0 } else { 1.0 };
-        let distance = nearest.squared.sqrt();
+        let distance = nearest.distance_squared.sqrt();
         let normal = if distance > TOUCHING * self.size {
             nearest.offset * (side / distance)
         } else {
-            // Edges folded flat look nowhere: then the face.
-            normal
-                .try_normalize()
-                .unwrap_or_else(|| self.facets.normal(nearest.place, Spot::Face).normalize_or(DVec3::Y))
+            // The pseudonormal of edges folded flat vanishes; the face normal replaces it.
+            normal.try_normalize().unwrap_or_else(|| {
+                self.facets
+                    .normal(nearest.slot, TriangleFeature::Face)
+                    .normalize_or(DVec3::Y)
+            })
         };
-        Signed {
+        SignedDistance {
             distance: side * distance,
             normal,
         }
     }
 
-    /// Whether a way from a point to far outside comes out once more than it goes in.
-    fn is_wound_about(&self, point: Vec3) -> bool {
+    /// Returns true if a ray to a point far outside leaves the solid once more than it enters.
+    fn has_positive_winding(&self, point: Vec3) -> bool {
         let bounds = self.tree.bounds();
-        let reach = (bounds.max - bounds.min).length() + point.distance(bounds.min);
+        let length = (bounds.max - bounds.min).length() + point.distance(bounds.min);
         let mut winding = 0;
-        self.crossings(point, point + Vec3::new(0.8, 0.5, 0.33) * 2.0 * reach, |crossing| {
+        self.crossings(point, point + Vec3::new(0.8, 0.5, 0.33) * 2.0 * length, |crossing| {
             winding += if crossing.enters { -1 } else { 1 };
         });
         winding > 0
     }
 }
 
-impl Between {
-    /// How far the surface is at most.
-    fn reach(&self) -> f32 {
-        (-self.least).max(self.most).max(0.0) * (1.0 + ROUNDING)
+impl DistanceRange {
+    /// Returns an upper bound of the distance to the surface.
+    fn max_distance(&self) -> f32 {
+        (-self.min).max(self.max).max(0.0) * (1.0 + ROUNDING)
     }
 }

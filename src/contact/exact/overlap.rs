@@ -1,4 +1,4 @@
-//! EXACT by itself: the points and edges of a surface that lie within a solid.
+//! Stand-alone EXACT queries: points and edges of a surface inside a solid.
 
 use glam::Vec3;
 
@@ -8,7 +8,7 @@ use crate::base::Error;
 use crate::base::{Result, ensure};
 use crate::mesh::ClosedSurface;
 
-/// A solid, rigid or changing its shape, that finds what lies within it.
+/// A rigid or deformable solid that finds the points and edges inside it.
 ///
 /// ```
 /// # use glam::vec3;
@@ -28,7 +28,7 @@ pub struct Exact {
     node_count: usize,
 }
 
-/// What lies within a solid. Its memory is used again by the next search.
+/// Points and edges inside a solid. Its memory is reused by the next search.
 ///
 /// ```
 /// # use glam::vec3;
@@ -44,14 +44,14 @@ pub struct Exact {
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Overlap {
-    /// In the order of the points.
+    /// Sorted by point.
     pub points: Vec<PointInside>,
-    /// In the order of the edges, and along them.
+    /// Sorted by edge, and along each edge.
     pub edges: Vec<EdgeInside>,
     crossings: Vec<(f64, bool)>,
 }
 
-/// A point within a solid.
+/// A point inside a solid.
 ///
 /// ```
 /// # use glam::vec3;
@@ -70,15 +70,15 @@ pub struct Overlap {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointInside {
-    /// Its number.
+    /// Index of the point.
     pub point: u32,
-    /// How far the solid's surface is, m.
+    /// Distance to the solid's surface, m.
     pub depth: f32,
-    /// The shortest way out, of unit length.
+    /// Unit direction of the shortest path out of the solid.
     pub normal: Vec3,
 }
 
-/// A stretch of an edge within a solid.
+/// A part of an edge inside a solid.
 ///
 /// ```
 /// # use glam::vec3;
@@ -96,16 +96,16 @@ pub struct PointInside {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeInside {
-    /// The edge's number.
+    /// Index of the edge.
     pub edge: u32,
-    /// Where it goes in, as a fraction of the edge; 0 where it begins inside.
+    /// Position where the edge enters, as a fraction of it; 0 if it begins inside.
     pub enters: f32,
-    /// Where it comes out; 1 where it ends inside.
+    /// Position where the edge leaves; 1 if it ends inside.
     pub leaves: f32,
 }
 
 impl Exact {
-    /// For a rigid solid.
+    /// Creates a rigid solid.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -116,7 +116,7 @@ impl Exact {
         })
     }
 
-    /// For a solid that will change its shape: without the grid that makes points far from the surface of a rigid one cheap.
+    /// Creates a deformable solid. It has no distance grid, which makes points far from a rigid surface cheap.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -127,10 +127,11 @@ impl Exact {
         })
     }
 
-    /// Takes the solid's nodes where they are now, in m, without allocating. Whether their triangles still enclose a solid is not asked.
+    /// Updates the solid's node positions (m) without allocating. The surface is not checked for self-intersection.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] where there are not as many as the surface was made of, or one is not finite; then nothing changed.
+    /// [`Error::InvalidArgument`] if their number differs from that of the surface, or one is not finite; the solid
+    /// then stays unchanged.
     pub fn refit(&mut self, positions: &[Vec3]) -> Result<()> {
         ensure!(
             positions.len() == self.node_count,
@@ -143,11 +144,11 @@ impl Exact {
         Ok(())
     }
 
-    /// Finds which of `points` (m, in the solid's own coordinates) lie within it, and which stretches of `edges` (two point numbers each).
-    /// Allocates only where `overlap` has no room left.
+    /// Finds which of `points` lie inside the solid (m, in its own coordinates), and which parts of `edges` (two
+    /// point indices each). Allocates only if `overlap` lacks capacity.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] where a point is not finite or an edge names no point; [`Error::OutOfMemory`].
+    /// [`Error::InvalidArgument`] if a point is not finite or an edge has an invalid index; [`Error::OutOfMemory`].
     pub fn find(&self, points: &[Vec3], edges: &[[u32; 2]], overlap: &mut Overlap) -> Result<()> {
         check_positions(points)?;
         for (edge, ends) in edges.iter().enumerate() {
@@ -178,13 +179,13 @@ impl Exact {
         Ok(())
     }
 
-    /// Whether a point lies within the solid.
+    /// Returns true if a point lies inside the solid.
     pub fn is_inside(&self, point: Vec3) -> bool {
         self.solid.is_inside(point)
     }
 
-    /// The distance of a point from the surface, m, below 0 inside, and the direction away from the solid; `None` where it is outside and
-    /// further than `within`.
+    /// Returns the distance of a point from the surface (m), negative inside, and the direction away from the solid;
+    /// `None` if it is further outside than `within`.
     pub fn distance(&self, point: Vec3, within: f32) -> Option<(f32, Vec3)> {
         self.solid.measure(point, within)
     }
@@ -203,7 +204,7 @@ impl Overlap {
             crossings.push((crossing.fraction, crossing.enters));
         });
         full?;
-        // What goes in where something comes out stays inside.
+        // An entry at the same position as an exit comes first, so that the edge stays inside.
         crossings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
         let step = |enters: bool| if enters { 1 } else { -1 };
         let mut winding = 0;
@@ -212,7 +213,7 @@ impl Overlap {
             winding += step(enters);
             lowest = lowest.min(winding);
         }
-        // It begins inside where it comes out more often than it has gone in before.
+        // The edge begins inside if it leaves more often than it has entered.
         winding = if crossings.is_empty() {
             i32::from(solid.is_inside(from))
         } else {

@@ -1,4 +1,4 @@
-//! EXACT against all triangles, in `f64`.
+//! EXACT against brute force over all triangles in `f64`.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::geometry::predicates::solid_angle;
 use crate::mesh::{ClosedSurface, Mesh, MeshFormat, load};
 use crate::random::Random;
 
-/// m, as all of these solids are about 0.1 m across.
+/// Search distance, m. All solids here are about 0.1 m across.
 const WITHIN: f32 = 0.004;
 
 pub(in crate::contact) fn cube() -> ClosedSurface {
@@ -17,8 +17,8 @@ pub(in crate::contact) fn cube() -> ClosedSurface {
     ClosedSurface::new(&mesh.positions, &mesh.surface().expect("a surface")).expect("a cube")
 }
 
-/// Sections that go round an axis, each closed in itself.
-fn wound(rings: u32, section: &[(f32, f32)], closes: bool) -> ClosedSurface {
+/// Returns the surface of revolution of a section.
+fn revolve(rings: u32, section: &[(f32, f32)], closes: bool) -> ClosedSurface {
     let sides = section.len() as u32;
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
@@ -34,13 +34,13 @@ fn wound(rings: u32, section: &[(f32, f32)], closes: bool) -> ClosedSurface {
             triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
-    // At the ends of the axis all are one.
+    // Removes degenerate triangles at the ends of the axis.
     let axis = |node: u32| positions[node as usize].truncate() == glam::Vec2::ZERO;
     triangles.retain(|&[a, b, c]| !(axis(a) && axis(b) || axis(b) && axis(c) || axis(c) && axis(a)));
     ClosedSurface::new(&positions, &triangles).expect("a surface")
 }
 
-/// Its quadrangles are flat: it is convex.
+/// A convex sphere of planar quadrangles.
 pub(in crate::contact) fn sphere(rings: u32) -> ClosedSurface {
     let bands = rings / 2;
     let angle = |index: u32| std::f32::consts::PI * (index as f32 / bands as f32 - 0.5);
@@ -53,7 +53,7 @@ pub(in crate::contact) fn sphere(rings: u32) -> ClosedSurface {
         (radius, 0.05 * angle(index).sin())
     };
     let section: Vec<(f32, f32)> = (0..=bands).map(at).collect();
-    wound(rings, &section, false)
+    revolve(rings, &section, false)
 }
 
 fn torus() -> ClosedSurface {
@@ -61,11 +61,11 @@ fn torus() -> ClosedSurface {
     let section: Vec<(f32, f32)> = (0..12)
         .map(|side| (0.035 + 0.015 * angle(side).cos(), 0.015 * angle(side).sin()))
         .collect();
-    wound(24, &section, true)
+    revolve(24, &section, true)
 }
 
-/// A real mesh, about 0.1 m across; none where the folder is missing.
-fn real(name: &str, scale: f32) -> Option<ClosedSurface> {
+/// A mesh from a file, about 0.1 m across; `None` if the folder is missing.
+fn load_mesh(name: &str, scale: f32) -> Option<ClosedSurface> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
         .ancestors()
         .map(|above| above.join("shared/meshes"))
@@ -77,7 +77,7 @@ fn real(name: &str, scale: f32) -> Option<ClosedSurface> {
 fn solids() -> Vec<(&'static str, ClosedSurface)> {
     let mut solids = vec![("cube", cube()), ("sphere", sphere(32)), ("torus", torus())];
     for (name, scale) in [("stomach.stl", 0.001), ("forceps_jaw_left.stl", 0.004)] {
-        match real(name, scale) {
+        match load_mesh(name, scale) {
             Some(surface) => solids.push((name, surface)),
             None => skip(name),
         }
@@ -95,21 +95,21 @@ struct Reference(Vec<[DVec3; 3]>);
 
 impl Reference {
     fn new(surface: &ClosedSurface) -> Self {
-        let place = |node: u32| surface.positions()[node as usize].as_dvec3();
-        Self(surface.triangles().iter().map(|nodes| nodes.map(place)).collect())
+        let position = |node: u32| surface.positions()[node as usize].as_dvec3();
+        Self(surface.triangles().iter().map(|nodes| nodes.map(position)).collect())
     }
 
     fn near(&self, low: DVec3, high: DVec3) -> Self {
-        let meets = |triangle: &&[DVec3; 3]| {
+        let overlaps = |triangle: &&[DVec3; 3]| {
             let [a, b, c] = triangle;
             a.min(*b).min(*c).cmple(high).all() && low.cmple(a.max(*b).max(*c)).all()
         };
-        Self(self.0.iter().filter(meets).copied().collect())
+        Self(self.0.iter().filter(overlaps).copied().collect())
     }
 
-    /// By planes and sides, in another way than what it is compared with.
+    /// By planes and sides, independently of the tested code.
     fn distance(&self, point: DVec3) -> f64 {
-        let one = |&[a, b, c]: &[DVec3; 3]| {
+        let distance_to_triangle = |&[a, b, c]: &[DVec3; 3]| {
             let normal = (b - a).cross(c - a);
             let above = |p: DVec3, q: DVec3| normal.dot((q - p).cross(point - p)) >= 0.0;
             if above(a, b) && above(b, c) && above(c, a) {
@@ -121,7 +121,7 @@ impl Reference {
             };
             to_side(a, b).min(to_side(b, c)).min(to_side(c, a))
         };
-        self.0.iter().map(one).fold(f64::INFINITY, f64::min)
+        self.0.iter().map(distance_to_triangle).fold(f64::INFINITY, f64::min)
     }
 
     fn is_inside(&self, point: DVec3) -> bool {
@@ -134,8 +134,8 @@ impl Reference {
     }
 }
 
-/// Points near a solid, and some further in and out.
-fn place(random: &mut Random, surface: &ClosedSurface, spread: f32) -> Vec3 {
+/// A random point near a solid, or further in and out.
+fn random_point(random: &mut Random, surface: &ClosedSurface, spread: f32) -> Vec3 {
     let triangle = surface.triangles()[random.below(surface.triangles().len())];
     let [a, b, c] = triangle.map(|node| surface.positions()[node as usize]);
     // Often at a node or an edge.
@@ -156,7 +156,7 @@ fn place(random: &mut Random, surface: &ClosedSurface, spread: f32) -> Vec3 {
 }
 
 #[test]
-fn points_are_measured() {
+fn points_have_exact_signed_distances() {
     let mut random = Random(5);
     for (name, surface) in solids() {
         let solid = ExactSolid::new(&surface).expect("a solid");
@@ -164,11 +164,11 @@ fn points_are_measured() {
         let reference = Reference::new(&surface);
         let (mut insides, mut found) = (0, 0);
         for _ in 0..400 {
-            let point = place(&mut random, &surface, 0.03);
+            let point = random_point(&mut random, &surface, 0.03);
             let expected = reference.signed(point.as_dvec3());
             for solid in [&solid, &changing] {
                 let told = solid.closest(&[point], WITHIN);
-                // What lies on the surface to rounding has no side.
+                // A point on the surface up to rounding has no side.
                 if expected.abs() > 1e-9 {
                     assert_eq!(solid.is_inside(point), expected < 0.0, "{name}: {point} at {expected}");
                 }
@@ -184,7 +184,7 @@ fn points_are_measured() {
                     "{name}: {point}: {} for {expected}",
                     told.distance
                 );
-                // The normal leads away as fast as may be.
+                // The normal is the direction of steepest ascent.
                 let step = 1e-5 * expected.abs().max(1e-4);
                 let ahead = reference.signed(point.as_dvec3() + told.normal.as_dvec3() * step);
                 assert!(
@@ -201,29 +201,29 @@ fn points_are_measured() {
 }
 
 #[test]
-fn edges_and_faces_are_measured() {
+fn edges_and_faces_have_exact_closest_points() {
     let mut random = Random(11);
     for (name, surface) in solids() {
         let solid = ExactSolid::new(&surface).expect("a solid");
         let reference = Reference::new(&surface);
-        // How often: nothing near, at the border, in between, deep.
+        // Counts of four cases: nothing near, closest at the border, closest in the interior, deep inside.
         let mut seen = [[0; 4]; 2];
         let mut lost = 0_i32;
         for turn in 0..400 {
             let count = 2 + turn % 2;
-            let first = place(&mut random, &surface, 0.01);
+            let first = random_point(&mut random, &surface, 0.01);
             let size = 0.012 * random.unit() + 0.001;
             let (_, up) = solid.measure(first, f32::INFINITY).expect("a distance");
-            // Every other one lies along the surface.
-            let mut way = || {
-                let way = random.vector() * size;
+            // Every other feature lies along the surface.
+            let mut random_direction = || {
+                let direction = random.vector() * size;
                 if turn % 4 < 2 {
-                    way
+                    direction
                 } else {
-                    way.reject_from_normalized(up) + 0.03 * random.unit() * size * up
+                    direction.reject_from_normalized(up) + 0.03 * random.unit() * size * up
                 }
             };
-            let [a, b] = [way(), way()];
+            let [a, b] = [random_direction(), random_direction()];
             let corners = [
                 first - 0.4 * a - 0.3 * b,
                 first + 0.6 * a - 0.3 * b,
@@ -231,15 +231,15 @@ fn edges_and_faces_are_measured() {
             ];
             let corners = &corners[..count];
             let exact: Vec<DVec3> = corners.iter().map(|corner| corner.as_dvec3()).collect();
-            // No point of it is further from the surface than a corner with the way from there.
+            // Upper bound of the distance of a feature's points from the surface.
             let furthest = exact
                 .iter()
                 .map(|corner| exact[0].distance(*corner))
                 .fold(0.0, f64::max);
             let reach = DVec3::splat(2.0 * furthest + reference.distance(exact[0]) + 1e-4);
             let near = reference.near(exact[0] - reach, exact[0] + reach);
-            // The least over a grid of points, refined about the least of them.
-            let place_of = |weights: [f64; 3]| -> DVec3 { exact.iter().zip(weights).map(|(p, w)| *p * w).sum() };
+            // Least distance over a grid of points, refined around the minimum.
+            let point_at = |weights: [f64; 3]| -> DVec3 { exact.iter().zip(weights).map(|(p, w)| *p * w).sum() };
             let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
             let mut centre = [0.0; 2];
             let mut width = 1.0;
@@ -260,7 +260,7 @@ fn edges_and_faces_are_measured() {
                         let v = if count == 2 { 0.0 } else { v.clamp(0.0, 1.0) };
                         let u = u.clamp(0.0, 1.0 - v);
                         let weights = [1.0 - u - v, u, v];
-                        let point = place_of(weights);
+                        let point = point_at(weights);
                         let here = near.distance(point);
                         let here = if here < best.1.abs() || best.1 <= 0.0 || here > 0.0 && best.1 == f64::INFINITY {
                             if reference_is_inside(&solid, &reference, point, here) {
@@ -284,25 +284,25 @@ fn edges_and_faces_are_measured() {
                 };
             }
             if count == 3 && best.1 > 0.0 {
-                // The least of a face outside is at a node of the solid that nothing else of the solid is closer than.
+                // A face outside is closest to a node of the solid, with no other part of the solid closer.
                 best.1 = f64::INFINITY;
                 for &node in near.0.iter().flatten() {
                     let weights = foot(&exact, node);
-                    let distance = place_of(weights).distance(node);
-                    // Not so above a straight edge, which comes closer on one side.
+                    let distance = point_at(weights).distance(node);
+                    // A point above a straight edge is no minimum, since the edge comes closer on one side.
                     let is_least = |weights: [f64; 3]| {
                         [[1, 2], [2, 0], [0, 1]].iter().all(|&[i, j]| {
                             [1e-4, -1e-4].iter().all(|step| {
                                 let mut beside = weights;
                                 beside[i] += step;
                                 beside[j] -= step;
-                                near.distance(place_of(beside)) > distance
+                                near.distance(point_at(beside)) > distance
                             })
                         })
                     };
                     if weights.iter().all(|&weight| weight > 1e-3)
                         && distance < best.1.min(f64::from(WITHIN))
-                        && near.distance(place_of(weights)) > distance - 1e-9
+                        && near.distance(point_at(weights)) > distance - 1e-9
                         && is_least(weights)
                     {
                         best = (weights, distance);
@@ -313,7 +313,7 @@ fn edges_and_faces_are_measured() {
             let tally = &mut seen[count - 2];
             let inner = best.0[..count].iter().all(|&weight| weight > 1e-3);
             let Some(told) = told else {
-                // Found nowhere near: far, or closest with a corner or a border, which is another feature's concern.
+                // Not found: it is far away, or closest at a corner or border, where another feature is in contact.
                 assert!(
                     best.1 > 0.99 * f64::from(WITHIN) || !inner && best.1 > -1e-7,
                     "{name}: {corners:?}: {best:?} is not found"
@@ -325,17 +325,18 @@ fn edges_and_faces_are_measured() {
             assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-6);
             assert!((told.normal.length() - 1.0).abs() < 1e-6);
             if told.inside {
-                // What is told is the distance of the point that is told.
-                let here = reference.signed(place_of(weights));
+                // The result is the distance of the point with these weights.
+                let here = reference.signed(point_at(weights));
                 assert!(
                     (here - f64::from(told.distance)).abs() < 2e-8,
                     "{name}: {corners:?}: {told:?}: {here}"
                 );
             }
-            // What hardly reaches in may be missed.
+            // A slight overlap may be missed.
             if best.1 < -2e-5 {
                 tally[3] += 1;
-                // Cutting planes find the deepest point in what is convex; elsewhere one that is deep, where it is not at the border.
+                // Cutting planes find the deepest point of a convex solid, elsewhere a deep one that is not at the
+                // border.
                 let convex = name == "cube" || name == "sphere";
                 let least = if convex { 0.99 } else { 0.2 };
                 assert!(told.distance < 0.0, "{name}: {corners:?}: {told:?} for {best:?}");
@@ -347,7 +348,7 @@ fn edges_and_faces_are_measured() {
                 }
             } else if told.inside {
                 tally[2] += 1;
-                // A least distance between the ends is found, unless a border is closer.
+                // A minimum in the interior is found, unless a border is closer.
                 if inner {
                     assert!(
                         f64::from(told.distance) < best.1.max(0.0) + 2e-6,
@@ -357,16 +358,16 @@ fn edges_and_faces_are_measured() {
             } else {
                 tally[1] += 1;
                 assert!(
-                    f64::from(told.distance) > reference.signed(place_of(weights)) - 2e-8,
+                    f64::from(told.distance) > reference.signed(point_at(weights)) - 2e-8,
                     "{name}: {corners:?}: {told:?}"
                 );
             }
         }
-        // In what is not convex a feature may stop at its border or in another dent, although it is deeper elsewhere.
+        // In a nonconvex solid the search may end at the border or in another dent.
         assert!(lost * 6 <= seen[0][3] + seen[1][3], "{name}: {lost} of {seen:?}");
         let [edges, faces] = seen;
         assert!(edges.iter().all(|&count| count > 1), "{name}: {seen:?}");
-        // A solid with few corners that stick out seldom meets a face with one.
+        // Few features of a solid with few convex corners meet one.
         assert!(
             faces[1] > 0 && faces[3] > 5 && (faces[2] > 0 || name != "sphere"),
             "{name}: {seen:?}"
@@ -374,14 +375,14 @@ fn edges_and_faces_are_measured() {
     }
 }
 
-/// The weights of the point of a face's plane below `point`.
+/// Returns the weights of the projection of `point` to a face's plane.
 fn foot(face: &[DVec3], point: DVec3) -> [f64; 3] {
     let normal = (face[1] - face[0]).cross(face[2] - face[0]);
     let part = |a: usize, b: usize| normal.dot((face[b] - face[a]).cross(point - face[a])) / normal.length_squared();
     [part(1, 2), part(2, 0), part(0, 1)]
 }
 
-/// By the solid angle only where it could matter.
+/// By the solid angle only near the surface.
 fn reference_is_inside(solid: &ExactSolid, reference: &Reference, point: DVec3, distance: f64) -> bool {
     if distance < 1e-6 {
         reference.is_inside(point)
@@ -399,7 +400,7 @@ fn crossings_alternate() {
         let mut crossed = 0;
         for turn in 0..600 {
             let [from, to] = if turn % 2 == 0 {
-                [(); 2].map(|()| place(&mut random, &surface, 0.05))
+                [(); 2].map(|()| random_point(&mut random, &surface, 0.05))
             } else {
                 // From node to node, through edges and nodes.
                 let count = surface.triangles().len();
@@ -416,7 +417,7 @@ fn crossings_alternate() {
             let mut winding = i32::from(reference.is_inside(from.as_dvec3()));
             let mut last = 0.0;
             let check = |winding: i32, from_fraction: f64, to_fraction: f64| {
-                // Between two crossings that are apart the side is what was counted.
+                // Between two separate crossings the side agrees with the count.
                 let middle = from.as_dvec3().lerp(to.as_dvec3(), 0.5 * (from_fraction + to_fraction));
                 if to_fraction - from_fraction > 1e-4 && reference.distance(middle) > 1e-7 {
                     assert_eq!(

@@ -1,17 +1,17 @@
-//! Two bodies in, what they have in common out.
+//! Overlap query between two bodies in image space.
 
 use glam::{DVec3, Vec3};
 
-use super::counted::Counted;
+use super::depth_buffer::EdgeDepthBuffer;
+use super::edge_tracing::{find_points, trace_edges};
 use super::layers::Layers;
 use super::overlap::Overlap;
-use super::projection::{Frame, LARGEST_IMAGE, Projection};
+use super::projection::{LARGEST_IMAGE, Projection, ViewFrame};
 use super::surface::{Placed, Surface};
-use super::traced::{find_points, trace_edges};
 use super::volume::add_volume;
 use crate::base::{Error, Result, above_zero, ensure};
 
-/// From where bodies are looked at.
+/// The views from which bodies are drawn.
 ///
 /// ```
 #[doc = include_str!("../../doctest/two_cubes.txt")]
@@ -22,13 +22,13 @@ use crate::base::{Error, Result, above_zero, ensure};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Views {
-    /// Along one direction, not zero.
+    /// Along one nonzero direction.
     Along(Vec3),
-    /// Along the three axes of space, one after the other. What any of them sees counts.
+    /// Along the three coordinate axes in turn. The results are combined.
     Axes,
 }
 
-/// How an image is made.
+/// The method of detection.
 ///
 /// ```
 #[doc = include_str!("../../doctest/two_cubes.txt")]
@@ -40,15 +40,16 @@ pub enum Views {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// As its authors describe it: edges are drawn into a depth buffer, faces in front of them counted. Of the edges that
-    /// share a pixel only the nearest is seen, and edges shorter than a pixel or along the view are not drawn; no points,
-    /// no volume.
+    /// The original method: edges are drawn into a depth buffer and the faces in front of them are counted. If
+    /// several edges share a pixel, only the nearest is detected. Edges shorter than a pixel or along the view are
+    /// not drawn. It reports no points and no volume.
     Counted,
-    /// By the intervals in which the ray of each pixel is inside a body. Nothing is missed that is deeper than 0.71 pixels.
+    /// By the intervals in which the ray of each pixel is inside a body. Overlaps deeper than 0.71 pixels are always
+    /// found.
     Intervals,
 }
 
-/// How bodies are compared. Plain data, used only during [`ImageSpace::new`].
+/// Definition of a detector. Plain data, used only during [`ImageSpace::new`].
 ///
 /// ```
 #[doc = include_str!("../../doctest/two_cubes.txt")]
@@ -59,21 +60,22 @@ pub enum Form {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageSpaceDefinition {
-    /// The side of a pixel, m, above 0.
+    /// Side of a pixel, m, above 0.
     pub pixel: f32,
-    /// From where.
+    /// The views.
     pub views: Views,
-    /// In which form.
+    /// The method.
     pub form: Form,
-    /// Room for so many pixels in an image, 1 to 2^24. Memory is reserved for this much; a pair whose boxes overlap so far
-    /// that it is not enough is drawn with pixels of twice the size, and so on.
+    /// Maximum number of pixels in an image, 1 to 2^24. Memory is reserved for this number. If the overlap of two
+    /// bodies' boxes needs more, the side of a pixel is doubled until it fits.
     pub pixels: u32,
-    /// Room for so many crossings of rays with faces in an image of one body; likewise. Not used by [`Form::Counted`].
+    /// Maximum number of ray crossings in an image of one body. If an image needs more, the side of a pixel is
+    /// doubled until it fits. Not used by [`Form::Counted`].
     pub crossings: u32,
 }
 
 impl ImageSpaceDefinition {
-    /// Along the three axes, by intervals, with room for 512 x 512 pixels and four crossings in each.
+    /// Defines a detector along the three axes, by intervals, for 512 x 512 pixels with four crossings each.
     pub fn new(pixel: f32) -> Self {
         Self {
             pixel,
@@ -85,41 +87,38 @@ impl ImageSpaceDefinition {
     }
 }
 
-/// Finds in image space what two bodies have in common, in memory that it has reserved.
+/// Finds the overlap of two bodies in image space, in reserved memory.
 ///
-/// Halic, Kockara, Bayrak, Rowe, Chen, section 2.1 (CInDeR), and Faure, Barbier, Allard, Falipou 2008 for volumes. The time
-/// is linear in polygons and in pixels covered. Bodies are compared where they are: what passes through a thin part
-/// between two detections is not seen.
+/// Halic, Kockara, Bayrak, Rowe, Chen, section 2.1 (CInDeR), and Faure, Barbier, Allard, Falipou 2008 for volumes.
+/// The time is linear in the number of polygons and of covered pixels. Detection is discrete: a body that passes
+/// through a thin part between two calls is not detected.
 ///
 /// ```
 #[doc = include_str!("../../doctest/two_cubes.txt")]
 /// let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
-/// // Cubes of 10 cm, one 8 cm beside the other.
-/// let overlap = space.detect(&bodies)?;
-/// assert!((overlap.volume - 0.1 * 0.1 * 0.02).abs() < 0.1 * overlap.volume);
-/// # Ok::<(), sinew::Error>(())
+/// Cubes of 10 cm, with an offset of 8 cm.
 /// ```
 #[derive(Debug)]
 pub struct ImageSpace {
     pixel: f32,
-    views: [Frame; 3],
+    views: [ViewFrame; 3],
     view_count: usize,
     pixels: usize,
-    drawing: Drawing,
+    data: DetectionData,
     overlap: Overlap,
 }
 
 #[derive(Debug)]
-enum Drawing {
-    Counted(Counted),
+enum DetectionData {
+    Counted(EdgeDepthBuffer),
     Intervals([Layers; 2]),
 }
 
 impl ImageSpace {
-    /// A detector with room for any two of these surfaces.
+    /// Creates a detector with memory for any two of these surfaces.
     ///
     /// Errors: [`Error::InvalidArgument`] for a pixel that is not above 0 and finite, a direction that is zero or not
-    /// finite, room for no pixels, no crossings or more than 2^24 pixels; [`Error::OutOfMemory`].
+    /// finite, `pixels` of 0 or above 2^24, or `crossings` of 0; [`Error::OutOfMemory`].
     pub fn new(definition: &ImageSpaceDefinition, surfaces: &[&Surface]) -> Result<Self> {
         let pixel = definition.pixel;
         above_zero("pixel", pixel)?;
@@ -130,13 +129,13 @@ impl ImageSpace {
         );
         ensure!(definition.crossings > 0, "crossings is 0: must be at least 1");
         let (views, view_count) = match definition.views {
-            Views::Axes => (Frame::AXES, 3),
+            Views::Axes => (ViewFrame::AXES, 3),
             Views::Along(direction) => {
                 ensure!(
                     direction.is_finite() && direction != Vec3::ZERO,
                     "the view is along {direction}: must be finite and not zero"
                 );
-                ([Frame::along(direction); 3], 1)
+                ([ViewFrame::along(direction); 3], 1)
             }
         };
         let (pixels, crossings) = (definition.pixels as usize, definition.crossings as usize);
@@ -146,9 +145,9 @@ impl ImageSpace {
             views,
             view_count,
             pixels,
-            drawing: match definition.form {
-                Form::Counted => Drawing::Counted(Counted::reserved(pixels, edges)?),
-                Form::Intervals => Drawing::Intervals([
+            data: match definition.form {
+                Form::Counted => DetectionData::Counted(EdgeDepthBuffer::reserved(pixels, edges)?),
+                Form::Intervals => DetectionData::Intervals([
                     Layers::reserved(pixels, crossings)?,
                     Layers::reserved(pixels, crossings)?,
                 ]),
@@ -157,11 +156,12 @@ impl ImageSpace {
         })
     }
 
-    /// What two bodies have in common where they are now. One of them at least is closed; where both are, each is looked
-    /// for in the other. Allocates nothing.
+    /// Finds the overlap of two bodies at their current positions. At least one must be closed. If both are, each is
+    /// tested against the other. Does not allocate.
     ///
-    /// Errors: [`Error::InvalidArgument`] for another number of positions than nodes, a position or thickness that is not
-    /// finite, two open surfaces; [`Error::Capacity`] for surfaces larger than those that room was reserved for.
+    /// Errors: [`Error::InvalidArgument`] if the number of positions differs from that of the nodes, a position or
+    /// thickness is not finite, or both surfaces are open; [`Error::Capacity`] for surfaces larger than the reserved
+    /// memory.
     pub fn detect(&mut self, bodies: &[Placed; 2]) -> Result<&Overlap> {
         bodies[0].check()?;
         bodies[1].check()?;
@@ -171,7 +171,7 @@ impl ImageSpace {
             "both surfaces are open: one at least must be closed"
         );
         ensure!(
-            self.overlap.takes(surfaces),
+            self.overlap.fits(surfaces),
             Error::Capacity(format!(
                 "surfaces of {} and {} nodes, {} and {} edges: larger than what the detector was made for",
                 surfaces[0].node_count(),
@@ -189,9 +189,9 @@ impl ImageSpace {
         }
         let overlap = &mut self.overlap;
         for inside in &mut overlap.inside {
-            // What several views found, which are all of what is there.
-            inside.join(0, f32::min);
-            inside.join_points();
+            // Merges the results of all views.
+            inside.merge_edges(0, f32::min);
+            inside.merge_points();
         }
         overlap.volume /= self.view_count as f64;
         let gradient: DVec3 = overlap.gradients[0].iter().sum();
@@ -203,19 +203,22 @@ impl ImageSpace {
         Ok(overlap)
     }
 
-    /// Draws one view, in pixels as small as there is room for; answers whether there was any.
-    fn detect_along(&mut self, frame: Frame, bodies: &[Placed; 2]) -> bool {
-        let boxes = [0, 1].map(|side| bounds(frame, bodies[side].positions));
+    /// Draws one view, with the smallest pixels that fit into memory. Returns false if not even one pixel fits.
+    fn detect_along(&mut self, frame: ViewFrame, bodies: &[Placed; 2]) -> bool {
+        let bounds_of_bodies = [0, 1].map(|side| bounds(frame, bodies[side].positions));
         let thickness = f64::from(bodies[0].thickness) + f64::from(bodies[1].thickness);
-        let low = boxes[0][0].max(boxes[1][0]) - thickness;
-        let high = boxes[0][1].min(boxes[1][1]) + thickness;
+        let low = bounds_of_bodies[0][0].max(bounds_of_bodies[1][0]) - thickness;
+        let high = bounds_of_bodies[0][1].min(bounds_of_bodies[1][1]) + thickness;
         if !low.cmple(high).all() {
             return true;
         }
-        let whole = [boxes[0][0].min(boxes[1][0]), boxes[0][1].max(boxes[1][1])];
+        let union = [
+            bounds_of_bodies[0][0].min(bounds_of_bodies[1][0]),
+            bounds_of_bodies[0][1].max(bounds_of_bodies[1][1]),
+        ];
         let mut pixel = f64::from(self.pixel);
         loop {
-            let fits = Projection::fits([low, high], whole, pixel, self.pixels);
+            let fits = Projection::fits([low, high], union, pixel, self.pixels);
             if fits
                 && let Ok(projection) = Projection::new(frame, low, high, pixel)
                 && self.draw(&projection, bodies)
@@ -223,30 +226,30 @@ impl ImageSpace {
                 self.overlap.pixel = self.overlap.pixel.max(pixel as f32);
                 return true;
             }
-            // Smaller than an image of one pixel there is none.
-            if fits && Projection::fits([low, high], whole, pixel, 1) {
+            // Not even a single pixel fits.
+            if fits && Projection::fits([low, high], union, pixel, 1) {
                 return false;
             }
             pixel *= 2.0;
         }
     }
 
-    /// Answers whether there was room.
+    /// Returns false if the memory is too small.
     fn draw(&mut self, projection: &Projection, bodies: &[Placed; 2]) -> bool {
         let overlap = &mut self.overlap;
         let [first, second] = bodies;
-        // Of each body, with the other as the occluder.
+        // Each closed body is the occluder of the other one.
         let sides = [(0, first, second), (1, second, first)];
         let sides = sides
             .into_iter()
             .filter(|(_, _, occluder)| occluder.surface.is_closed());
-        match &mut self.drawing {
-            Drawing::Counted(counted) => {
+        match &mut self.data {
+            DetectionData::Counted(counted) => {
                 for (side, body, occluder) in sides {
                     counted.detect(projection, body, occluder, &mut overlap.inside[side]);
                 }
             }
-            Drawing::Intervals(layers) => {
+            DetectionData::Intervals(layers) => {
                 for (layers, body) in layers.iter_mut().zip(bodies) {
                     let corners = |triangle: usize| Some(body.corners(triangle));
                     if body.surface.is_closed() && !layers.draw(projection, body.surface.triangles().len(), &corners) {
@@ -256,10 +259,10 @@ impl ImageSpace {
                 let thickness = f64::from(first.thickness) + f64::from(second.thickness);
                 for (side, body, _) in sides {
                     let inside = &mut overlap.inside[side];
-                    let others = inside.edges.len();
+                    let first_edge = inside.edges.len();
                     trace_edges(projection, &layers[1 - side], thickness, body, inside);
-                    inside.join(others, f32::max);
-                    // An open body gives edges alone.
+                    inside.merge_edges(first_edge, f32::max);
+                    // Of an open body only edges are reported.
                     if body.surface.is_closed() {
                         find_points(projection, &layers[1 - side], thickness, body, inside);
                     }
@@ -273,12 +276,12 @@ impl ImageSpace {
     }
 }
 
-/// The box around a body in the coordinates of a view.
-fn bounds(frame: Frame, positions: &[Vec3]) -> [DVec3; 2] {
+/// Returns the bounding box of a body in the coordinates of a view.
+fn bounds(frame: ViewFrame, positions: &[Vec3]) -> [DVec3; 2] {
     let mut corners = [DVec3::INFINITY, DVec3::NEG_INFINITY];
     for &position in positions {
-        let at = frame.coordinates(position);
-        corners = [corners[0].min(at), corners[1].max(at)];
+        let coordinates = frame.coordinates(position);
+        corners = [corners[0].min(coordinates), corners[1].max(coordinates)];
     }
     corners
 }

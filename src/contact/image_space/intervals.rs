@@ -1,34 +1,36 @@
-//! Where the ray of a pixel is inside a body.
+//! Intervals in which the ray of a pixel is inside a body.
 
 use super::layers::RayCrossing;
 
-/// A piece of a ray within a body.
+/// An interval of a ray inside a body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Interval {
     /// Depths along the view, m.
     pub entry: f64,
     pub exit: f64,
-    /// The triangles there.
+    /// Triangles at entry and exit.
     pub triangles: [u32; 2],
 }
 
 impl Interval {
-    /// How deep a depth lies in it, and the triangle through which the way out is shorter; below 0 outside.
+    /// Returns the distance of a depth to the nearer end of the interval, negative outside, and the triangle at that
+    /// end.
     pub fn depth_of(&self, depth: f64) -> (f64, u32) {
-        let (back, ahead) = (depth - self.entry, self.exit - depth);
-        if back <= ahead {
-            (back, self.triangles[0])
+        let (to_entry, to_exit) = (depth - self.entry, self.exit - depth);
+        if to_entry <= to_exit {
+            (to_entry, self.triangles[0])
         } else {
-            (ahead, self.triangles[1])
+            (to_exit, self.triangles[1])
         }
     }
 }
 
-/// The pieces of a ray that lie within a body, each longer by `thickness` at both ends; pieces that then touch are one.
+/// Iterates over the intervals of a ray inside a body, each extended by `thickness` at both ends. Intervals that then
+/// touch are merged.
 pub(super) struct Intervals<'a> {
     crossings: std::slice::Iter<'a, RayCrossing>,
     thickness: f64,
-    ahead: Option<Interval>,
+    next_interval: Option<Interval>,
 }
 
 impl<'a> Intervals<'a> {
@@ -36,13 +38,13 @@ impl<'a> Intervals<'a> {
         let mut intervals = Self {
             crossings: crossings.iter(),
             thickness,
-            ahead: None,
+            next_interval: None,
         };
-        intervals.ahead = intervals.read();
+        intervals.next_interval = intervals.read();
         intervals
     }
 
-    /// The next piece in which the surface is wound around the ray.
+    /// Returns the next interval with a positive winding number.
     fn read(&mut self) -> Option<Interval> {
         let mut winding = 0;
         let mut entry: Option<&RayCrossing> = None;
@@ -68,13 +70,13 @@ impl Iterator for Intervals<'_> {
     type Item = Interval;
 
     fn next(&mut self) -> Option<Interval> {
-        let mut whole = self.ahead.take()?;
-        self.ahead = self.read();
-        while let Some(next) = self.ahead.filter(|next| next.entry <= whole.exit) {
-            whole.exit = next.exit;
-            whole.triangles[1] = next.triangles[1];
-            self.ahead = self.read();
+        let mut merged = self.next_interval.take()?;
+        self.next_interval = self.read();
+        while let Some(next) = self.next_interval.filter(|next| next.entry <= merged.exit) {
+            merged.exit = next.exit;
+            merged.triangles[1] = next.triangles[1];
+            self.next_interval = self.read();
         }
-        Some(whole)
+        Some(merged)
     }
 }

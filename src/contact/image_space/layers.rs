@@ -1,18 +1,19 @@
-//! A layered depth image (Shade et al. 1998): for each pixel all surfaces that a ray through its middle passes, by depth.
+//! Layered depth image (Shade et al. 1998): for each pixel, all surfaces that the ray through its center crosses,
+//! sorted by depth.
 
 use glam::Vec3;
 
-use super::draw::draw_triangles;
 use super::projection::Projection;
+use super::rasterize::draw_triangles;
 use crate::base::{Result, memory};
 use crate::codec::saved;
 
-/// Where the ray of a pixel passes a surface.
+/// An intersection of a pixel's ray with a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct RayCrossing {
-    /// Along the view, m.
+    /// Distance along the view, m.
     pub depth: f32,
-    /// The triangle, doubled, and 1 where the ray enters.
+    /// Twice the triangle's index, plus 1 if the ray enters.
     code: u32,
 }
 
@@ -30,16 +31,16 @@ impl RayCrossing {
         self.code >> 1
     }
 
-    /// What it changes of the number of times that the surface is wound around the ray's point.
+    /// Change of the winding number along the ray.
     pub fn winding(&self) -> i32 {
         if self.code & 1 == 1 { 1 } else { -1 }
     }
 }
 
-/// The crossings of all pixels, those of a pixel in ascending depth.
+/// The crossings of all pixels, sorted by depth in each pixel.
 #[derive(Debug, Default)]
 pub(super) struct Layers {
-    /// Where the crossings of each pixel end; those of the next begin there.
+    /// End of each pixel's crossings, and start of the next pixel's.
     ends: Vec<u32>,
     crossings: Vec<RayCrossing>,
 }
@@ -47,7 +48,7 @@ pub(super) struct Layers {
 saved! { Layers { ends, crossings } }
 
 impl Layers {
-    /// Room for so much.
+    /// Reserves memory for this many pixels and crossings.
     pub fn reserved(pixels: usize, crossings: usize) -> Result<Self> {
         Ok(Self {
             ends: memory::reserved(pixels)?,
@@ -55,7 +56,7 @@ impl Layers {
         })
     }
 
-    /// Of a surface, in memory of its own.
+    /// Draws a surface into new memory.
     pub fn new(projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
         let mut layers = Self::reserved(projection.pixel_count(), 0)?;
         let corners = |triangle: usize| Some(triangles[triangle].map(|node| positions[node as usize]));
@@ -65,7 +66,8 @@ impl Layers {
         Ok(layers)
     }
 
-    /// Draws so many triangles, those without corners left out, into the memory reserved; answers whether it was enough.
+    /// Draws `count` triangles into the reserved memory, without those that have no corners. Returns false if the
+    /// memory is too small.
     pub fn draw(
         &mut self,
         projection: &Projection,
@@ -83,7 +85,7 @@ impl Layers {
         fits
     }
 
-    /// Leaves in `ends` where each pixel's crossings are to begin; answers how many there are in all.
+    /// Stores the start of each pixel's crossings in `ends`. Returns the total number of crossings.
     fn count(&mut self, projection: &Projection, count: usize, corners: &impl Fn(usize) -> Option<[Vec3; 3]>) -> usize {
         self.ends.clear();
         self.ends.resize(projection.pixel_count(), 0);
@@ -99,7 +101,7 @@ impl Layers {
         total
     }
 
-    /// A counting sort by pixel, then a small sort in each.
+    /// Fills the crossings by a counting sort over pixels, then sorts each pixel by depth.
     fn fill(
         &mut self,
         crossings: usize,
@@ -109,9 +111,9 @@ impl Layers {
     ) {
         self.crossings.resize(crossings, RayCrossing::default());
         draw_triangles(projection, count, corners, |triangle, pixel, fragment| {
-            let place = &mut self.ends[pixel];
-            self.crossings[*place as usize] = RayCrossing::new(fragment.depth, triangle, fragment.front);
-            *place += 1;
+            let slot = &mut self.ends[pixel];
+            self.crossings[*slot as usize] = RayCrossing::new(fragment.depth, triangle, fragment.front);
+            *slot += 1;
         });
         let mut begin = 0;
         for &end in &self.ends {
@@ -123,12 +125,12 @@ impl Layers {
         }
     }
 
-    /// Whether no ray passes anything.
+    /// Returns true if there are no crossings.
     pub fn is_empty(&self) -> bool {
         self.crossings.is_empty()
     }
 
-    /// What the ray of a pixel passes.
+    /// Returns the crossings of a pixel's ray.
     pub fn at(&self, pixel: usize) -> &[RayCrossing] {
         let begin = pixel.checked_sub(1).map_or(0, |previous| self.ends[previous]);
         &self.crossings[begin as usize..self.ends[pixel] as usize]

@@ -1,11 +1,11 @@
-//! What a detection finds.
+//! Results of a detection.
 
 use glam::{DVec3, Vec3};
 
 use super::surface::Surface;
 use crate::base::{Result, memory};
 
-/// What two surfaces have in common. Index 0 belongs to the first, 1 to the second.
+/// Overlap of two surfaces. Index 0 belongs to the first surface, 1 to the second.
 ///
 /// ```
 #[doc = include_str!("../../doctest/two_cubes.txt")]
@@ -18,23 +18,23 @@ use crate::base::{Result, memory};
 /// ```
 #[derive(Debug)]
 pub struct Overlap {
-    /// What of each lies inside the other; nothing where the other is open.
+    /// Parts of each surface inside the other; empty if the other is open.
     pub inside: [Inside; 2],
-    /// m³, the mean over the views; 0 where one of them is open, and with [`Form::Counted`](super::Form::Counted).
+    /// Overlap volume, m³, the mean over the views; 0 if a surface is open, and with
+    /// [`Form::Counted`](super::Form::Counted).
     pub volume: f64,
-    /// How the volume changes with each node of each, m² (Faure et al. 2008); zero where the volume is.
+    /// Gradient of the volume by each node of each surface, m² (Faure et al. 2008); zero if the volume is 0.
     pub gradients: [Vec<DVec3>; 2],
-    /// The direction of unit length in which the first has to be moved so that the volume shrinks fastest, opposite to the
-    /// gradient; zero where there is no volume.
+    /// Unit direction in which the first surface must move so that the volume shrinks fastest, opposite to the
+    /// gradient; zero if there is no volume.
     pub normal: Vec3,
-    /// How far it has to be moved, were the volume to shrink so all the way, m.
+    /// Displacement that would reduce the volume to 0 at that rate, m.
     pub depth: f32,
-    /// The largest pixel used, m: that asked for, or twice that and so on where it would have needed more memory than was
-    /// reserved.
+    /// Largest pixel used, m: the requested one, or a power of two times it if the reserved memory was too small.
     pub pixel: f32,
 }
 
-/// What of a surface lies inside another.
+/// Parts of a surface inside another.
 ///
 /// ```
 #[doc = include_str!("../../doctest/two_cubes.txt")]
@@ -47,11 +47,11 @@ pub struct Overlap {
 /// ```
 #[derive(Debug, Default)]
 pub struct Inside {
-    /// In ascending order; none of a surface that is open.
+    /// Nodes in ascending order; empty if the surface is open.
     pub points: Vec<PointInside>,
-    /// By edge, then from its first node on.
+    /// Sorted by edge, then along the edge.
     pub edges: Vec<EdgeInside>,
-    /// Parts of edges inside that there was no room for.
+    /// Number of parts of edges for which the memory was too small.
     pub unlisted: u32,
 }
 
@@ -72,9 +72,9 @@ pub struct Inside {
 pub struct PointInside {
     /// The node.
     pub node: u32,
-    /// The way out along the view, m; the shortest of those of several views.
+    /// Distance to the surface along the view, m; the least over all views.
     pub depth: f32,
-    /// The triangle of the other surface at the end of that way.
+    /// Triangle of the other surface at that distance.
     pub triangle: u32,
 }
 
@@ -93,18 +93,18 @@ pub struct PointInside {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeInside {
-    /// Its place among [`Surface::edges`].
+    /// Index in [`Surface::edges`].
     pub edge: u32,
-    /// Where it begins and ends, as fractions of the edge.
+    /// Start and end, as fractions of the edge.
     pub entry: f32,
     /// See `entry`.
     pub exit: f32,
-    /// The longest of the ways out along the view, m; of several views the one that sees the least.
+    /// Largest distance to the surface along the view, m; the least over all views.
     pub depth: f32,
 }
 
 impl Overlap {
-    /// Room for what any two of these surfaces can have in common.
+    /// Reserves memory for the overlap of any two of these surfaces.
     pub(super) fn reserved(surfaces: &[&Surface]) -> Result<Self> {
         let nodes = surfaces.iter().map(|surface| surface.node_count()).max().unwrap_or(0);
         let edges = surfaces.iter().map(|surface| surface.edges().len()).max().unwrap_or(0);
@@ -125,15 +125,15 @@ impl Overlap {
         })
     }
 
-    /// Whether there is room for these two.
-    pub(super) fn takes(&self, surfaces: [&Surface; 2]) -> bool {
+    /// Returns true if the memory is sufficient for these two surfaces.
+    pub(super) fn fits(&self, surfaces: [&Surface; 2]) -> bool {
         let nodes = self.gradients[0].capacity().min(self.gradients[1].capacity());
         let edges = self.inside[0].edges.capacity().min(self.inside[1].edges.capacity()) / 4;
-        let fits = |surface: &Surface| surface.node_count() <= nodes && surface.edges().len() <= edges;
-        surfaces.into_iter().all(fits)
+        let surface_fits = |surface: &Surface| surface.node_count() <= nodes && surface.edges().len() <= edges;
+        surfaces.into_iter().all(surface_fits)
     }
 
-    /// Nothing, between surfaces of so many nodes.
+    /// Clears the overlap, for surfaces with these numbers of nodes.
     pub(super) fn clear(&mut self, node_counts: [usize; 2], pixel: f32) {
         for inside in &mut self.inside {
             inside.points.clear();
@@ -147,14 +147,14 @@ impl Overlap {
         (self.volume, self.normal, self.depth, self.pixel) = (0.0, Vec3::ZERO, 0.0, pixel);
     }
 
-    /// Whether anything was found.
+    /// Returns true if no overlap was found.
     pub fn is_empty(&self) -> bool {
         self.volume == 0.0 && self.inside.iter().all(|i| i.points.is_empty() && i.edges.is_empty())
     }
 }
 
 impl Inside {
-    /// Adds a part of an edge, joined to the one before where it goes on from there; those before `first` are of other views.
+    /// Adds a part of an edge, merged with the last one if they touch. Parts before `first` belong to other views.
     pub(super) fn add(&mut self, part: EdgeInside, first: usize) {
         if let Some(last) = self.edges[first..].last_mut()
             && last.edge == part.edge
@@ -171,18 +171,18 @@ impl Inside {
         }
     }
 
-    /// Sorts the parts from `first` on and joins what touches: `depth` tells which of two depths that has.
-    pub(super) fn join(&mut self, first: usize, depth: impl Fn(f32, f32) -> f32) {
-        let by_place = |a: &EdgeInside, b: &EdgeInside| a.edge.cmp(&b.edge).then(a.entry.total_cmp(&b.entry));
-        self.edges[first..].sort_unstable_by(by_place);
+    /// Sorts the parts from `first` on and merges those that touch. `depth` combines two depths.
+    pub(super) fn merge_edges(&mut self, first: usize, depth: impl Fn(f32, f32) -> f32) {
+        let by_position = |a: &EdgeInside, b: &EdgeInside| a.edge.cmp(&b.edge).then(a.entry.total_cmp(&b.entry));
+        self.edges[first..].sort_unstable_by(by_position);
         let mut last = first;
         for next in first..self.edges.len() {
             let part = self.edges[next];
-            let whole = &mut self.edges[last];
-            if part.edge == whole.edge && part.entry <= whole.exit {
+            let merged = &mut self.edges[last];
+            if part.edge == merged.edge && part.entry <= merged.exit {
                 if next > last {
-                    whole.exit = whole.exit.max(part.exit);
-                    whole.depth = depth(whole.depth, part.depth);
+                    merged.exit = merged.exit.max(part.exit);
+                    merged.depth = depth(merged.depth, part.depth);
                 }
             } else {
                 last += 1;
@@ -192,8 +192,8 @@ impl Inside {
         self.edges.truncate((last + 1).min(self.edges.len()));
     }
 
-    /// Keeps of each node the least depth.
-    pub(super) fn join_points(&mut self) {
+    /// Keeps the least depth of each node.
+    pub(super) fn merge_points(&mut self) {
         let by_node = |a: &PointInside, b: &PointInside| a.node.cmp(&b.node).then(a.depth.total_cmp(&b.depth));
         self.points.sort_unstable_by(by_node);
         self.points.dedup_by_key(|point| point.node);

@@ -1,11 +1,11 @@
-//! What can be drawn: checked once, so that a detection need not.
+//! Surfaces for image-space detection, validated once.
 
 use glam::Vec3;
 
 use crate::base::{Error, Result, ensure, memory};
 use crate::mesh;
 
-/// What is said of an occluder that is none.
+/// Error message for an occluder that is not closed.
 pub(super) const OPEN: &str =
     "the surface is not closed: an occluder must be, with each edge as often in one direction as in the other";
 
@@ -26,11 +26,11 @@ pub struct Surface {
     node_count: usize,
     triangles: Vec<[u32; 3]>,
     edges: Vec<[u32; 2]>,
-    /// Whether others can be inside of it: not of one that was closed and is cut.
+    /// True if other bodies can be inside. A closed surface that was cut is no longer closed.
     pub(crate) closed: bool,
 }
 
-/// A surface where its nodes are now.
+/// A surface with its current node positions.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -47,17 +47,16 @@ pub struct Surface {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
-    /// What is joined to what.
+    /// Triangles and edges.
     pub surface: &'a Surface,
-    /// Metres, one for each node.
+    /// One position per node, m.
     pub positions: &'a [Vec3],
-    /// How much further along the view than its faces the body counts as there, m, at least 0: what keeps thin parts from
-    /// being missed.
+    /// Expansion of the body along the view, m, at least 0. It prevents thin parts from being missed.
     pub thickness: f32,
 }
 
 impl Surface {
-    /// Of a body that others can be inside of: its triangles face outwards and leave no gap.
+    /// Creates the surface of a body that others can be inside of. Its triangles face outward and leave no gap.
     ///
     /// Errors: [`Error::InvalidArgument`] for no triangles, an index out of range, a surface that is not closed;
     /// [`Error::OutOfMemory`].
@@ -67,7 +66,7 @@ impl Surface {
         Self::new(node_count, triangles, true)
     }
 
-    /// Of a body that has no inside: it gives edges alone.
+    /// Creates the surface of a body without an inside. Only its edges are reported.
     ///
     /// Errors: [`Error::InvalidArgument`] for no triangles or an index out of range; [`Error::OutOfMemory`].
     pub fn open(node_count: usize, triangles: &[[u32; 3]]) -> Result<Self> {
@@ -84,34 +83,34 @@ impl Surface {
         })
     }
 
-    /// Whether others can be inside of it.
+    /// Returns true if other bodies can be inside.
     pub fn is_closed(&self) -> bool {
         self.closed
     }
 
-    /// How many positions it has.
+    /// Returns the number of nodes.
     pub fn node_count(&self) -> usize {
         self.node_count
     }
 
-    /// Three nodes each.
+    /// Returns the triangles, three nodes each.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// Two nodes each, every edge once.
+    /// Returns the edges, two nodes each.
     pub fn edges(&self) -> &[[u32; 2]] {
         &self.edges
     }
 }
 
 impl Placed<'_> {
-    /// The corners of a triangle.
+    /// Returns the corners of a triangle.
     pub(super) fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.surface.triangles[triangle].map(|node| self.positions[node as usize])
     }
 
-    /// Refuses what does not belong together or is not finite.
+    /// Checks that the number of positions fits and all values are finite.
     pub(super) fn check(&self) -> Result<()> {
         let node_count = self.surface.node_count;
         ensure!(
@@ -135,7 +134,7 @@ pub(super) fn check_positions(positions: &[Vec3]) -> Result<()> {
     Ok(())
 }
 
-/// Refuses what cannot be drawn.
+/// Checks that the triangles can be drawn.
 pub(super) fn check(node_count: usize, triangles: &[[u32; 3]]) -> Result<()> {
     ensure!(!triangles.is_empty(), "triangles: the surface has none");
     if triangles.len() >= 1 << 31 {

@@ -1,11 +1,11 @@
-//! Features against solids whose distance is known.
+//! Features against solids with known distance.
 
 use glam::Vec3;
 
 use super::LayeredImage;
 use crate::random::Random;
 
-/// A box about the origin with these half edges.
+/// A box around the origin with these half extents.
 fn cuboid(half: Vec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let corner = |i: u32| half * Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32).map(|c| 2.0 * c - 1.0);
     let sides = [
@@ -21,13 +21,13 @@ fn cuboid(half: Vec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 }
 
 /// The signed distance of a point from such a box.
-fn from_cuboid(point: Vec3, half: Vec3) -> f32 {
+fn distance_to_cuboid(point: Vec3, half: Vec3) -> f32 {
     let beyond = point.abs() - half;
     beyond.max(Vec3::ZERO).length() + beyond.max_element().min(0.0)
 }
 
 #[test]
-fn an_edge_across_a_corner_is_deepest_in_its_middle() {
+fn features_are_deepest_where_sampled() {
     let half = Vec3::new(0.3, 0.2, 0.25);
     let (positions, triangles) = cuboid(half);
     let pixel = 0.01;
@@ -48,24 +48,24 @@ fn an_edge_across_a_corner_is_deepest_in_its_middle() {
                         2 => a.lerp(b, u),
                         _ => a + (b - a) * u + (c - a) * v,
                     };
-                    least = least.min(from_cuboid(point, half));
+                    least = least.min(distance_to_cuboid(point, half));
                 }
             }
-            let answer = image.closest(corners, within);
-            let Some(closest) = answer else {
+            let result = image.closest(corners, within);
+            let Some(closest) = result else {
                 assert!(least > within - pixel, "{corners:?}: {least}");
                 continue;
             };
             seen[corners.len() - 1] += 1;
             let weights = closest.weights;
             assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-5);
-            let at = corners
+            let point = corners
                 .iter()
                 .zip(weights)
                 .map(|(&corner, weight)| corner * weight)
                 .sum::<Vec3>();
-            let exact = from_cuboid(at, half);
-            // The distance is that of the point found, which is as deep as any that was sampled.
+            let exact = distance_to_cuboid(point, half);
+            // The result is the distance of the point found, which is as deep as any sample.
             let slack = match corners.len() {
                 1 | 2 if least < -pixel => 0.25 * pixel,
                 3 if least < -pixel => 0.5 * pixel,

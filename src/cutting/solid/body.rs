@@ -1,18 +1,19 @@
-//! The solid that is cut: cells of material, the tetrahedra that fill them, the triangles that are drawn, and the vertices bound to nodes.
+//! A solid that can be cut: cells of material, tetrahedra that fill them, render triangles, and vertices that are bound
+//! to nodes.
 
 use glam::{DVec3, Vec3};
 
-use super::sever::{Mark, SolidStroke};
+use super::separate::{BladeMark, SolidStroke};
 use crate::base::{Result, memory};
 use crate::codec::{saved, saved_enum};
-use crate::cutting::divided::{Cell, Divided, NONE, Node, Simplex, divided, weighed};
-use crate::cutting::pieces::piece_count;
+use crate::cutting::cell_complex::{Cell, CellComplex, NONE, Node, Simplex, cell_complex, weighted_mean};
+use crate::cutting::cell_copies::piece_count;
 use crate::cutting::tracked::Tracked;
 
 /// The corners of the face opposite each corner, counterclockwise seen from outside.
 pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
-/// A tetrahedron that is simulated.
+/// A simulated tetrahedron.
 ///
 /// ```
 #[doc = include_str!("../../doctest/cut_solid.txt")]
@@ -24,32 +25,32 @@ pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidCell {
-    /// Its nodes, in the order in which they were given.
+    /// The nodes, in the given order.
     pub nodes: [u32; 4],
-    /// The volume of its material in the rest shape, m³.
+    /// The volume of the material in the rest shape, m³.
     pub volume: f64,
-    /// How far what is snapped in it may be moved, in the rest shape, m.
+    /// The snapping distance in the rest shape, m.
     pub snap: f64,
-    /// The first of the tetrahedra of its material.
+    /// The first tetrahedron of the material.
     pub(crate) first: u32,
-    /// For each of its nodes the next corner at the node; corner k of cell c has the number 4 c + k.
+    /// For each node the next corner at the node. Corner k of cell c has the index 4 c + k.
     pub(crate) next: [u32; 4],
 }
 
 saved! { SolidCell { nodes, volume, snap, first, next } }
 
-/// Whether a face of the material with a tetrahedron across was cut.
+/// The state of a face between two tetrahedra of the material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Face {
-    /// It was not.
+pub(crate) enum FaceState {
+    /// The face is not cut.
     Whole,
-    /// The blade has passed through all of it, but it cannot open yet.
+    /// The blade has passed through the whole face, but it cannot open yet.
     Severed,
-    /// It is being opened.
+    /// The current cut opens the face.
     Opening,
 }
 
-saved_enum!(Face { 0 => Whole, 1 => Severed, 2 => Opening });
+saved_enum!(FaceState { 0 => Whole, 1 => Severed, 2 => Opening });
 
 /// A tetrahedron of the material.
 ///
@@ -64,27 +65,28 @@ saved_enum!(Face { 0 => Whole, 1 => Severed, 2 => Opening });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidTetrahedron {
-    /// Its vertices; seen from the first the others are clockwise, that is, their triple product is above 0.
+    /// The vertices. Seen from the first one the others are clockwise, so that their triple product is above 0.
     pub corners: [u32; 4],
-    /// The cell that it lies in.
+    /// The cell that contains the tetrahedron.
     pub cell: u32,
-    /// Its volume in the rest shape, m³, above 0.
+    /// The volume in the rest shape, m³, above 0.
     pub volume: f64,
     /// The tetrahedron across the face opposite each corner.
-    pub(crate) neighbours: [u32; 4],
-    /// What became of the face opposite each corner.
-    pub(crate) faces: [Face; 4],
-    /// The triangle drawn on the face opposite each corner, if nothing lies across.
-    pub(crate) drawn: [u32; 4],
-    /// The stroke that it counts as on the other side of than the planes of its corners tell, which are all on the blade.
-    pub(crate) turned: u32,
+    pub(crate) neighbors: [u32; 4],
+    /// The state of the face opposite each corner.
+    pub(crate) faces: [FaceState; 4],
+    /// The render triangle on the face opposite each corner, if it has no neighbor.
+    pub(crate) render_triangles: [u32; 4],
+    /// The stroke that treats the tetrahedron, whose corners are all on the blade, as on the other side than their
+    /// planes indicate.
+    pub(crate) flipped_in: u32,
     /// The next tetrahedron of the same cell.
     pub(crate) next: u32,
 }
 
-saved! { SolidTetrahedron { corners, cell, volume, neighbours, faces, drawn, turned, next } }
+saved! { SolidTetrahedron { corners, cell, volume, neighbors, faces, render_triangles, flipped_in, next } }
 
-/// A triangle that is drawn and touched: a face of the material with nothing across.
+/// A triangle of the render surface: a face of the material without a neighbor.
 ///
 /// ```
 #[doc = include_str!("../../doctest/cut_solid.txt")]
@@ -95,19 +97,19 @@ saved! { SolidTetrahedron { corners, cell, volume, neighbours, faces, drawn, tur
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidTriangle {
-    /// Its vertices, counterclockwise seen from outside.
+    /// The vertices, counterclockwise seen from outside.
     pub corners: [u32; 3],
-    /// The cell that it lies in.
+    /// The cell that contains the triangle.
     pub cell: u32,
-    /// Whether a cut has bared it; else it is skin.
+    /// True if a cut exposed the triangle. Otherwise it belongs to the skin.
     pub is_inner: bool,
-    /// The tetrahedron of which it is a face.
+    /// The tetrahedron that has this face.
     pub(crate) tetrahedron: u32,
 }
 
 saved! { SolidTriangle { corners, cell, is_inner, tetrahedron } }
 
-/// A corner of the material. Those that triangles have are drawn; others lie inside.
+/// A vertex of the material. Vertices of triangles are rendered. Others lie inside.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -124,17 +126,17 @@ saved! { SolidTriangle { corners, cell, is_inner, tetrahedron } }
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidVertex {
-    /// The nodes that it is bound to; unused ones repeat the first with weight 0.
+    /// The nodes that it is bound to. Unused entries repeat the first one with weight 0.
     pub nodes: [u32; 4],
-    /// How much of each, at least 0, 1 in all.
+    /// The weights of the nodes. They are at least 0 and add up to 1.
     pub weights: [f64; 4],
-    /// Its number among nodes, which no other vertex has: that of the node that it is at, or one of its own.
+    /// The index among nodes, which no other vertex has: that of the node at this vertex, or a separate one.
     pub point: u32,
-    /// One of the tetrahedra about it.
+    /// One of the tetrahedra around it.
     pub(crate) around: u32,
-    /// Where the blade passed through it, in the stroke that came near it last, and in the one before.
-    pub(crate) mark: Mark,
-    pub(crate) other_mark: Mark,
+    /// The position relative to the blade in the last stroke near it, and in the one before.
+    pub(crate) mark: BladeMark,
+    pub(crate) other_mark: BladeMark,
 }
 
 saved! { SolidVertex { nodes, weights, point, around, mark, other_mark } }
@@ -162,30 +164,35 @@ pub struct CutSolid {
     pub(crate) tetrahedra: Tracked<SolidTetrahedron>,
     pub(crate) triangles: Tracked<SolidTriangle>,
     pub(crate) vertices: Tracked<SolidVertex>,
-    /// How many strokes there were.
+    /// The number of strokes.
     pub(crate) strokes: u32,
     pub(crate) stroke: SolidStroke,
-    /// Both before the last cut.
+    /// The values of both before the last cut.
     pub(crate) before: (u32, SolidStroke),
 }
 
 saved! { CutSolid { nodes, cells, tetrahedra, triangles, vertices, strokes, stroke, before } }
 
-divided!(CutSolid, 4, SolidCell { volume }, tetrahedra, SolidTriangle, {
+cell_complex!(CutSolid, 4, SolidCell { volume }, tetrahedra, SolidTriangle, {
     const EDGES: &'static [[usize; 2]] = &[[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
     const SIDES: [&'static [usize]; 4] = [&FACES[0], &FACES[1], &FACES[2], &FACES[3]];
 
-    fn part_of(&self, tetrahedron: u32) -> f64 {
+    fn material_fraction(&self, tetrahedron: u32) -> f64 {
         self.tetrahedra[tetrahedron].volume
     }
 
     fn move_simplex(&mut self, tetrahedron: u32, cell: u32, next: u32) -> Result<()> {
         let SolidTetrahedron {
-            cell: before, drawn, ..
+            cell: before,
+            render_triangles,
+            ..
         } = self.tetrahedra[tetrahedron];
         self.tetrahedra
             .edit(tetrahedron, |it| (it.cell, it.next) = (cell, next))?;
-        for triangle in drawn.into_iter().filter(|&drawn| cell != before && drawn != NONE) {
+        for triangle in render_triangles
+            .into_iter()
+            .filter(|&triangle| cell != before && triangle != NONE)
+        {
             self.triangles.edit(triangle, |triangle| triangle.cell = cell)?;
         }
         Ok(())
@@ -193,8 +200,8 @@ divided!(CutSolid, 4, SolidCell { volume }, tetrahedra, SolidTriangle, {
 });
 
 impl CutSolid {
-    /// Reserves room for so many more nodes, and for as much of all else as cuts that make them need in general, so that cuts do not have to
-    /// move what is there.
+    /// Reserves space for this many more nodes, and for everything else that cuts with these nodes usually need. Cuts
+    /// then need not reallocate.
     pub fn reserve(&mut self, nodes: u32) -> Result<()> {
         let nodes = nodes as usize;
         self.nodes.reserve(nodes)?;
@@ -204,12 +211,13 @@ impl CutSolid {
         self.vertices.reserve(4 * nodes)
     }
 
-    /// The tetrahedra of the material; none is ever taken away.
+    /// The tetrahedra of the material. Cuts never remove one.
     pub fn tetrahedra(&self) -> &[SolidTetrahedron] {
         self.tetrahedra.values()
     }
 
-    /// The vertices of the material, drawn or not; none is ever taken away. At first there is one for each node, with its number.
+    /// The vertices of the material, rendered or not. Cuts never remove one. The first ones are one for each node, with
+    /// its index.
     pub fn vertices(&self) -> &[SolidVertex] {
         self.vertices.values()
     }
@@ -219,24 +227,24 @@ impl CutSolid {
         self.cells_at(node).map(|cell| self.cells[cell].volume / 4.0).sum()
     }
 
-    /// How many pieces the material has fallen into, found by going through all.
+    /// The number of connected components of the material. All tetrahedra are visited.
     pub fn piece_count(&self) -> Result<u32> {
-        piece_count(self.tetrahedra().iter().map(|tetrahedron| tetrahedron.neighbours))
+        piece_count(self.tetrahedra().iter().map(|tetrahedron| tetrahedron.neighbors))
     }
 
-    /// The tetrahedra about a vertex, as far as they hang together by faces at it, each with the vertex's number in it.
-    pub(crate) fn star(&self, vertex: u32, star: &mut Vec<(u32, usize)>) -> Result<()> {
+    /// The tetrahedra around a vertex that are connected through faces at it, each with the corner index of the vertex.
+    pub(crate) fn vertex_star(&self, vertex: u32, star: &mut Vec<(u32, usize)>) -> Result<()> {
         star.clear();
         let start = self.vertices[vertex].around;
         if start == NONE {
             return Ok(());
         }
         memory::push(star, (start, self.corner(start, vertex)))?;
-        let mut at = 0;
-        while let Some(&(tetrahedron, corner)) = star.get(at) {
-            at += 1;
-            for (face, &across) in self.tetrahedra[tetrahedron].neighbours.iter().enumerate() {
-                if face != corner && across != NONE && !star.iter().any(|&(seen, _)| seen == across) {
+        let mut index = 0;
+        while let Some(&(tetrahedron, corner)) = star.get(index) {
+            index += 1;
+            for (face, &across) in self.tetrahedra[tetrahedron].neighbors.iter().enumerate() {
+                if face != corner && across != NONE && !star.iter().any(|&(visited, _)| visited == across) {
                     memory::push(star, (across, self.corner(across, vertex)))?;
                 }
             }
@@ -245,15 +253,15 @@ impl CutSolid {
         Ok(())
     }
 
-    /// The tetrahedra about an edge between two corners of one, as far as they hang together by faces at it.
+    /// The tetrahedra around an edge of one of them that are connected through faces at it.
     pub(crate) fn ring(&self, tetrahedron: u32, edge: [u32; 2], ring: &mut Vec<u32>) -> Result<()> {
         ring.clear();
-        let [a, b] = self.others(tetrahedron, edge);
-        for (mut at, mut left) in [(tetrahedron, a), self.round(tetrahedron, edge, b)] {
-            while at != NONE {
-                memory::push(ring, at)?;
-                (at, left) = self.round(at, edge, left);
-                if at == tetrahedron {
+        let [a, b] = self.opposite_corners(tetrahedron, edge);
+        for (mut index, mut opposite) in [(tetrahedron, a), self.next_around_edge(tetrahedron, edge, b)] {
+            while index != NONE {
+                memory::push(ring, index)?;
+                (index, opposite) = self.next_around_edge(index, edge, opposite);
+                if index == tetrahedron {
                     return Ok(());
                 }
             }
@@ -261,31 +269,32 @@ impl CutSolid {
         Ok(())
     }
 
-    /// Goes on round an edge through the face opposite a corner: the tetrahedron across, and its corner to go on through.
-    pub(crate) fn round(&self, tetrahedron: u32, edge: [u32; 2], left: u32) -> (u32, u32) {
-        let across = self.tetrahedra[tetrahedron].neighbours[self.corner(tetrahedron, left)];
+    /// The next tetrahedron around an edge, through the face opposite corner `opposite`, and the corner opposite the face
+    /// after it.
+    pub(crate) fn next_around_edge(&self, tetrahedron: u32, edge: [u32; 2], opposite: u32) -> (u32, u32) {
+        let across = self.tetrahedra[tetrahedron].neighbors[self.corner(tetrahedron, opposite)];
         if across == NONE {
             return (NONE, NONE);
         }
-        let [a, b] = self.others(tetrahedron, edge);
-        let shared = if a == left { b } else { a };
+        let [a, b] = self.opposite_corners(tetrahedron, edge);
+        let shared = if a == opposite { b } else { a };
         (across, shared)
     }
 
-    /// The corners of a tetrahedron that are not on an edge of it.
-    pub(crate) fn others(&self, tetrahedron: u32, edge: [u32; 2]) -> [u32; 2] {
-        let mut others = [NONE; 2];
+    /// The corners of a tetrahedron that are not on one of its edges.
+    pub(crate) fn opposite_corners(&self, tetrahedron: u32, edge: [u32; 2]) -> [u32; 2] {
+        let mut opposite = [NONE; 2];
         let mut count = 0;
         for corner in self.tetrahedra[tetrahedron].corners {
             if !edge.contains(&corner) && count < 2 {
-                others[count] = corner;
+                opposite[count] = corner;
                 count += 1;
             }
         }
-        others
+        opposite
     }
 
-    /// Which corner of a tetrahedron a vertex is.
+    /// The corner index of a vertex in a tetrahedron.
     pub(crate) fn corner(&self, tetrahedron: u32, vertex: u32) -> usize {
         let corners = self.tetrahedra[tetrahedron].corners;
         (0..3).find(|&k| corners[k] == vertex).unwrap_or(3)
@@ -302,9 +311,9 @@ impl CutSolid {
         0.5 * (b - a).cross(c - a).length()
     }
 
-    /// Which face of the tetrahedron across a face that is.
-    pub(crate) fn back(&self, tetrahedron: u32, face: usize) -> usize {
-        let across = self.tetrahedra[tetrahedron].neighbours[face];
+    /// The index of a face in the tetrahedron across it.
+    pub(crate) fn face_in_neighbor(&self, tetrahedron: u32, face: usize) -> usize {
+        let across = self.tetrahedra[tetrahedron].neighbors[face];
         let corners = self.face(tetrahedron, face);
         let other = self.tetrahedra[across].corners;
         (0..3).find(|&k| !corners.contains(&other[k])).unwrap_or(3)

@@ -1,69 +1,69 @@
-//! The solid as it is before any cut.
+//! Creates a solid before any cut.
 
 use glam::{DVec3, Vec3};
 
-use super::body::{CutSolid, FACES, Face, SolidCell, SolidTetrahedron, SolidTriangle, SolidVertex};
-use super::sever::{Mark, SolidStroke};
+use super::body::{CutSolid, FACES, FaceState, SolidCell, SolidTetrahedron, SolidTriangle, SolidVertex};
+use super::separate::{BladeMark, SolidStroke};
 use crate::base::{Error, Result, ensure, memory};
-use crate::cutting::divided::{NONE, SNAP, nodes_at, places_of, put_at};
+use crate::cutting::cell_complex::{NONE, SNAP, insert_corners, nodes_without_cells, rest_positions_of};
 use crate::cutting::tracked::Tracked;
 
 impl CutSolid {
-    /// Of the rest positions of its nodes, m, of cells with four nodes each, in any order, and of the triangles that are drawn: the outer faces of
-    /// the cells, each once and outward, in any order, or none, if they are to be found. The material of each cell is one tetrahedron, and there is
-    /// a vertex for each node.
+    /// Creates a solid from the rest positions of its nodes, m, and from cells with four nodes each, in any order.
+    /// `render_triangles` contains the outer faces of the cells, each once and outward, in any order. If it is empty,
+    /// they are found. The material of each cell starts as one tetrahedron, with a vertex for each node.
     ///
-    /// Refused unless positions are finite, nodes are known, each cell has a volume, at a face there are two cells at most, on either side of it,
-    /// the cells about a node hang together by faces at it, and triangles are as they are asked for.
-    pub fn new(rest: &[Vec3], cells: &[[u32; 4]], drawn: &[[u32; 3]]) -> Result<Self> {
+    /// Positions must be finite, nodes known, and volumes not zero. A face must have at most two cells, on different
+    /// sides. The cells around a node must be connected through faces at it.
+    pub fn new(rest: &[Vec3], cells: &[[u32; 4]], render_triangles: &[[u32; 3]]) -> Result<Self> {
         ensure!(
             rest.len().max(cells.len()) < (NONE / 4) as usize,
             "more than 2^30 nodes or cells"
         );
-        let mut nodes = nodes_at(rest)?;
+        let mut nodes = nodes_without_cells(rest)?;
         let mut vertices = memory::collected((0..rest.len() as u32).map(|node| SolidVertex {
             nodes: [node; 4],
             weights: [1.0, 0.0, 0.0, 0.0],
             point: node,
             around: NONE,
-            mark: Mark::NONE,
-            other_mark: Mark::NONE,
+            mark: BladeMark::NONE,
+            other_mark: BladeMark::NONE,
         }))?;
-        let mut made = memory::reserved(cells.len())?;
+        let mut solid_cells = memory::reserved(cells.len())?;
         let mut tetrahedra = memory::reserved(cells.len())?;
         for (number, &corners) in cells.iter().enumerate() {
-            let places = places_of(number, corners, rest)?;
-            let volume = volume_of(places);
+            let positions = rest_positions_of(number, corners, rest)?;
+            let volume = volume_of(positions);
             ensure!(volume.abs() > 0.0, "cell {number} of nodes {corners:?} has no volume");
             for node in corners {
                 vertices[node as usize].around = number as u32;
             }
-            made.push(SolidCell {
+            solid_cells.push(SolidCell {
                 nodes: corners,
                 volume: volume.abs(),
-                snap: SNAP * shortest_edge(places),
+                snap: SNAP * shortest_edge(positions),
                 first: number as u32,
-                next: put_at(&mut nodes, number, corners),
+                next: insert_corners(&mut nodes, number, corners),
             });
             let [a, b, c, d] = corners;
             tetrahedra.push(SolidTetrahedron {
                 corners: if volume > 0.0 { corners } else { [a, b, d, c] },
                 cell: number as u32,
                 volume: volume.abs(),
-                neighbours: [NONE; 4],
-                faces: [Face::Whole; 4],
-                drawn: [NONE; 4],
-                turned: 0,
+                neighbors: [NONE; 4],
+                faces: [FaceState::Whole; 4],
+                render_triangles: [NONE; 4],
+                flipped_in: 0,
                 next: NONE,
             });
         }
-        let mut triangles = join_neighbours(&mut tetrahedra)?;
-        if !drawn.is_empty() {
-            put_in_order(&mut triangles, &mut tetrahedra, drawn)?;
+        let mut triangles = join_neighbors(&mut tetrahedra)?;
+        if !render_triangles.is_empty() {
+            reorder_triangles(&mut triangles, &mut tetrahedra, render_triangles)?;
         }
         let solid = Self {
             nodes: Tracked::new(nodes),
-            cells: Tracked::new(made),
+            cells: Tracked::new(solid_cells),
             tetrahedra: Tracked::new(tetrahedra),
             triangles: Tracked::new(triangles),
             vertices: Tracked::new(vertices),
@@ -82,7 +82,7 @@ impl CutSolid {
         }
         let mut star = Vec::new();
         for (vertex, &count) in counts.iter().enumerate() {
-            self.star(vertex as u32, &mut star)?;
+            self.vertex_star(vertex as u32, &mut star)?;
             ensure!(
                 star.len() == count,
                 "node {vertex} has {count} cells, of which {} hang together by faces at it",
@@ -93,27 +93,27 @@ impl CutSolid {
     }
 }
 
-/// Finds the neighbours of each tetrahedron, and draws the faces that have none.
-fn join_neighbours(tetrahedra: &mut [SolidTetrahedron]) -> Result<Vec<SolidTriangle>> {
+/// Finds the neighbors of each tetrahedron. Returns render triangles for the faces without one.
+fn join_neighbors(tetrahedra: &mut [SolidTetrahedron]) -> Result<Vec<SolidTriangle>> {
     let mut sides = memory::reserved(4 * tetrahedra.len())?;
     for (number, tetrahedron) in tetrahedra.iter().enumerate() {
         for (face, corners) in FACES.iter().enumerate() {
             let [a, b, c] = corners.map(|k| tetrahedron.corners[k]);
             let mut sorted = [a, b, c];
             sorted.sort_unstable();
-            // Whether it takes an even number of swaps to sort them.
+            // True if an even number of swaps sorts them.
             let is_even = (a < b) ^ (b < c) ^ (a < c);
             sides.push((sorted, is_even, number as u32, face));
         }
     }
     sides.sort_unstable();
-    let mut drawn = memory::reserved(sides.chunk_by(|a, b| a.0 == b.0).filter(|at| at.len() == 1).count())?;
-    for at_face in sides.chunk_by(|a, b| a.0 == b.0) {
-        match *at_face {
-            [(_, _, number, face)] => drawn.push((number, face)),
+    let mut outer_faces = memory::reserved(sides.chunk_by(|a, b| a.0 == b.0).filter(|at| at.len() == 1).count())?;
+    for face_sides in sides.chunk_by(|a, b| a.0 == b.0) {
+        match *face_sides {
+            [(_, _, number, face)] => outer_faces.push((number, face)),
             [(_, false, a, face_a), (_, true, b, face_b)] => {
-                tetrahedra[a as usize].neighbours[face_a] = b;
-                tetrahedra[b as usize].neighbours[face_b] = a;
+                tetrahedra[a as usize].neighbors[face_a] = b;
+                tetrahedra[b as usize].neighbors[face_b] = a;
             }
             [(nodes, _, a, _), (_, _, b, _)] => {
                 return Err(Error::invalid(format!(
@@ -123,17 +123,17 @@ fn join_neighbours(tetrahedra: &mut [SolidTetrahedron]) -> Result<Vec<SolidTrian
             _ => {
                 return Err(Error::invalid(format!(
                     "{} cells have the face of nodes {:?}",
-                    at_face.len(),
-                    at_face[0].0
+                    face_sides.len(),
+                    face_sides[0].0
                 )));
             }
         }
     }
-    drawn.sort_unstable();
-    let mut triangles = memory::reserved(drawn.len())?;
-    for (tetrahedron, face) in drawn {
+    outer_faces.sort_unstable();
+    let mut triangles = memory::reserved(outer_faces.len())?;
+    for (tetrahedron, face) in outer_faces {
         let it = &mut tetrahedra[tetrahedron as usize];
-        it.drawn[face] = triangles.len() as u32;
+        it.render_triangles[face] = triangles.len() as u32;
         triangles.push(SolidTriangle {
             corners: FACES[face].map(|k| it.corners[k]),
             cell: it.cell,
@@ -144,8 +144,8 @@ fn join_neighbours(tetrahedra: &mut [SolidTetrahedron]) -> Result<Vec<SolidTrian
     Ok(triangles)
 }
 
-/// Gives triangles the order and the first corners of those given.
-fn put_in_order(
+/// Puts triangles into the order of the given ones, with the same first corners.
+fn reorder_triangles(
     triangles: &mut [SolidTriangle],
     tetrahedra: &mut [SolidTetrahedron],
     given: &[[u32; 3]],
@@ -156,21 +156,21 @@ fn put_in_order(
         given.len(),
         triangles.len()
     );
-    let mut places =
+    let mut sorted_given =
         memory::collected((0..given.len() as u32).map(|place| (from_lowest(given[place as usize]), place)))?;
-    places.sort_unstable();
-    let mut known = memory::copied(triangles)?;
-    known.sort_unstable_by_key(|triangle| from_lowest(triangle.corners));
-    for (&(corners, place), triangle) in places.iter().zip(known) {
+    sorted_given.sort_unstable();
+    let mut unordered = memory::copied(triangles)?;
+    unordered.sort_unstable_by_key(|triangle| from_lowest(triangle.corners));
+    for (&(corners, place), triangle) in sorted_given.iter().zip(unordered) {
         ensure!(
             from_lowest(triangle.corners) == corners,
             "triangle {place} of nodes {:?} is no outer face of a cell, turned outward, or is there twice",
             given[place as usize]
         );
         let it = &mut tetrahedra[triangle.tetrahedron as usize];
-        for (drawn, face) in it.drawn.iter_mut().zip(FACES) {
-            if *drawn != NONE && from_lowest(face.map(|k| it.corners[k])) == corners {
-                *drawn = place;
+        for (render_triangle, face) in it.render_triangles.iter_mut().zip(FACES) {
+            if *render_triangle != NONE && from_lowest(face.map(|k| it.corners[k])) == corners {
+                *render_triangle = place;
             }
         }
         triangles[place as usize] = SolidTriangle {
@@ -181,19 +181,19 @@ fn put_in_order(
     Ok(())
 }
 
-/// The corners from the lowest on.
+/// Rotates the corners so that the lowest is first.
 fn from_lowest(mut corners: [u32; 3]) -> [u32; 3] {
     let lowest = (0..3).min_by_key(|&k| corners[k]).unwrap_or(0);
     corners.rotate_left(lowest);
     corners
 }
 
-/// The volume of a tetrahedron, below 0 if it is turned over.
+/// The signed volume of a tetrahedron, below 0 if it is inverted.
 fn volume_of([a, b, c, d]: [DVec3; 4]) -> f64 {
     (b - a).cross(c - a).dot(d - a) / 6.0
 }
 
-fn shortest_edge(places: [DVec3; 4]) -> f64 {
-    let lengths = (0..4).flat_map(|a| (0..a).map(move |b| places[a].distance(places[b])));
+fn shortest_edge(positions: [DVec3; 4]) -> f64 {
+    let lengths = (0..4).flat_map(|a| (0..a).map(move |b| positions[a].distance(positions[b])));
     lengths.fold(f64::INFINITY, f64::min)
 }

@@ -1,61 +1,65 @@
-//! A cut from its beginning to its end.
+//! All stages of a cut.
 
 use glam::Vec3;
 
 use super::body::CutSolid;
-use super::crossing::Swept;
+use super::crossing::SweptTriangle;
 use crate::base::{Result, memory};
+use crate::cutting::cell_copies::Copier;
 use crate::cutting::changes::Changes;
 use crate::cutting::cut::{Limits, Sweep};
-use crate::cutting::pieces::Copier;
 
-/// A cut that is being made.
+/// A cut in progress.
 pub(crate) struct SolidCut<'a> {
     pub(crate) solid: &'a mut CutSolid,
     pub(crate) limits: Limits,
     pub(crate) changes: Changes,
-    /// The vertices that this step has found on the blade.
+    /// The vertices on the blade that this step has found.
     pub(crate) marked: Vec<u32>,
-    /// The vertices of which this step has told the side anew.
-    pub(crate) beside: Vec<u32>,
-    /// Whether it is a tear: sides are not told by a blade.
+    /// The vertices whose side this step has changed.
+    pub(crate) side_changed: Vec<u32>,
+    /// True for a tear, where no blade defines the sides.
     pub(crate) is_tear: bool,
 }
 
 impl CutSolid {
-    /// Cuts what a blade passes through while nodes are at `positions`. Of the cells `candidates` alone, in any order, it finds those that are met:
-    /// all whose box meets the sweep's.
+    /// Cuts the cells that a blade passes through with nodes at `positions`. It examines only the cells in
+    /// `candidates`, in any order. They must include all whose bounding box overlaps that of the sweep.
     ///
-    /// Where the blade crosses an edge of the material there is a vertex from then on: an end of the edge, if it lies within 5 % of the shortest
-    /// edge of the cells about it, in the rest shape, or a new one, which divides the tetrahedra about the edge. A face between three of them is
-    /// cut. It opens once a corner of it parts, so that what is drawn stays manifold; that of a tetrahedron cut in part when its last edge is
-    /// crossed, by the same stroke or a later one in the same plane. Steps of which each starts where the last ended are one stroke.
+    /// Each point where the blade crosses an edge of the material becomes a vertex. An end of the edge is used within 5
+    /// % of the shortest edge of the cells around it in the rest shape. A new vertex divides the tetrahedra around the
+    /// edge. A face between three such vertices is cut. It opens once one of its corners separates, so that the render
+    /// surface stays manifold. The face of a partly cut tetrahedron opens when its last edge is crossed, by the same
+    /// stroke or a later one in the same plane. Consecutive steps, each starting where the last one ended, are one
+    /// stroke.
     ///
-    /// A cell whose material falls apart is copied for each piece; copies share nodes where their material hangs together across a face that the
-    /// node moves (Molino, Bao, Fedkiw 2004). Of the copies of a node that keeps its number which has a vertex of the
-    /// material at it; of several that with the most material.
+    /// A cell whose material falls apart is copied for each piece. Copies share nodes if their material is connected
+    /// across a face that the node moves (Molino, Bao, Fedkiw 2004). The copy with a vertex of the material at the node
+    /// keeps the node's index, or of several the one with the most material.
     ///
-    /// The cost is that of what is met. [`CutSolid::undo`] takes it back until the next cut.
+    /// The cost is proportional to the intersected cells. [`CutSolid::undo`] restores the state before the cut, until
+    /// the next cut.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): there is not one position for each node, one that is needed or the blade is
-    /// not finite, or a candidate is unknown. [`Error::Capacity`](crate::Error::Capacity) beyond the limits.
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory). Then nothing has changed.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): the number of positions is not the number of nodes, a
+    /// needed position or the blade is not finite, or a candidate is unknown.
+    /// [`Error::Capacity`](crate::Error::Capacity) beyond the limits.
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory). An error changes nothing.
     pub fn cut(&mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32], limits: Limits) -> Result<Changes> {
         let items = ("cells", self.cells.count());
         sweep.check(positions, self.node_count(), candidates, items, |cell| {
             self.cells[cell].nodes
         })?;
         self.begin();
-        let changes = SolidCut::new(self, limits, false).make(sweep, positions, candidates);
+        let changes = SolidCut::new(self, limits, false).run(sweep, positions, candidates);
         if changes.is_err() {
             self.undo();
         }
         changes
     }
 
-    /// Takes back the last cut; a second time, nothing.
+    /// Undoes the last cut. A second call does nothing.
     pub fn undo(&mut self) {
         self.nodes.undo();
         self.cells.undo();
@@ -74,10 +78,10 @@ impl CutSolid {
         self.before = (self.strokes, self.stroke);
     }
 
-    /// The cells whose box meets the sweep's if nodes are at `positions`, found by going through all.
+    /// The cells whose bounding box overlaps that of the sweep with nodes at `positions`. All cells are examined.
     pub fn near(&self, sweep: &Sweep, positions: &[Vec3]) -> Result<Vec<u32>> {
-        let place = |node| positions[node as usize];
-        sweep.near(self.cells().iter().map(|cell| cell.nodes.map(place)))
+        let position = |node| positions[node as usize];
+        sweep.near(self.cells().iter().map(|cell| cell.nodes.map(position)))
     }
 }
 
@@ -90,28 +94,28 @@ impl<'a> SolidCut<'a> {
                 ..Changes::default()
             },
             marked: Vec::new(),
-            beside: Vec::new(),
+            side_changed: Vec::new(),
             is_tear,
             solid,
         }
     }
 
-    fn make(mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<Changes> {
+    fn run(mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<Changes> {
         let mut candidates = memory::copied(candidates)?;
         memory::sort_once(&mut candidates);
         let CutSolid { stroke, strokes, .. } = &mut *self.solid;
-        stroke.go_on(sweep, strokes);
+        stroke.advance(sweep, strokes);
         for triangle in sweep.triangles() {
-            let swept = Swept::new(triangle.map(|corner| corner.as_dvec3()));
-            let sign = self.solid.stroke.turn(swept.normal);
-            self.carve(&swept, sign, positions, &candidates)?;
+            let swept = SweptTriangle::new(triangle.map(|corner| corner.as_dvec3()));
+            let sign = self.solid.stroke.orient(swept.normal);
+            self.intersect(&swept, sign, positions, &candidates)?;
         }
-        self.sever()?;
-        let faces = self.ready()?;
+        self.mark_severed()?;
+        let faces = self.openable_faces()?;
         self.finish(&faces)
     }
 
-    /// Opens faces that are ready, and what follows from that.
+    /// Opens faces, copies cells and nodes, and completes the changes.
     pub(crate) fn finish(mut self, faces: &[(u32, usize)]) -> Result<Changes> {
         let cells = self.open(faces)?;
         Copier {
@@ -119,10 +123,10 @@ impl<'a> SolidCut<'a> {
             limits: self.limits,
             changes: &mut self.changes,
         }
-        .part(&cells)?;
-        // The lists that only the end can tell.
-        self.changes.triangles = self.solid.triangles.touched()?;
-        self.number_points()?;
+        .run(&cells)?;
+        // Lists that are known only at the end.
+        self.changes.triangles = self.solid.triangles.changed_indices()?;
+        self.assign_points()?;
         for edge in &mut self.changes.rim {
             edge.points = edge.points.map(|vertex| self.solid.vertices[vertex].point);
         }

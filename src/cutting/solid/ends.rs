@@ -1,20 +1,21 @@
-//! Where the blade's edge stands in the material at the end of a step.
+//! The position of the blade's edge in the material at the end of a step.
 
 use glam::{DMat3, DVec3, Vec3};
 
 use super::body::CutSolid;
+use crate::cutting::cell_complex::SNAP;
 use crate::cutting::cut::Sweep;
-use crate::cutting::divided::SNAP;
 use crate::cutting::material::CutEnd;
 
 impl CutSolid {
-    /// The middle of the way on which the edge at the end of a sweep leads through a cell, if it does.
+    /// The midpoint of the part of a sweep's final edge that lies in a cell. `None` if the edge does not pass through
+    /// it.
     pub(crate) fn end_in(&self, cell: u32, sweep: &Sweep, positions: &[Vec3]) -> Option<CutEnd> {
         let [from, to] = sweep.end.map(|end| end.as_dvec3());
         let nodes = self.cells[cell].nodes;
         let [a, b, c, d] = nodes.map(|node| positions[node as usize].as_dvec3());
         let inverse = DMat3::from_cols(b - a, c - a, d - a).inverse();
-        // How the weights of its corners go along the edge.
+        // The weights of the corners at both ends of the edge.
         let weights = [from, to].map(|end| {
             let DVec3 { x, y, z } = inverse * (end - a);
             [1.0 - x - y - z, x, y, z]
@@ -35,14 +36,14 @@ impl CutSolid {
             vertex: None,
             nodes,
             weights: std::array::from_fn(|k| weights[0][k] + middle * (weights[1][k] - weights[0][k])),
-            // What was snapped may lie on either side; a step that begins too early finds what is open already.
+            // Snapped vertices can lie on either side. A step that begins too early finds faces that are already open.
             slack: 3.0 * self.cells[cell].snap,
             size: self.cells[cell].snap / SNAP,
         })
     }
 
-    /// The material has moved since the last step of the blade, whose edge is here in it now.
-    pub(crate) fn carry(&mut self, edge: [Vec3; 2]) {
-        self.stroke.carry(edge);
+    /// Sets the edge's current position in the material, which has moved since the last step.
+    pub(crate) fn set_edge(&mut self, edge: [Vec3; 2]) {
+        self.stroke.set_edge(edge);
     }
 }

@@ -1,59 +1,62 @@
-//! Which severed faces can open: those with which what is drawn stays manifold.
+//! Selects the severed faces that can open while the render surface stays manifold.
 //!
-//! A severed face of which no corner parts cannot gape. It stays closed, like one that hangs on to the others by a corner alone, until the blade has
-//! gone on.
+//! A severed face cannot open if none of its corners separates. It then stays closed until the blade advances, and so
+//! does a face that is connected to the others only through a corner.
 
-use super::body::{CutSolid, Face};
+use super::body::{CutSolid, FaceState};
 use super::cut::SolidCut;
 use crate::base::DisjointSets;
 use crate::base::{Result, memory};
-use crate::cutting::divided::NONE;
+use crate::cutting::cell_complex::NONE;
 
-/// A tetrahedron and which of its faces.
+/// A tetrahedron and the index of one of its faces.
 type FaceOf = (u32, usize);
 
-/// A face at a vertex that will have nothing across.
+/// A face at a vertex that will have no neighbor.
 #[derive(Clone, Copy)]
-struct Bare {
+struct BareFace {
     tetrahedron: u32,
     face: usize,
     /// The other corners, counterclockwise seen from outside.
     from: u32,
     to: u32,
-    /// Which of the parts about the vertex it belongs to.
-    part: usize,
-    /// Which of the rounds of such faces.
-    round: usize,
+    /// The component around the vertex that has the face.
+    component: usize,
+    /// The loop of such faces around the vertex that contains it.
+    loop_index: usize,
 }
 
-/// What hangs together about a vertex once faces are open.
-struct VertexParts {
+/// The connected components around a vertex after faces open.
+struct VertexComponents {
     star: Vec<(u32, usize)>,
     union: DisjointSets,
 }
 
-impl VertexParts {
-    /// The part that a tetrahedron is in.
-    fn of(&mut self, tetrahedron: u32) -> Option<usize> {
-        let at = self.star.binary_search_by_key(&tetrahedron, |&(of, _)| of).ok()?;
-        Some(self.union.lowest(at))
+impl VertexComponents {
+    /// The component that contains a tetrahedron.
+    fn component_of(&mut self, tetrahedron: u32) -> Option<usize> {
+        let index = self
+            .star
+            .binary_search_by_key(&tetrahedron, |&(member, _)| member)
+            .ok()?;
+        Some(self.union.lowest(index))
     }
 }
 
 impl SolidCut<'_> {
-    /// The severed faces that hang together with vertices found on the blade in this step and can open, each by the lower of its tetrahedra, marked
-    /// as such.
-    pub(crate) fn ready(&mut self) -> Result<Vec<(u32, usize)>> {
-        let (mut faces, mut vertices) = self.severed()?;
-        self.keep_crumbs(&mut faces)?;
+    /// The severed faces that are connected with vertices found on the blade in this step and that can open. Each is
+    /// given by its lower tetrahedron, and marked as opening.
+    pub(crate) fn openable_faces(&mut self) -> Result<Vec<(u32, usize)>> {
+        let (mut faces, mut vertices) = self.collect_severed()?;
+        self.keep_slivers(&mut faces)?;
         loop {
-            self.close_some(&mut faces, vertices)?;
+            self.close_nonmanifold(&mut faces, vertices)?;
             let count = faces.len();
-            self.keep_crumbs(&mut faces)?;
+            self.keep_slivers(&mut faces)?;
             if faces.len() == count {
                 return Ok(faces);
             }
-            // What was drawn about a crumb may have kept the rest manifold.
+            // Faces around a sliver can have kept the rest manifold.
             vertices = memory::reserved(3 * faces.len())?;
             for &(tetrahedron, face) in &faces {
                 vertices.extend(self.solid.face(tetrahedron, face));
@@ -62,102 +65,103 @@ impl SolidCut<'_> {
         }
     }
 
-    /// Closes faces until what is drawn about all vertices is manifold; looks at those given, and goes on from there.
-    fn close_some(&mut self, faces: &mut Vec<(u32, usize)>, mut vertices: Vec<u32>) -> Result<()> {
-        let mut at = 0;
+    /// Closes faces until the render surface is manifold at all vertices. The search starts at the given vertices.
+    fn close_nonmanifold(&mut self, faces: &mut Vec<(u32, usize)>, mut vertices: Vec<u32>) -> Result<()> {
+        let mut index = 0;
         let mut closed = Vec::new();
-        while let Some(&vertex) = vertices.get(at) {
-            at += 1;
-            self.closed_at(vertex, &mut closed)?;
-            if !self.is_tear && self.turn_tip(vertex, &closed, faces, &mut vertices)? {
+        while let Some(&vertex) = vertices.get(index) {
+            index += 1;
+            self.faces_to_close(vertex, &mut closed)?;
+            if !self.is_tear && self.flip_tip(vertex, &closed, faces, &mut vertices)? {
                 closed.clear();
                 memory::push(&mut vertices, vertex)?;
                 continue;
             }
             for (tetrahedron, face) in closed.drain(..) {
-                if self.solid.tetrahedra[tetrahedron].faces[face] == Face::Opening {
-                    self.set_face(tetrahedron, face, Face::Severed)?;
+                if self.solid.tetrahedra[tetrahedron].faces[face] == FaceState::Opening {
+                    self.set_face(tetrahedron, face, FaceState::Severed)?;
                     memory::extend(&mut vertices, self.solid.face(tetrahedron, face))?;
                 }
             }
         }
         memory::sort_once(faces);
-        faces.retain(|&(tetrahedron, face)| self.solid.tetrahedra[tetrahedron].faces[face] == Face::Opening);
+        faces.retain(|&(tetrahedron, face)| self.solid.tetrahedra[tetrahedron].faces[face] == FaceState::Opening);
         Ok(())
     }
 
-    /// A tip of what lies on one side of the blade that only touches a vertex where the other side is drawn too, and that has all corners on the
-    /// blade, counts as on the other side. Answers whether there was one.
-    fn turn_tip(
+    /// Moves a tip to the other side of the blade. A tip has all corners on the blade and only touches a vertex at
+    /// which the other side is rendered too. Returns true if there was one.
+    fn flip_tip(
         &mut self,
         vertex: u32,
         closed: &[(u32, usize)],
         faces: &mut Vec<(u32, usize)>,
         vertices: &mut Vec<u32>,
     ) -> Result<bool> {
-        let Some(&(beside, face)) = closed.first() else {
+        let Some(&(adjacent, face)) = closed.first() else {
             return Ok(false);
         };
         let stroke = self.solid.stroke.number;
-        let mut parts = self.solid.parts(vertex)?;
-        let Some(part) = parts.of(self.solid.tetrahedra[beside].neighbours[face]) else {
+        let mut components = self.solid.components(vertex)?;
+        let Some(component) = components.component_of(self.solid.tetrahedra[adjacent].neighbors[face]) else {
             return Ok(false);
         };
-        let of_part = parts.star.iter().enumerate();
+        let members = components.star.iter().enumerate();
         let mut tip = memory::gathered(
-            of_part
-                .filter(|&(at, _)| parts.union.lowest(at) == part)
-                .map(|(_, of)| of.0),
+            members
+                .filter(|&(index, _)| components.union.lowest(index) == component)
+                .map(|(_, member)| member.0),
         )?;
-        let may_turn = |&of: &u32| self.tip(of).is_none() && self.solid.tetrahedra[of].turned != stroke;
-        if parts.of(beside) == Some(part) || !tip.iter().all(may_turn) {
+        let can_flip = |&member: &u32| self.tip(member).is_none() && self.solid.tetrahedra[member].flipped_in != stroke;
+        if components.component_of(adjacent) == Some(component) || !tip.iter().all(can_flip) {
             tip.clear();
-            let sides = [self.solid.tetrahedra[beside].neighbours[face], beside];
-            tip.extend(sides.iter().find(|of| may_turn(of)));
+            let sides = [self.solid.tetrahedra[adjacent].neighbors[face], adjacent];
+            tip.extend(sides.iter().find(|side| can_flip(side)));
             if tip.is_empty() {
                 return Ok(false);
             }
         }
         for &tetrahedron in &tip {
-            self.solid.tetrahedra.edit(tetrahedron, |it| it.turned = stroke)?;
+            self.solid.tetrahedra.edit(tetrahedron, |it| it.flipped_in = stroke)?;
         }
         for &tetrahedron in &tip {
             for face in 0..4 {
                 let it = self.solid.tetrahedra[tetrahedron];
-                let across = it.neighbours[face];
+                let across = it.neighbors[face];
                 if across == NONE {
                     continue;
                 }
-                let to = if self.is_on_the_way(tetrahedron, face) {
-                    Face::Opening
+                let to = if self.lies_on_path(tetrahedron, face) {
+                    FaceState::Opening
                 } else {
-                    Face::Whole
+                    FaceState::Whole
                 };
                 if it.faces[face] == to {
                     continue;
                 }
                 self.set_face(tetrahedron, face, to)?;
-                let back = self.solid.back(tetrahedron, face);
-                memory::push(faces, (tetrahedron, face).min((across, back)))?;
+                let opposite_face = self.solid.face_in_neighbor(tetrahedron, face);
+                memory::push(faces, (tetrahedron, face).min((across, opposite_face)))?;
                 memory::extend(vertices, self.solid.face(tetrahedron, face))?;
             }
         }
         Ok(true)
     }
 
-    /// All severed faces that hang together with vertices found on the blade, marked as opening, and their corners, both in order.
-    fn severed(&mut self) -> Result<(Vec<FaceOf>, Vec<u32>)> {
+    /// All severed faces connected with vertices found on the blade, marked as opening, and their corners, both in
+    /// order.
+    fn collect_severed(&mut self) -> Result<(Vec<FaceOf>, Vec<u32>)> {
         let (mut faces, mut corners) = (Vec::new(), Vec::new());
         let mut vertices = std::mem::take(&mut self.marked);
         let mut star = Vec::new();
         while !vertices.is_empty() {
             for vertex in std::mem::take(&mut vertices) {
-                self.solid.star(vertex, &mut star)?;
+                self.solid.vertex_star(vertex, &mut star)?;
                 for &(tetrahedron, corner) in &star {
                     for face in (0..4).filter(|&face| face != corner) {
                         let it = self.solid.tetrahedra[tetrahedron];
-                        if it.faces[face] == Face::Severed && it.neighbours[face] > tetrahedron {
-                            self.set_face(tetrahedron, face, Face::Opening)?;
+                        if it.faces[face] == FaceState::Severed && it.neighbors[face] > tetrahedron {
+                            self.set_face(tetrahedron, face, FaceState::Opening)?;
                             memory::push(&mut faces, (tetrahedron, face))?;
                             memory::extend(&mut vertices, self.solid.face(tetrahedron, face))?;
                             memory::extend(&mut corners, self.solid.face(tetrahedron, face))?;
@@ -172,29 +176,30 @@ impl SolidCut<'_> {
         Ok((faces, corners))
     }
 
-    /// Opening faces at a vertex that have to stay closed: of rounds of bare faces about one part all but the main one; those of which no corner
-    /// parts; and one face at an edge that would be twice in what is drawn.
-    fn closed_at(&self, vertex: u32, closed: &mut Vec<(u32, usize)>) -> Result<()> {
-        let mut parts = self.solid.parts(vertex)?;
-        let bare = self.bare(vertex, &mut parts)?;
-        let is_skin = |bare: &Bare| self.solid.tetrahedra[bare.tetrahedron].neighbours[bare.face] == NONE;
-        // For each part the round that stays: that of skin, or else the longest.
+    /// The opening faces at a vertex that must stay closed. These are faces in all loops around a component but the
+    /// main one, and faces without a separating corner. If there are none, it is one face at an edge that would occur
+    /// twice in the render surface.
+    fn faces_to_close(&self, vertex: u32, closed: &mut Vec<(u32, usize)>) -> Result<()> {
+        let mut components = self.solid.components(vertex)?;
+        let bare = self.bare_faces(vertex, &mut components)?;
+        let is_skin = |bare: &BareFace| self.solid.tetrahedra[bare.tetrahedron].neighbors[bare.face] == NONE;
+        // For each component the loop that stays: that with skin, or otherwise the longest.
         let mut main: Vec<(usize, usize, bool, usize)> = Vec::new();
-        for of_round in bare.chunk_by(|a, b| a.round == b.round) {
+        for loop_faces in bare.chunk_by(|a, b| a.loop_index == b.loop_index) {
             let this = (
-                of_round[0].part,
-                of_round[0].round,
-                of_round.iter().any(is_skin),
-                of_round.len(),
+                loop_faces[0].component,
+                loop_faces[0].loop_index,
+                loop_faces.iter().any(is_skin),
+                loop_faces.len(),
             );
-            match main.iter_mut().find(|known| known.0 == this.0) {
+            match main.iter_mut().find(|best| best.0 == this.0) {
                 None => memory::push(&mut main, this)?,
-                Some(known) if (this.2, this.3) > (known.2, known.3) => *known = this,
+                Some(best) if (this.2, this.3) > (best.2, best.3) => *best = this,
                 Some(_) => {}
             }
         }
         for it in &bare {
-            let is_main = main.iter().any(|main| main.1 == it.round);
+            let is_main = main.iter().any(|main| main.1 == it.loop_index);
             if !is_main && !is_skin(it) {
                 memory::push(closed, (it.tetrahedron, it.face))?;
             }
@@ -203,25 +208,25 @@ impl SolidCut<'_> {
             if is_skin(it) {
                 continue;
             }
-            let across = self.solid.tetrahedra[it.tetrahedron].neighbours[it.face];
-            let is_parted = parts.of(across) != Some(it.part)
-                || self.is_parted(it.from, it.tetrahedron, it.face)?
-                || self.is_parted(it.to, it.tetrahedron, it.face)?;
-            if !is_parted {
+            let across = self.solid.tetrahedra[it.tetrahedron].neighbors[it.face];
+            let separates = components.component_of(across) != Some(it.component)
+                || self.separates(it.from, it.tetrahedron, it.face)?
+                || self.separates(it.to, it.tetrahedron, it.face)?;
+            if !separates {
                 memory::push(closed, (it.tetrahedron, it.face))?;
             }
         }
         if !closed.is_empty() {
             return Ok(());
         }
-        for (at, one) in bare.iter().enumerate() {
-            for other in &bare[at + 1..] {
-                if (one.from, one.part) != (other.from, other.part) {
+        for (index, one) in bare.iter().enumerate() {
+            for other in &bare[index + 1..] {
+                if (one.from, one.component) != (other.from, other.component) {
                     continue;
                 }
-                let mut far = self.solid.parts(one.from)?;
-                if far.of(one.tetrahedron) == far.of(other.tetrahedron)
-                    && let Some(face) = self.loosest(one.tetrahedron, [vertex, one.from])?
+                let mut far = self.solid.components(one.from)?;
+                if far.component_of(one.tetrahedron) == far.component_of(other.tetrahedron)
+                    && let Some(face) = self.loosest_face(one.tetrahedron, [vertex, one.from])?
                 {
                     return memory::push(closed, face);
                 }
@@ -230,80 +235,82 @@ impl SolidCut<'_> {
         Ok(())
     }
 
-    /// Whether at another corner what lies on the two sides of an opening face parts.
-    fn is_parted(&self, vertex: u32, tetrahedron: u32, face: usize) -> Result<bool> {
-        let mut parts = self.solid.parts(vertex)?;
-        let across = self.solid.tetrahedra[tetrahedron].neighbours[face];
-        Ok(parts.of(tetrahedron) != parts.of(across))
+    /// True if the two sides of an opening face separate at another of its corners.
+    fn separates(&self, vertex: u32, tetrahedron: u32, face: usize) -> Result<bool> {
+        let mut components = self.solid.components(vertex)?;
+        let across = self.solid.tetrahedra[tetrahedron].neighbors[face];
+        Ok(components.component_of(tetrahedron) != components.component_of(across))
     }
 
-    /// The bare faces at a vertex, those of a round one after the other.
-    fn bare(&self, vertex: u32, parts: &mut VertexParts) -> Result<Vec<Bare>> {
+    /// The bare faces at a vertex, in groups of one loop each.
+    fn bare_faces(&self, vertex: u32, components: &mut VertexComponents) -> Result<Vec<BareFace>> {
         let mut bare = Vec::new();
-        for at in 0..parts.star.len() {
-            let (tetrahedron, corner) = parts.star[at];
+        for index in 0..components.star.len() {
+            let (tetrahedron, corner) = components.star[index];
             for face in (0..4).filter(|&face| face != corner) {
                 if self.solid.is_bare(tetrahedron, face) {
                     let corners = self.solid.face(tetrahedron, face);
-                    let first = corners.iter().position(|&of| of == vertex).unwrap_or(0);
-                    let part = parts.union.lowest(at);
+                    let first = corners.iter().position(|&corner| corner == vertex).unwrap_or(0);
+                    let component = components.union.lowest(index);
                     memory::push(
                         &mut bare,
-                        Bare {
+                        BareFace {
                             tetrahedron,
                             face,
                             from: corners[(first + 1) % 3],
                             to: corners[(first + 2) % 3],
-                            part,
-                            round: usize::MAX,
+                            component,
+                            loop_index: usize::MAX,
                         },
                     )?;
                 }
             }
         }
         for start in 0..bare.len() {
-            let mut at = start;
-            while bare[at].round == usize::MAX {
-                bare[at].round = start;
-                let it = &bare[at];
-                let next = self.solid.beside(it.tetrahedron, it.face, [vertex, it.to]);
-                at = bare
+            let mut index = start;
+            while bare[index].loop_index == usize::MAX {
+                bare[index].loop_index = start;
+                let it = &bare[index];
+                let next = self.solid.next_bare_face(it.tetrahedron, it.face, [vertex, it.to]);
+                index = bare
                     .iter()
-                    .position(|of| (of.tetrahedron, of.face) == next)
-                    .unwrap_or(at);
+                    .position(|other| (other.tetrahedron, other.face) == next)
+                    .unwrap_or(index);
             }
         }
-        bare.sort_by_key(|of| of.round);
+        bare.sort_by_key(|bare_face| bare_face.loop_index);
         Ok(bare)
     }
 
-    /// Of the opening faces at an edge that with the most edges that no other bare face has.
-    fn loosest(&self, tetrahedron: u32, edge: [u32; 2]) -> Result<Option<(u32, usize)>> {
+    /// The opening face at an edge that has the most edges without another bare face.
+    fn loosest_face(&self, tetrahedron: u32, edge: [u32; 2]) -> Result<Option<(u32, usize)>> {
         let (mut ring, mut about) = (Vec::new(), Vec::new());
         self.solid.ring(tetrahedron, edge, &mut ring)?;
         ring.sort_unstable();
         let mut loosest = None;
-        for &at in &ring {
+        for &member in &ring {
             for face in 0..4 {
-                let it = self.solid.tetrahedra[at];
-                let corners = self.solid.face(at, face);
+                let it = self.solid.tetrahedra[member];
+                let corners = self.solid.face(member, face);
                 let is_at_edge = edge.iter().all(|end| corners.contains(end));
-                if !is_at_edge || it.faces[face] != Face::Opening || it.neighbours[face] < at {
+                if !is_at_edge || it.faces[face] != FaceState::Opening || it.neighbors[face] < member {
                     continue;
                 }
                 let mut free = 0;
                 for k in 0..3 {
                     let side = [corners[k], corners[(k + 1) % 3]];
-                    self.solid.ring(at, side, &mut about)?;
-                    let others = about.iter().flat_map(|&of| (0..4).map(move |face| (of, face)));
-                    let bare = others.filter(|&(of, face)| {
-                        let corners = self.solid.face(of, face);
-                        side.iter().all(|end| corners.contains(end)) && self.solid.is_bare(of, face)
+                    self.solid.ring(member, side, &mut about)?;
+                    let others = about
+                        .iter()
+                        .flat_map(|&neighbor| (0..4).map(move |face| (neighbor, face)));
+                    let bare = others.filter(|&(neighbor, face)| {
+                        let corners = self.solid.face(neighbor, face);
+                        side.iter().all(|end| corners.contains(end)) && self.solid.is_bare(neighbor, face)
                     });
                     free += usize::from(bare.count() == 2);
                 }
                 if loosest.is_none_or(|(most, _)| free > most) {
-                    loosest = Some((free, (at, face)));
+                    loosest = Some((free, (member, face)));
                 }
             }
         }
@@ -312,42 +319,42 @@ impl SolidCut<'_> {
 }
 
 impl CutSolid {
-    /// Whether a face has nothing across, or is opening.
+    /// True if a face has no neighbor, or is opening.
     pub(crate) fn is_bare(&self, tetrahedron: u32, face: usize) -> bool {
         let it = &self.tetrahedra[tetrahedron];
-        it.neighbours[face] == NONE || it.faces[face] == Face::Opening
+        it.neighbors[face] == NONE || it.faces[face] == FaceState::Opening
     }
 
-    fn parts(&self, vertex: u32) -> Result<VertexParts> {
-        let mut parts = VertexParts {
+    fn components(&self, vertex: u32) -> Result<VertexComponents> {
+        let mut components = VertexComponents {
             star: Vec::new(),
             union: DisjointSets::default(),
         };
-        self.star(vertex, &mut parts.star)?;
-        parts.union.reset(parts.star.len())?;
-        for (at, &(tetrahedron, corner)) in parts.star.iter().enumerate() {
+        self.vertex_star(vertex, &mut components.star)?;
+        components.union.reset(components.star.len())?;
+        for (index, &(tetrahedron, corner)) in components.star.iter().enumerate() {
             for face in (0..4).filter(|&face| face != corner && !self.is_bare(tetrahedron, face)) {
-                let across = self.tetrahedra[tetrahedron].neighbours[face];
-                if let Ok(other) = parts.star.binary_search_by_key(&across, |&(of, _)| of) {
-                    parts.union.unite(at, other);
+                let across = self.tetrahedra[tetrahedron].neighbors[face];
+                if let Ok(other) = components.star.binary_search_by_key(&across, |&(member, _)| member) {
+                    components.union.unite(index, other);
                 }
             }
         }
-        Ok(parts)
+        Ok(components)
     }
 
-    /// The bare face that comes next round an edge of a bare face, on the material's side.
-    pub(crate) fn beside(&self, mut tetrahedron: u32, mut face: usize, edge: [u32; 2]) -> (u32, usize) {
+    /// The next bare face around an edge of a bare face, on the side of the material.
+    pub(crate) fn next_bare_face(&self, mut tetrahedron: u32, mut face: usize, edge: [u32; 2]) -> (u32, usize) {
         loop {
             let third = self.tetrahedra[tetrahedron].corners[face];
-            let left = self.others(tetrahedron, edge);
+            let left = self.opposite_corners(tetrahedron, edge);
             let other = if left[0] == third { left[1] } else { left[0] };
             let next = self.corner(tetrahedron, other);
             if self.is_bare(tetrahedron, next) {
                 return (tetrahedron, next);
             }
-            let across = self.tetrahedra[tetrahedron].neighbours[next];
-            face = self.back(tetrahedron, next);
+            let across = self.tetrahedra[tetrahedron].neighbors[next];
+            face = self.face_in_neighbor(tetrahedron, next);
             tetrahedron = across;
         }
     }

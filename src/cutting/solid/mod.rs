@@ -1,32 +1,37 @@
 //! Cuts through tetrahedral solids with virtual nodes (Molino, Bao, Fedkiw 2004; Wang, Jiang, Schroeder, Teran 2014).
 //!
-//! Material lies in *cells*, the tetrahedra that are simulated. It is divided into tetrahedra of its own, one for each cell at first, whose
-//! *vertices* are given by weights of a cell's nodes. A cut splits edges of the material where the blade crosses them, which leaves the material
-//! conforming and loses none, and parts it along faces whose corners all lie on the blade's way. A cell whose material falls into pieces is copied
-//! for each, so that what is simulated stays as well shaped as it was. What is drawn and touched are the faces of the material with nothing across.
+//! The *cells* are the simulated tetrahedra. Their material is divided into separate tetrahedra, one for each cell at
+//! first, whose *vertices* are weighted means of the nodes of one cell. A cut splits edges of the material where the
+//! blade crosses them, which keeps the material conforming and conserves its volume. It separates the material along
+//! faces whose corners all lie on the blade's path. A cell whose material falls into pieces is copied for each piece,
+//! so that the simulated elements keep their shape. The render surface consists of the faces of the material without a
+//! neighbor.
 //!
-//! What holds between cuts: a cell's tetrahedra fill its material; across a face lies one tetrahedron, or nothing, and then the face is drawn; the
-//! tetrahedra about a vertex hang together by faces at it; what is drawn is a closed manifold; the nodes of a vertex are nodes of all cells about
-//! it; cells whose tetrahedra are neighbours share the nodes that move the face between them.
+//! Invariants between cuts:
+//! - The tetrahedra of a cell fill its material. A face has one neighbor, or is in the render surface.
+//! - The tetrahedra around a vertex are connected through faces at it. The render surface is a closed manifold.
+//! - The nodes of a vertex are nodes of all cells around it. Cells with neighboring tetrahedra share the nodes that
+//!   move the face between them.
 //!
-//! A cut goes through these stages: `carve` finds and splits (with `crossing`, `split`) and marks vertices as being on the blade, `sever` finds the
-//! faces on its way, `crumbs` and `manifold` those of them that can open yet, `open` opens them; cells and nodes are parted as those of surfaces are.
+//! The stages of a cut: `intersect` finds and splits (with `crossing`, `split`) and marks vertices as on the blade.
+//! `separate` finds the faces on its path. `slivers` and `manifold` select those that can open, and `open` opens them.
+//! Cells and nodes are copied as in surfaces.
 
+mod blade_query;
 mod body;
 mod build;
-mod carve;
 mod crossing;
-mod crumbs;
 mod cut;
 mod ends;
+mod intersect;
 mod manifold;
-mod met;
 mod open;
+mod opening;
 mod points;
-mod reach;
-mod sever;
+mod separate;
+mod slivers;
 mod split;
 mod tear;
 
 pub use body::{CutSolid, SolidCell, SolidTetrahedron, SolidTriangle, SolidVertex};
-pub(crate) use sever::SolidStroke;
+pub(crate) use separate::SolidStroke;

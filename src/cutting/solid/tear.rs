@@ -1,29 +1,32 @@
-//! Tears through a solid, along faces of its material: what lies about a vertex is parted across what stretches it most.
+//! Tears through a solid, along faces of its material. The tetrahedra around a vertex are separated across the largest
+//! principal strain.
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::body::{CutSolid, Face};
+use super::body::{CutSolid, FaceState};
 use super::cut::SolidCut;
-use super::sever::SolidStroke;
+use super::separate::SolidStroke;
 use crate::base::{Result, memory};
+use crate::cutting::cell_complex::{CellComplex, NONE};
 use crate::cutting::changes::Changes;
 use crate::cutting::cut::{Limits, Sweep};
-use crate::cutting::divided::{Divided, NONE};
 use crate::cutting::tear::VertexLoad;
 use crate::strain::eigenvalues;
 
-/// A tetrahedron of which the middle lies no higher above a plane than this part of how far it reaches off it is not above: rounding does not tell.
-const BESIDE: f64 = 1e-9;
+/// A tetrahedron is above a plane if the height of its middle is more than this fraction of its extent across the
+/// plane. Smaller heights are rounding errors.
+const ROUNDING: f64 = 1e-9;
 
 impl CutSolid {
-    /// What the cells at a node are stretched by, in the mean over their material: the largest principal value of (F Fᵀ - 1) / 2 with the gradient F of
-    /// the deformation (Finger 1894), without unit, and the direction of it as the normal of a tear; `None`: nothing stretches it.
+    /// The largest principal strain at a node, from the mean over its cells weighted by volume. The strain is
+    /// `(F Fᵀ - 1) / 2` with the deformation gradient F (Finger 1894). Its direction is the normal of a tear. `None` if
+    /// no strain is positive.
     pub(crate) fn load_at(&self, node: u32, positions: &[Vec3]) -> Option<VertexLoad> {
         let (mut sum, mut volume) = (DMat3::ZERO, 0.0);
         for cell in self.cells_at(node) {
             let cell = &self.cells[cell];
-            let edges = |places: [DVec3; 4]| {
-                let [a, b, c, d] = places;
+            let edges = |corners: [DVec3; 4]| {
+                let [a, b, c, d] = corners;
                 DMat3::from_cols(b - a, c - a, d - a)
             };
             let rest = edges(cell.nodes.map(|node| self.nodes[node].rest.as_dvec3()));
@@ -39,10 +42,10 @@ impl CutSolid {
         if !(tension > 0.0 && tension.is_finite()) {
             return None;
         }
-        // What is left of the others has the direction of the largest (Cayley, Hamilton).
-        let without = |value: f64| mean - DMat3::from_diagonal(DVec3::splat(value));
-        let left = without(smallest) * without(middle);
-        let columns = [left.x_axis, left.y_axis, left.z_axis];
+        // Removing the other eigenvalues leaves the direction of the largest (Cayley, Hamilton).
+        let shifted = |value: f64| mean - DMat3::from_diagonal(DVec3::splat(value));
+        let product = shifted(smallest) * shifted(middle);
+        let columns = [product.x_axis, product.y_axis, product.z_axis];
         let longest = columns
             .into_iter()
             .reduce(|a, b| if b.length() > a.length() { b } else { a })?;
@@ -51,8 +54,9 @@ impl CutSolid {
         Some(VertexLoad { tension, along, normal })
     }
 
-    /// Parts the tetrahedra about a vertex whose middles lie on the two sides of the plane across a load while nodes are at `positions`, as far as what is
-    /// drawn stays manifold; `None`: nothing opened, and nothing has changed. [`CutSolid::undo`] takes it back until the next cut.
+    /// Separates the tetrahedra around a vertex along the plane across a load, with nodes at `positions`. Each belongs
+    /// to the side of its middle. Faces open as far as the render surface stays manifold. `None` if nothing opened, and
+    /// nothing has changed. [`CutSolid::undo`] restores the state before the tear, until the next cut.
     ///
     /// # Errors
     /// As [`CutSolid::cut`].
@@ -66,11 +70,11 @@ impl CutSolid {
         let faces = self.faces_across(vertex, load.normal, positions)?;
         self.begin();
         let strokes = self.strokes + 1;
-        // The stroke of a blade goes on after it.
-        let of_blade = std::mem::replace(&mut self.stroke, SolidStroke::of_tear(strokes));
+        // The stroke of a blade continues after the tear.
+        let blade_stroke = std::mem::replace(&mut self.stroke, SolidStroke::for_tear(strokes));
         self.strokes = strokes;
         let changes = SolidCut::new(self, limits, true).tear(&faces);
-        self.stroke = of_blade;
+        self.stroke = blade_stroke;
         match changes {
             Ok(changes) if !changes.faces.is_empty() => Ok(Some(changes)),
             other => {
@@ -80,10 +84,10 @@ impl CutSolid {
         }
     }
 
-    /// The faces at a vertex between tetrahedra on the two sides of a plane through it, each by one of its sides.
+    /// The faces at a vertex between tetrahedra on different sides of a plane through it, each by one of its sides.
     fn faces_across(&self, vertex: u32, normal: DVec3, positions: &[Vec3]) -> Result<Vec<(u32, usize)>> {
         let mut star = Vec::new();
-        self.star(vertex, &mut star)?;
+        self.vertex_star(vertex, &mut star)?;
         let from = self.place(vertex, positions).as_dvec3();
         let height = |tetrahedron: u32| {
             let corners = self.tetrahedra[tetrahedron].corners;
@@ -94,8 +98,8 @@ impl CutSolid {
         let mut faces = Vec::new();
         for &(tetrahedron, corner) in &star {
             for face in (0..4).filter(|&face| face != corner) {
-                let across = self.tetrahedra[tetrahedron].neighbours[face];
-                if across != NONE && height(tetrahedron) > BESIDE && !(height(across) > BESIDE) {
+                let across = self.tetrahedra[tetrahedron].neighbors[face];
+                if across != NONE && height(tetrahedron) > ROUNDING && !(height(across) > ROUNDING) {
                     memory::push(&mut faces, (tetrahedron, face))?;
                 }
             }
@@ -103,16 +107,19 @@ impl CutSolid {
         Ok(faces)
     }
 
-    /// A square about a vertex across a load that reaches as far as what would part there, with nodes at `positions`.
-    pub(crate) fn way_of(&self, vertex: u32, load: &VertexLoad, positions: &[Vec3]) -> Result<Sweep> {
-        let place = |vertex: u32| self.place(vertex, positions).as_dvec3();
-        let from = place(vertex);
+    /// A square around a vertex across a load. It extends as far as the faces that would separate there, with nodes at
+    /// `positions`.
+    pub(crate) fn tear_sweep(&self, vertex: u32, load: &VertexLoad, positions: &[Vec3]) -> Result<Sweep> {
+        let position = |vertex: u32| self.place(vertex, positions).as_dvec3();
+        let from = position(vertex);
         let faces = self.faces_across(vertex, load.normal, positions)?;
         let corners = faces
             .into_iter()
             .flat_map(|(tetrahedron, face)| self.face(tetrahedron, face));
-        let reach = corners.map(|corner| place(corner).distance(from)).fold(0.0, f64::max);
-        let [a, b] = [load.along, load.normal.cross(load.along)].map(|way| way * reach);
+        let reach = corners
+            .map(|corner| position(corner).distance(from))
+            .fold(0.0, f64::max);
+        let [a, b] = [load.along, load.normal.cross(load.along)].map(|axis| axis * reach);
         let at = |along: f64, across: f64| (from + along * a + across * b).as_vec3();
         Ok(Sweep {
             start: [at(-1.0, -1.0), at(-1.0, 1.0)],
@@ -125,18 +132,18 @@ impl SolidCut<'_> {
     fn tear(mut self, faces: &[(u32, usize)]) -> Result<Changes> {
         let mut torn = Vec::new();
         for &(tetrahedron, face) in faces {
-            if self.solid.tetrahedra[tetrahedron].faces[face] == Face::Whole {
-                self.set_face(tetrahedron, face, Face::Severed)?;
+            if self.solid.tetrahedra[tetrahedron].faces[face] == FaceState::Whole {
+                self.set_face(tetrahedron, face, FaceState::Severed)?;
                 memory::push(&mut torn, (tetrahedron, face))?;
             }
             memory::extend(&mut self.marked, self.solid.face(tetrahedron, face))?;
         }
         memory::sort_once(&mut self.marked);
-        let opening = self.ready()?;
-        // What cannot open is not torn.
+        let opening = self.openable_faces()?;
+        // Faces that cannot open are not torn.
         for (tetrahedron, face) in torn {
-            if self.solid.tetrahedra[tetrahedron].faces[face] == Face::Severed {
-                self.set_face(tetrahedron, face, Face::Whole)?;
+            if self.solid.tetrahedra[tetrahedron].faces[face] == FaceState::Severed {
+                self.set_face(tetrahedron, face, FaceState::Whole)?;
             }
         }
         self.finish(&opening)

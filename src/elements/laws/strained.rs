@@ -1,32 +1,35 @@
-//! Stresses, tangents and bounds of any hyperelastic law, of its derivatives with I1, I2 and J.
+//! Stress, tangent and bounds of a hyperelastic law, from its derivatives with respect to I1, I2 and J.
 //!
-//! `P = 2 w1 F + 2 w2 F x cof F + wJ cof F`, with the product `A x B` of matrices of which `F x F = 2 cof F` (Bonet, Gil, Ortigosa 2015). The tangent is
-//! `2 w1 dF + 4 w11 F (F : dF) + 2 w2 F x (F x dF) + X x dF + wJJ cof F (cof F : dF)` with `X = 2 w2 cof F + wJ F`: all but `X x dF` is positive.
+//! `P = 2 w1 F + 2 w2 F x cof F + wJ cof F`, where the tensor cross product `A x B` has `F x F = 2 cof F` (Bonet, Gil,
+//! Ortigosa 2015). The tangent is `2 w1 dF + 4 w11 F (F : dF) + 2 w2 F x (F x dF) + X x dF + wJJ cof F (cof F : dF)`
+//! with `X = 2 w2 cof F + wJ F`. All terms but `X x dF` are positive semidefinite.
 //!
-//! With principal stretches s and products c of two of them, that of all terms but w11 is known in the frame of the stretches: pairs of entries
-//! across have `2 w1 + 2 w2 s_k² ± (2 w2 c_k + wJ s_k)`, and entries along have `2 w1 + 2 w2 (I1 + 2 s s^T - 3 s_k²) + wJ O + wJJ c c^T`, where O has s_k
-//! beside its diagonal and is also `(c c^T - diag c²) / J`. With `wJ = -4 w2 + r` those along have `2 w1 + r O + wJJ c c^T` and
-//! `2 w2 (I1 - s_k² + 2 (Oc - O))`, Oc with c_k beside its diagonal. Bounds on these make the tangent positive, and tell how stiff it is.
+//! Let s be the principal stretches, and c the products of two of them. In the principal frame, all terms but w11 have
+//! closed forms. Pairs of off-diagonal entries have the eigenvalues `2 w1 + 2 w2 s_k² ± (2 w2 c_k + wJ s_k)`. The
+//! diagonal entries have the matrix `2 w1 + 2 w2 (I1 + 2 s s^T - 3 s_k²) + wJ O + wJJ c c^T`. Here O has the
+//! off-diagonal entries s_k; it is also `(c c^T - diag c²) / J`. With `wJ = -4 w2 + r` the matrix is the sum of
+//! `2 w1 + r O + wJJ c c^T` and `2 w2 (I1 - s_k² + 2 (Oc - O))`, where Oc has the off-diagonal entries c_k. Bounds on these
+//! terms serve to make the tangent positive semidefinite, and to bound its stiffness.
 
 use super::Hyperelastic;
 use crate::simd::Real;
 
-/// The columns of a matrix.
+/// A matrix as three columns.
 pub(crate) type MatrixColumns<R> = [[R; 3]; 3];
 
-/// A tetrahedron as it is deformed, with what its law has there.
+/// A deformation, and the derivatives of the law there.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Strained<R> {
-    /// F.
+pub(crate) struct StrainState<R> {
+    /// The deformation gradient F.
     pub gradient: MatrixColumns<R>,
     pub cofactors: MatrixColumns<R>,
     pub i1: R,
-    /// J - 1.
-    pub growth: R,
-    /// w1, w2, wJ; the last with the pressure.
-    slopes: [R; 3],
-    /// w11, and wJJ with kappa.
-    curvatures: [R; 2],
+    /// The volumetric strain J - 1.
+    pub volume_strain: R,
+    /// w1, w2 and wJ, including kappa and pressure.
+    first_derivatives: [R; 3],
+    /// w11, and wJJ including kappa.
+    second_derivatives: [R; 2],
 }
 
 #[inline(always)]
@@ -59,15 +62,15 @@ fn add<R: Real>([x, y, z]: MatrixColumns<R>, [a, b, c]: MatrixColumns<R>, factor
     ]
 }
 
-/// The sum of the products of entries.
+/// The Frobenius inner product.
 #[inline(always)]
 pub(crate) fn inner<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: MatrixColumns<R>) -> R {
     dot(a, x) + dot(b, y) + dot(c, z)
 }
 
-/// A x B.
+/// The tensor cross product A x B.
 #[inline(always)]
-pub(crate) fn product_of<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: MatrixColumns<R>) -> MatrixColumns<R> {
+pub(crate) fn tensor_cross<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: MatrixColumns<R>) -> MatrixColumns<R> {
     [
         sum(cross(b, z), cross(y, c)),
         sum(cross(c, x), cross(z, a)),
@@ -75,188 +78,192 @@ pub(crate) fn product_of<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: Matrix
     ]
 }
 
-/// No less than the largest eigenvalue of the products of the columns (Gershgorin).
+/// An upper bound on the largest eigenvalue of A^T A (Gershgorin).
 #[inline(always)]
-fn largest<R: Real>([a, b, c]: MatrixColumns<R>) -> R {
-    let (ab, ac, bc) = (dot(a, b).size(), dot(a, c).size(), dot(b, c).size());
+fn largest_eigenvalue<R: Real>([a, b, c]: MatrixColumns<R>) -> R {
+    let (ab, ac, bc) = (dot(a, b).abs(), dot(a, c).abs(), dot(b, c).abs());
     let rows = [dot(a, a) + ab + ac, dot(b, b) + ab + bc, dot(c, c) + ac + bc];
-    rows[0].greater(rows[1]).greater(rows[2])
+    rows[0].max(rows[1]).max(rows[2])
 }
 
-/// No less than a root, and no more than some 15 % above it from 1/20 to 150: the lowest of its tangents at 1/9, 1, 9 and 81.
+/// An upper bound on the square root, at most about 15 % too high from 1/20 to 150: the lowest of its tangents at 1/9,
+/// 1, 9 and 81.
 #[inline(always)]
-fn root<R: Real>(square: R) -> R {
-    let at = |middle: f64| square * R::of(0.5 / middle) + R::of(0.5 * middle);
-    at(1.0 / 3.0).lesser(at(1.0)).lesser(at(3.0)).lesser(at(9.0))
+fn sqrt_bound<R: Real>(square: R) -> R {
+    let tangent = |middle: f64| square * R::from_f64(0.5 / middle) + R::from_f64(0.5 * middle);
+    tangent(1.0 / 3.0).min(tangent(1.0)).min(tangent(3.0)).min(tangent(9.0))
 }
 
-/// The greater of `A g + B` at a third and at 1, over the denominators there.
+/// The maximum of `(A g + B) / (K + 2 mu g)` over g from 1/3 to 1, attained at an end. `inv_third` and `inv_one` are
+/// the inverse denominators.
 #[inline(always)]
-fn relative<R: Real>(shear: R, volume: R, [least, most]: [R; 2]) -> R {
-    let third = (shear * R::of(1.0 / 3.0) + volume) * least;
-    third.greater((shear + volume) * most)
+fn max_ratio<R: Real>(shear: R, volume: R, [inv_third, inv_one]: [R; 2]) -> R {
+    let third = (shear * R::from_f64(1.0 / 3.0) + volume) * inv_third;
+    third.max((shear + volume) * inv_one)
 }
 
-/// Bounds on the stretches.
+/// Bounds on the principal stretches.
 struct StretchBounds<R> {
-    /// The largest, and its square.
+    /// The largest stretch, and its square.
     stretch: R,
     square: R,
-    /// The square of the largest product of two.
+    /// The square of the largest product of two stretches.
     area: R,
-    /// The lowest product of two; only where J is above 0.
+    /// The lowest product of two stretches, for J above 0 only.
     least_product: R,
-    /// The square of the least.
+    /// The square of the smallest stretch.
     least_square: R,
-    /// The largest eigenvalue of O, and that of O with c_k off its diagonal, less.
-    across: R,
-    between: R,
+    /// Upper bounds on the largest eigenvalues of O and of Oc - O.
+    o_eigenvalue: R,
+    oc_minus_o: R,
     i2: R,
     volume: R,
-    /// The same, above 0.
-    positive: R,
-    /// 0 where J is above a thousandth, large where it is below 0.
-    inverted: R,
+    /// J, at least 0.001.
+    positive_volume: R,
+    /// 0 for J above 0.001, large for J below 0.
+    inversion: R,
 }
 
-impl<R: Real> Strained<R> {
-    /// Of a law beside `kappa/2 (J - 1)²` with the pressure that this has now.
+impl<R: Real> StrainState<R> {
+    /// The state of a law and the volume term `kappa/2 (J - 1)²` at this deformation gradient.
     #[inline(always)]
     pub fn new(law: impl Hyperelastic, gradient: MatrixColumns<R>, kappa: R) -> Self {
         let [a, b, c] = gradient;
         let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
         let i1 = inner(gradient, gradient);
-        let growth = dot(gradient[0], cofactors[0]) - R::of(1.0);
-        let [w1, w2, wj] = law.slopes(i1, growth);
-        let [w11, wjj] = law.curvatures(i1, growth);
+        let volume_strain = dot(gradient[0], cofactors[0]) - R::from_f64(1.0);
+        let [w1, w2, wj] = law.first_derivatives(i1, volume_strain);
+        let [w11, wjj] = law.second_derivatives(i1, volume_strain);
         Self {
             gradient,
             cofactors,
             i1,
-            growth,
-            slopes: [w1, w2, wj + kappa * growth],
-            curvatures: [w11, wjj + kappa],
+            volume_strain,
+            first_derivatives: [w1, w2, wj + kappa * volume_strain],
+            second_derivatives: [w11, wjj + kappa],
         }
     }
 
-    /// With so much pressure more, Pa.
+    /// Adds a pressure, Pa.
     #[inline(always)]
-    pub fn pressed(mut self, more: R) -> Self {
-        self.slopes[2] = self.slopes[2] + more;
+    pub fn with_added_pressure(mut self, added: R) -> Self {
+        self.first_derivatives[2] = self.first_derivatives[2] + added;
         self
     }
 
-    /// With volume resisting so much more, Pa, by a pressure that it already has.
+    /// Adds the stiffness of a volume term whose pressure is already included, Pa.
     #[inline(always)]
-    pub fn with_volume(mut self, kappa: R) -> Self {
-        self.curvatures[1] = self.curvatures[1] + kappa;
+    pub fn with_volume_stiffness(mut self, kappa: R) -> Self {
+        self.second_derivatives[1] = self.second_derivatives[1] + kappa;
         self
     }
 
-    /// A change of the stress with that of a pressure on top, Pa.
+    /// Adds the stress change of a pressure change to `changed`, Pa.
     #[inline(always)]
     pub fn with_pressure_change(&self, changed: MatrixColumns<R>, pressure: R) -> MatrixColumns<R> {
         add(changed, self.cofactors, pressure)
     }
 
-    /// P, the first stress of Piola and Kirchhoff, Pa.
+    /// The first Piola-Kirchhoff stress P, Pa.
     #[inline(always)]
     pub fn stress(&self) -> MatrixColumns<R> {
-        let [w1, w2, wj] = self.slopes;
-        let (two, zero) = (R::of(2.0), [[R::of(0.0); 3]; 3]);
+        let [w1, w2, wj] = self.first_derivatives;
+        let (two, zero) = (R::from_f64(2.0), [[R::from_f64(0.0); 3]; 3]);
         let stress = add(zero, self.gradient, two * w1);
-        let stress = add(stress, product_of(self.gradient, self.cofactors), two * w2);
+        let stress = add(stress, tensor_cross(self.gradient, self.cofactors), two * w2);
         add(stress, self.cofactors, wj)
     }
 
-    /// How the stress changes with the deformation, to first order, Pa, and with this `lift` on top.
+    /// The stress change to first order, Pa, with the tangent shifted by `lift`.
     #[inline(always)]
     pub fn stress_change(&self, change: MatrixColumns<R>, lift: R) -> MatrixColumns<R> {
-        let ([w1, w2, wj], [w11, wjj]) = (self.slopes, self.curvatures);
-        let (two, zero) = (R::of(2.0), [[R::of(0.0); 3]; 3]);
-        let turns = add(add(zero, self.cofactors, two * w2), self.gradient, wj);
-        let changed = add(product_of(turns, change), change, two * w1 + lift);
-        let areas = product_of(self.gradient, change);
-        let changed = add(changed, product_of(self.gradient, areas), two * w2);
-        let along = R::of(4.0) * w11 * inner(self.gradient, change);
-        let changed = add(changed, self.gradient, along);
+        let ([w1, w2, wj], [w11, wjj]) = (self.first_derivatives, self.second_derivatives);
+        let (two, zero) = (R::from_f64(2.0), [[R::from_f64(0.0); 3]; 3]);
+        let cross_factor = add(add(zero, self.cofactors, two * w2), self.gradient, wj);
+        let changed = add(tensor_cross(cross_factor, change), change, two * w1 + lift);
+        let areas = tensor_cross(self.gradient, change);
+        let changed = add(changed, tensor_cross(self.gradient, areas), two * w2);
+        let strain_term = R::from_f64(4.0) * w11 * inner(self.gradient, change);
+        let changed = add(changed, self.gradient, strain_term);
         add(changed, self.cofactors, wjj * inner(self.cofactors, change))
     }
 
     #[inline(always)]
     fn bounds(&self) -> StretchBounds<R> {
-        let (zero, least) = (R::of(0.0), R::of(1e-3));
-        let square = largest(self.gradient).greater(R::of(1e-12));
-        let stretch = root(square);
-        let volume = self.growth + R::of(1.0);
-        let inverted = (least - volume).greater(zero) * R::of(1e6);
-        let low = volume / square;
+        let (zero, min_volume) = (R::from_f64(0.0), R::from_f64(1e-3));
+        let square = largest_eigenvalue(self.gradient).max(R::from_f64(1e-12));
+        let stretch = sqrt_bound(square);
+        let volume = self.volume_strain + R::from_f64(1.0);
+        let inversion = (min_volume - volume).max(zero) * R::from_f64(1e6);
+        let smallest = volume / square;
         let i2 = inner(self.cofactors, self.cofactors);
-        // The sum of the squares of s_k - c_k, by 4/3.
-        let apart = (self.i1 + i2 - R::of(6.0) * volume) * R::of(4.0 / 3.0);
+        // 4/3 of the sum of (s_k - c_k)².
+        let distance_sq = (self.i1 + i2 - R::from_f64(6.0) * volume) * R::from_f64(4.0 / 3.0);
         StretchBounds {
             stretch,
             square,
-            area: largest(self.cofactors),
-            least_product: (volume / stretch - inverted).greater(zero - R::of(0.5) * self.i1),
-            least_square: low * low,
-            across: R::of(2.0) * root(self.i1 * R::of(1.0 / 3.0)),
-            between: root(apart).lesser(R::of(0.1) * root(R::of(100.0) * apart)),
+            area: largest_eigenvalue(self.cofactors),
+            least_product: (volume / stretch - inversion).max(zero - R::from_f64(0.5) * self.i1),
+            least_square: smallest * smallest,
+            o_eigenvalue: R::from_f64(2.0) * sqrt_bound(self.i1 * R::from_f64(1.0 / 3.0)),
+            oc_minus_o: sqrt_bound(distance_sq).min(R::from_f64(0.1) * sqrt_bound(R::from_f64(100.0) * distance_sq)),
             i2,
             volume,
-            positive: volume.greater(least),
-            inverted,
+            positive_volume: volume.max(min_volume),
+            inversion,
         }
     }
 
-    /// The same with no more pressure than its tangent can have, and what has to be added to the latter that nothing of it is negative, Pa. At
-    /// rest that is all of the pressure and nothing. What pressure does beyond draws one way as much as it pushes another.
+    /// Limits the pressure so that the tangent stays nearly positive, and returns the shift that makes it positive
+    /// semidefinite, Pa. At rest nothing is limited and the shift is 0. The pressure beyond the limit pulls in one
+    /// direction as much as it pushes in another.
     #[inline(always)]
-    pub fn positive(mut self) -> (Self, R) {
-        let ([w1, w2, wj], [_, wjj]) = (self.slopes, self.curvatures);
-        let (zero, two) = (R::of(0.0), R::of(2.0));
-        let (of_i1, of_i2) = (two * w1, two * w2);
-        let at = self.bounds();
-        let high = of_i1 / at.across;
-        let across = (of_i1 + of_i2 * (at.least_square + at.least_product).greater(zero)) / at.stretch;
-        let along = high.greater(at.volume.greater(zero) * (wjj + of_i1 / at.i2)) + two * of_i2;
-        let wj = wj.greater(zero - across.lesser(along)).lesser(high);
-        self.slopes[2] = wj;
-        let size = wj.size();
-        let pulled = wj.greater(zero) * at.stretch;
-        let across = (size * at.stretch - of_i2 * (at.least_square + at.least_product))
-            .greater(pulled + of_i2 * (at.square - at.least_square));
-        // O with its eigenvalues, or as what is along c c^T and beside it.
-        let rest = wj + two * of_i2;
-        let pulled = rest.greater(zero) * at.across;
-        let apart = (rest.size() - at.volume * wjj).greater(zero) * at.i2 / at.positive + rest.size() * at.inverted;
-        let along = (rest.size() * at.across).lesser(apart.greater(pulled));
-        let along = along + of_i2 * (two * at.between + at.square - self.i1).greater(zero);
-        (self, (across.greater(along) - of_i1).greater(zero))
+    pub fn clamped(mut self) -> (Self, R) {
+        let ([w1, w2, wj], [_, wjj]) = (self.first_derivatives, self.second_derivatives);
+        let (zero, two) = (R::from_f64(0.0), R::from_f64(2.0));
+        let (two_w1, two_w2) = (two * w1, two * w2);
+        let bounds = self.bounds();
+        let max_wj = two_w1 / bounds.o_eigenvalue;
+        let off_diagonal = (two_w1 + two_w2 * (bounds.least_square + bounds.least_product).max(zero)) / bounds.stretch;
+        let diagonal = max_wj.max(bounds.volume.max(zero) * (wjj + two_w1 / bounds.i2)) + two * two_w2;
+        let wj = wj.max(zero - off_diagonal.min(diagonal)).min(max_wj);
+        self.first_derivatives[2] = wj;
+        let size = wj.abs();
+        let tension = wj.max(zero) * bounds.stretch;
+        let off_diagonal = (size * bounds.stretch - two_w2 * (bounds.least_square + bounds.least_product))
+            .max(tension + two_w2 * (bounds.square - bounds.least_square));
+        // O is bounded by its eigenvalues, or by its form along c and across it.
+        let r = wj + two * two_w2;
+        let tension = r.max(zero) * bounds.o_eigenvalue;
+        let form_bound =
+            (r.abs() - bounds.volume * wjj).max(zero) * bounds.i2 / bounds.positive_volume + r.abs() * bounds.inversion;
+        let diagonal = (r.abs() * bounds.o_eigenvalue).min(form_bound.max(tension));
+        let diagonal = diagonal + two_w2 * (two * bounds.oc_minus_o + bounds.square - self.i1).max(zero);
+        (self, (off_diagonal.max(diagonal) - two_w1).max(zero))
     }
 
-    /// How much stiffer it is than at rest at most, at least 1. It is `(A g + B) / (K + 2 mu g)`, of which a part g from a third to 1 counts as shear.
-    /// `least` and `most` are 1 over the denominators at a third and at 1.
+    /// An upper bound on the stiffness relative to rest, at least 1: the maximum of `(A g + B) / (K + 2 mu g)` over
+    /// shear fractions g from 1/3 to 1. `inv_third` and `inv_one` are the inverse denominators at 1/3 and 1.
     #[inline(always)]
-    pub fn stiffening(&self, least: R, most: R) -> R {
-        let ([w1, w2, wj], [w11, wjj]) = (self.slopes, self.curvatures);
-        let (zero, one, two) = (R::of(0.0), R::of(1.0), R::of(2.0));
-        let (of_i1, of_i2, size) = (two * w1, two * w2, wj.size());
-        let at = self.bounds();
-        let pressed = size * at.stretch - of_i2 * at.least_product.greater(zero);
-        let pulled = of_i2 * at.square + wj.greater(zero) * at.stretch;
-        let across = of_i1 + of_i2 * at.square + pressed.greater(pulled);
-        let along = of_i1 + of_i2 * (self.i1 - at.least_square + two * at.between);
-        let rest = wj + two * of_i2;
-        let strains = R::of(4.0) * w11 * at.square;
-        // O as above.
-        let apart = relative(
-            across.greater(along + rest.size() * (at.area / at.positive + at.inverted)),
-            (wjj + rest / at.positive).greater(zero) * at.area + strains,
-            [least, most],
+    pub fn stiffening(&self, inv_third: R, inv_one: R) -> R {
+        let ([w1, w2, wj], [w11, wjj]) = (self.first_derivatives, self.second_derivatives);
+        let (zero, one, two) = (R::from_f64(0.0), R::from_f64(1.0), R::from_f64(2.0));
+        let (two_w1, two_w2, size) = (two * w1, two * w2, wj.abs());
+        let bounds = self.bounds();
+        let compression = size * bounds.stretch - two_w2 * bounds.least_product.max(zero);
+        let tension = two_w2 * bounds.square + wj.max(zero) * bounds.stretch;
+        let off_diagonal = two_w1 + two_w2 * bounds.square + compression.max(tension);
+        let diagonal = two_w1 + two_w2 * (self.i1 - bounds.least_square + two * bounds.oc_minus_o);
+        let r = wj + two * two_w2;
+        let strains = R::from_f64(4.0) * w11 * bounds.square;
+        // O is bounded as in [`Self::clamped`].
+        let split_bound = max_ratio(
+            off_diagonal.max(diagonal + r.abs() * (bounds.area / bounds.positive_volume + bounds.inversion)),
+            (wjj + r / bounds.positive_volume).max(zero) * bounds.area + strains,
+            [inv_third, inv_one],
         );
-        let shear = across.greater(along + rest.size() * at.across);
-        let whole = relative(shear, wjj * at.area + strains, [least, most]);
-        apart.lesser(whole).greater(one)
+        let shear = off_diagonal.max(diagonal + r.abs() * bounds.o_eigenvalue);
+        let joint_bound = max_ratio(shear, wjj * bounds.area + strains, [inv_third, inv_one]);
+        split_bound.min(joint_bound).max(one)
     }
 }

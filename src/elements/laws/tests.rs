@@ -11,63 +11,63 @@ fn sum(a: MatrixColumns<f64>, b: MatrixColumns<f64>, factor: f64) -> MatrixColum
 
 const IDENTITY: MatrixColumns<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Near rest, large deformations, flat ones, and what is inverted.
+/// Deformations near rest, large ones, flat ones and inverted ones.
 fn deformations(random: &mut Random) -> Vec<MatrixColumns<f64>> {
-    let mut all = Vec::new();
+    let mut deformations = Vec::new();
     for size in [0.0, 1e-3, 0.1, 0.5, 1.0, 2.0] {
         for _ in 0..100 {
-            all.push(sum(IDENTITY, matrix(random, size), 1.0));
+            deformations.push(sum(IDENTITY, matrix(random, size), 1.0));
             let mut other = sum(IDENTITY, matrix(random, 0.3 * size), 1.0);
             let factor = f64::from(random.unit()) * 2.0 - 1.0;
             other[2] = other[2].map(|entry| entry * factor);
-            all.push(other);
+            deformations.push(other);
         }
     }
-    all
+    deformations
 }
 
 fn invariants(gradient: MatrixColumns<f64>) -> [f64; 3] {
-    let strained = Strained::new(NeoHookean::new(1.0), gradient, 0.0);
-    let i2 = inner(strained.cofactors, strained.cofactors);
-    [strained.i1, i2, strained.growth]
+    let state = StrainState::new(NeoHookean::new(1.0), gradient, 0.0);
+    let i2 = inner(state.cofactors, state.cofactors);
+    [state.i1, i2, state.volume_strain]
 }
 
 fn density(law: impl Hyperelastic, gradient: MatrixColumns<f64>, kappa: f64) -> f64 {
-    let [i1, i2, growth] = invariants(gradient);
-    law.energy([i1, i2, growth]) + 0.5 * kappa * growth * growth
+    let [i1, i2, volume_strain] = invariants(gradient);
+    law.energy([i1, i2, volume_strain]) + 0.5 * kappa * volume_strain * volume_strain
 }
 
-/// A law, and its mu.
+/// Checks a law with mu = 1 Pa.
 fn check(law: impl Hyperelastic) {
     const STEP: f64 = 1e-5;
     let mut random = Random(3);
     for kappa in [0.0, 1.5, 30.0] {
         let (least, most) = (1.0 / (kappa + 2.0 / 3.0), 1.0 / (kappa + 2.0));
-        let rest = Strained::new(law, IDENTITY, kappa);
-        // Nothing is lifted at rest, and the bound is near what it bounds there.
-        let (at_rest, lift) = rest.positive();
-        let lost = sum(at_rest.stress(), rest.stress(), -1.0);
-        assert!(lift < 1e-12 && inner(lost, lost) < 1e-12, "{lift} {lost:?}");
+        let rest = StrainState::new(law, IDENTITY, kappa);
+        // At rest nothing is shifted, and the bound is nearly sharp.
+        let (at_rest, lift) = rest.clamped();
+        let removed = sum(at_rest.stress(), rest.stress(), -1.0);
+        assert!(lift < 1e-12 && inner(removed, removed) < 1e-12, "{lift} {removed:?}");
         let stiffening = rest.stiffening(least, most);
         assert!((1.0..1.3).contains(&stiffening), "{stiffening}");
         for gradient in deformations(&mut random) {
-            let at = Strained::new(law, gradient, kappa);
+            let at = StrainState::new(law, gradient, kappa);
             let size = 1.0 + kappa + inner(at.stress(), at.stress()).sqrt();
             let size = size * (1.0 + at.i1);
             let change = matrix(&mut random, 1.0);
-            let moved = |by: f64| sum(gradient, change, by);
-            let slope = (density(law, moved(STEP), kappa) - density(law, moved(-STEP), kappa)) / (2.0 * STEP);
-            assert!((inner(at.stress(), change) - slope).abs() < 1e-7 * size);
-            let [more, less] = [STEP, -STEP].map(|by| Strained::new(law, moved(by), kappa).stress());
-            let slope = sum(more, less, -1.0);
+            let deformed = |by: f64| sum(gradient, change, by);
+            let expected = (density(law, deformed(STEP), kappa) - density(law, deformed(-STEP), kappa)) / (2.0 * STEP);
+            assert!((inner(at.stress(), change) - expected).abs() < 1e-7 * size);
+            let [more, less] = [STEP, -STEP].map(|by| StrainState::new(law, deformed(by), kappa).stress());
+            let expected = sum(more, less, -1.0);
             let tangent = at.stress_change(change, 0.0);
-            let error = sum(tangent, slope, -0.5 / STEP);
+            let error = sum(tangent, expected, -0.5 / STEP);
             assert!(inner(error, error).sqrt() < 1e-7 * size, "{error:?}");
-            // Nothing of it is negative with the lift, and rotations at rest cost nothing.
-            let (positive, lift) = at.positive();
+            // The shifted tangent is positive semidefinite.
+            let (clamped, lift) = at.clamped();
             for _ in 0..20 {
                 let change = matrix(&mut random, 1.0);
-                let form = inner(positive.stress_change(change, lift), change);
+                let form = inner(clamped.stress_change(change, lift), change);
                 assert!(form > -1e-9 * size, "{form} {lift} {gradient:?}");
             }
             // No corner of a regular tetrahedron or of a needle is stiffer than the bound.
@@ -81,22 +81,23 @@ fn check(law: impl Hyperelastic) {
     }
 }
 
-/// The form of any ways of corners is at most c sum |g|² |u|² / p, with the gradients of a tetrahedron of which shear counts as this part.
-fn check_bound(at: &Strained<f64>, random: &mut Random, most: f64, shear: f64) {
+/// Checks that the quadratic form of any displacements is at most c sum |g|² |u|² / p, for a tetrahedron with this
+/// fraction of shear.
+fn check_bound(at: &StrainState<f64>, random: &mut Random, most: f64, shear: f64) {
     let regular = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
     let needle = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [-2.0, 0.0, 0.0]];
     let gradients: [[f64; 3]; 4] = if shear < 0.5 { regular } else { needle };
     let sizes = gradients.map(|gradient| gradient.iter().map(|x| x * x).sum::<f64>().sqrt());
-    let all: f64 = sizes.iter().sum();
+    let total: f64 = sizes.iter().sum();
     let (mut change, mut bound) = ([[0.0; 3]; 3], 0.0);
     for (gradient, size) in gradients.into_iter().zip(sizes) {
-        let [way, ..] = matrix(random, 1.0);
-        for (column, along) in change.iter_mut().zip(gradient) {
-            for (entry, way) in column.iter_mut().zip(way) {
-                *entry += way * along;
+        let [displacement, ..] = matrix(random, 1.0);
+        for (column, component) in change.iter_mut().zip(gradient) {
+            for (entry, displacement) in column.iter_mut().zip(displacement) {
+                *entry += displacement * component;
             }
         }
-        bound += most * size * all * way.iter().map(|x| x * x).sum::<f64>();
+        bound += most * size * total * displacement.iter().map(|x| x * x).sum::<f64>();
     }
     let form = inner(at.stress_change(change, 0.0), change);
     assert!(form <= bound * (1.0 + 1e-9), "{form} {bound} {:?}", at.gradient);
@@ -111,10 +112,10 @@ fn stresses_and_tangents_are_derivatives_and_their_bounds_hold() {
 }
 
 #[test]
-fn small_strains_are_those_of_the_shear_modulus_alone() {
+fn small_strains_depend_on_the_shear_modulus_alone() {
     fn check(law: impl Hyperelastic) {
         let strain = [[2e-5, 1e-5, -3e-5], [1e-5, -1e-5, 2e-5], [-3e-5, 2e-5, 4e-5]];
-        let stress = Strained::new(law, sum(IDENTITY, strain, 1.0), 0.0).stress();
+        let stress = StrainState::new(law, sum(IDENTITY, strain, 1.0), 0.0).stress();
         let error = sum(stress, strain, -2.0);
         assert!(inner(error, error).sqrt() < 2e-8, "{error:?}");
     }
@@ -122,13 +123,13 @@ fn small_strains_are_those_of_the_shear_modulus_alone() {
     check(MooneyRivlin::new(1.0, 0.4));
 }
 
-/// Lanes that no tetrahedron fills have F = 0, and are added up with the others.
+/// Lanes without a tetrahedron have F = 0; their results are summed with the others and must be finite.
 #[test]
-fn lanes_without_a_tetrahedron_have_numbers() {
+fn lanes_without_a_tetrahedron_give_finite_results() {
     fn check(law: impl Hyperelastic, kappa: f64) {
-        let at = Strained::new(law, [[0.0; 3]; 3], kappa);
-        let (positive, lift) = at.positive();
-        let changed = positive.stress_change([[0.0; 3]; 3], lift);
+        let at = StrainState::new(law, [[0.0; 3]; 3], kappa);
+        let (clamped, lift) = at.clamped();
+        let changed = clamped.stress_change([[0.0; 3]; 3], lift);
         assert!(lift.is_finite() && inner(changed, IDENTITY).is_finite());
         assert!(at.stiffening(1.0, 1.0).is_finite() && inner(at.stress(), IDENTITY).is_finite());
     }

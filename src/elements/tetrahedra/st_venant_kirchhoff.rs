@@ -1,42 +1,43 @@
-//! The kernels of tetrahedra of St Venant and Kirchhoff's law with a signed volume term.
+//! Kernels of St Venant-Kirchhoff tetrahedra with a signed volume term.
 
-use super::{DeformedLanes, GROUP, Stresses, Tetrahedra, turns};
-use crate::elements::{LEAST_SHEAR, Law};
+use super::{DeformedLanes, GROUP, Stresses, Tetrahedra, batches};
+use crate::elements::{ElasticLaw, LEAST_SHEAR};
 use crate::simd::algebra::{Six, add_times, cross, dot, largest, scaled_matrix, scaled_six, sum_six, times_upper};
 use crate::simd::{Lanes, Record, WithLanes};
 
-/// With the pressures that their nodes have beside their places, or none, and with as many loads as groups, or none.
-pub(super) struct FindForces<'a, const RINGS: bool, const LOADED: bool> {
-    pub law: Law,
-    pub loads: &'a [Stresses],
-    pub of: Tetrahedra<'a>,
+/// Computes forces. With `NODAL`, the fourth component of a node's record is its pressure. With `LOADED`, each group
+/// has an extra stress.
+pub(super) struct FindForces<'a, const NODAL: bool, const LOADED: bool> {
+    pub law: ElasticLaw,
+    pub extra: &'a [Stresses],
+    pub tetrahedra: Tetrahedra<'a>,
 }
 
-pub(super) struct FindChanges<'a, const RINGS: bool, const LOADED: bool> {
-    pub law: Law,
-    pub loads: &'a [Stresses],
-    pub ways: *const Record,
-    pub of: Tetrahedra<'a>,
+pub(super) struct FindDifferentials<'a, const NODAL: bool, const LOADED: bool> {
+    pub law: ElasticLaw,
+    pub extra: &'a [Stresses],
+    pub displacements: *const Record,
+    pub tetrahedra: Tetrahedra<'a>,
 }
 
-/// Of as many groups as there are stresses.
+/// Computes stresses, one for each group.
 pub(super) struct FindStresses<'a> {
-    pub law: Law,
+    pub law: ElasticLaw,
     pub stresses: &'a mut [Stresses],
-    pub of: Tetrahedra<'a>,
+    pub tetrahedra: Tetrahedra<'a>,
 }
 
 pub(super) struct FindEnergy<'a> {
-    pub law: Law,
-    pub of: Tetrahedra<'a>,
+    pub law: ElasticLaw,
+    pub tetrahedra: Tetrahedra<'a>,
 }
 
-pub(super) struct FindGrowths<'a> {
-    pub ways: Option<*const Record>,
-    pub of: Tetrahedra<'a>,
+pub(super) struct FindVolumeChanges<'a> {
+    pub displacements: Option<*const Record>,
+    pub tetrahedra: Tetrahedra<'a>,
 }
 
-/// A law's numbers in every lane.
+/// The constants of a law in every lane.
 #[derive(Clone, Copy)]
 struct Constants<L> {
     lambda: L,
@@ -46,8 +47,8 @@ struct Constants<L> {
 
 impl<L: Lanes> Constants<L> {
     #[inline(always)]
-    unsafe fn new(law: Law) -> Self {
-        // SAFETY: the caller promises the instructions.
+    unsafe fn new(law: ElasticLaw) -> Self {
+        // SAFETY: the caller guarantees the instruction set.
         unsafe {
             Self {
                 lambda: L::splat(law.lambda),
@@ -57,95 +58,98 @@ impl<L: Lanes> Constants<L> {
         }
     }
 
-    /// With no resistance of volume where that is a matter of rings.
+    /// The constants without volume resistance, if nodal pressures provide it.
     #[inline(always)]
-    unsafe fn without_rings(law: Law) -> Self {
+    unsafe fn without_nodal_pressure(law: ElasticLaw) -> Self {
         // SAFETY: the same contract.
-        unsafe { Self::new(if law.rings { Law { kappa: 0.0, ..law } } else { law }) }
+        unsafe {
+            Self::new(if law.nodal_pressure {
+                ElasticLaw { kappa: 0.0, ..law }
+            } else {
+                law
+            })
+        }
     }
 
-    /// The stress S of twice a strain.
+    /// The stress S for twice a strain.
     #[inline(always)]
     unsafe fn stress(self, twice_strain: Six<L>, twice_trace: L) -> Six<L> {
-        // SAFETY: the caller promises the instructions.
+        // SAFETY: the caller guarantees the instruction set.
         unsafe {
-            let part = self.lambda.multiply(twice_trace).multiply(L::splat(0.5));
+            let volumetric = self.lambda.mul(twice_trace).mul(L::splat(0.5));
             let [xx, xy, xz, yy, yz, zz] = twice_strain;
             [
-                self.mu.multiply_add(xx, part),
-                self.mu.multiply(xy),
-                self.mu.multiply(xz),
-                self.mu.multiply_add(yy, part),
-                self.mu.multiply(yz),
-                self.mu.multiply_add(zz, part),
+                self.mu.mul_add(xx, volumetric),
+                self.mu.mul(xy),
+                self.mu.mul(xz),
+                self.mu.mul_add(yy, volumetric),
+                self.mu.mul(yz),
+                self.mu.mul_add(zz, volumetric),
             ]
         }
     }
 }
 
-impl<const RINGS: bool, const LOADED: bool> WithLanes for FindForces<'_, RINGS, LOADED> {
+impl<const NODAL: bool, const LOADED: bool> WithLanes for FindForces<'_, NODAL, LOADED> {
     type Output = f32;
 
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) -> f32 {
-        let Self { law, loads, of } = self;
-        // SAFETY: the same contract; corners lead to positions and sums.
+        let Self { law, extra, tetrahedra } = self;
+        // SAFETY: the same contract; corners are indices of positions and sums.
         unsafe {
             let constants = Constants::<L>::new(law);
             let (one, half) = (L::splat(1.0), L::splat(0.5));
-            // Of what rates are made for, tension is most where shear counts most, all else where it counts least.
-            let least = L::splat(1.0 / law.stiffest(LEAST_SHEAR));
-            let most = L::splat(1.0 / law.stiffest(1.0));
-            let along = L::splat(law.lambda.max(0.0) + 2.0 * law.mu * LEAST_SHEAR);
+            // The ratio to the stiffness at rest is largest at the largest shear fraction for tension, and at the
+            // least for all other terms.
+            let inv_third = L::splat(1.0 / law.rest_stiffness_bound(LEAST_SHEAR));
+            let inv_one = L::splat(1.0 / law.rest_stiffness_bound(1.0));
+            let modulus = L::splat(law.lambda.max(0.0) + 2.0 * law.mu * LEAST_SHEAR);
             let mut highest = L::splat(0.0);
-            for (index, group) in of.groups.iter().enumerate() {
-                for first in turns::<L>() {
+            for (index, group) in tetrahedra.groups.iter().enumerate() {
+                for first in batches::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
                     let volumes = Tetrahedra::volumes::<L>(group, first);
-                    let deformed = of.deformed(group, first, inverse);
+                    let deformed = tetrahedra.deformed(group, first, inverse);
                     let DeformedLanes {
                         gradient,
                         cofactors,
                         twice_strain,
                         twice_trace,
-                        growth,
+                        volume_strain,
                         pressure,
                     } = deformed;
                     let mut stress = constants.stress(twice_strain, twice_trace);
-                    let mut pressure = if RINGS {
+                    let mut pressure = if NODAL {
                         pressure
                     } else {
-                        constants.kappa.multiply(growth)
+                        constants.kappa.mul(volume_strain)
                     };
-                    let mut load = L::splat(0.0);
+                    let mut extra_norm = L::splat(0.0);
                     if LOADED {
-                        let entries = loads[index].entries::<L>(first);
+                        let entries = extra[index].entries::<L>(first);
                         stress = sum_six(stress, entries);
-                        load = largest(entries);
-                        if !RINGS {
-                            pressure = pressure.add(loads[index].pressures::<L>(first));
+                        extra_norm = largest(entries);
+                        if !NODAL {
+                            pressure = pressure.add(extra[index].pressures::<L>(first));
                         }
                     }
-                    let minus = L::splat(0.0).subtract(volumes);
+                    let minus = L::splat(0.0).sub(volumes);
                     let stress = scaled_six(stress, minus);
-                    // The largest stretch squared is at most the largest sum of a row's sizes (Gershgorin).
+                    // An upper bound on the square of the largest stretch (Gershgorin).
                     let [xx, xy, xz, yy, yz, zz] = twice_strain;
-                    let (xy, xz, yz) = (xy.size(), xz.size(), yz.size());
-                    let stretch = xx
-                        .add(xy)
-                        .add(xz)
-                        .greater(yy.add(xy).add(yz))
-                        .greater(zz.add(xz).add(yz));
-                    let stretch = stretch.greater(L::splat(0.0)).add(one);
-                    let tension = constants.mu.multiply(stretch.subtract(one));
-                    let tension = constants.lambda.multiply(twice_trace).multiply_add(half, tension);
-                    let tension = tension.greater(L::splat(0.0)).add(load);
-                    // Pressure turns with the root of that, which is below its tangents: at 1, 9 and 81.
-                    let root = stretch.multiply_add(half, half);
-                    let root = root.lesser(stretch.multiply_add(L::splat(1.0 / 6.0), L::splat(1.5)));
-                    let root = root.lesser(stretch.multiply_add(L::splat(1.0 / 18.0), L::splat(4.5)));
-                    let pressed = pressure.size().multiply(root);
-                    // Volume grows with areas: the square of the largest.
+                    let (xy, xz, yz) = (xy.abs(), xz.abs(), yz.abs());
+                    let stretch = xx.add(xy).add(xz).max(yy.add(xy).add(yz)).max(zz.add(xz).add(yz));
+                    let stretch = stretch.max(L::splat(0.0)).add(one);
+                    let tension = constants.mu.mul(stretch.sub(one));
+                    let tension = constants.lambda.mul(twice_trace).mul_add(half, tension);
+                    let tension = tension.max(L::splat(0.0)).add(extra_norm);
+                    // Pressure scales with the stretch; the root is below its tangents at 1, 9 and 81.
+                    let root = stretch.mul_add(half, half);
+                    let root = root.min(stretch.mul_add(L::splat(1.0 / 6.0), L::splat(1.5)));
+                    let root = root.min(stretch.mul_add(L::splat(1.0 / 18.0), L::splat(4.5)));
+                    let pressure_term = pressure.abs().mul(root);
+                    // The volume term scales with the square of the largest area ratio.
                     let [ab, bc, ca] = cofactors;
                     let areas = [
                         dot(ab, ab),
@@ -155,42 +159,47 @@ impl<const RINGS: bool, const LOADED: bool> WithLanes for FindForces<'_, RINGS, 
                         dot(bc, ca),
                         dot(ca, ca),
                     ];
-                    let area = largest(areas).greater(stretch);
-                    let stiffness = along.multiply_add(stretch, pressed);
-                    let stiffness = constants.kappa.multiply_add(area, stiffness);
-                    let stiffness = stiffness.multiply(least);
-                    let stiffness = tension.multiply_add(most, stiffness);
+                    let area = largest(areas).max(stretch);
+                    let stiffness = modulus.mul_add(stretch, pressure_term);
+                    let stiffness = constants.kappa.mul_add(area, stiffness);
+                    let stiffness = stiffness.mul(inv_third);
+                    let stiffness = tension.mul_add(inv_one, stiffness);
                     let rates = L::load(group.rates.as_ptr().add(first));
-                    highest = highest.greater(stiffness.multiply(rates));
-                    let load = pressure.multiply(minus);
-                    let first_stress = scaled_matrix(cofactors, load);
-                    of.spread(group, first, add_times(first_stress, gradient, stress), inverse);
+                    highest = highest.max(stiffness.mul(rates));
+                    let force_pressure = pressure.mul(minus);
+                    let first_stress = scaled_matrix(cofactors, force_pressure);
+                    tetrahedra.scatter_forces(group, first, add_times(first_stress, gradient, stress), inverse);
                 }
             }
-            let mut all = [0.0_f32; GROUP];
-            highest.store(all.as_mut_ptr());
-            all.into_iter().fold(0.0, f32::max)
+            let mut lane_bounds = [0.0_f32; GROUP];
+            highest.store(lane_bounds.as_mut_ptr());
+            lane_bounds.into_iter().fold(0.0, f32::max)
         }
     }
 }
 
-impl<const RINGS: bool, const LOADED: bool> WithLanes for FindChanges<'_, RINGS, LOADED> {
+impl<const NODAL: bool, const LOADED: bool> WithLanes for FindDifferentials<'_, NODAL, LOADED> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
-        let Self { law, loads, ways, of } = self;
-        // SAFETY: the same contract; corners lead to positions, ways and sums.
+        let Self {
+            law,
+            extra,
+            displacements,
+            tetrahedra,
+        } = self;
+        // SAFETY: the same contract; corners are indices of positions, displacements and sums.
         unsafe {
             let constants = Constants::<L>::new(law);
             let zero = L::splat(0.0);
-            for (index, group) in of.groups.iter().enumerate() {
-                for first in turns::<L>() {
+            for (index, group) in tetrahedra.groups.iter().enumerate() {
+                for first in batches::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
                     let volumes = Tetrahedra::volumes::<L>(group, first);
-                    let deformed = of.deformed(group, first, inverse);
+                    let deformed = tetrahedra.deformed(group, first, inverse);
                     let [a, b, c] = deformed.gradient;
-                    let (edges, pressure) = Tetrahedra::edges::<L>(ways, group, first);
+                    let (edges, pressure) = Tetrahedra::edges::<L>(displacements, group, first);
                     let change = times_upper(edges, inverse);
                     let [da, db, dc] = change;
                     let twice_strain = [
@@ -203,67 +212,75 @@ impl<const RINGS: bool, const LOADED: bool> WithLanes for FindChanges<'_, RINGS,
                     ];
                     let twice_trace = twice_strain[0].add(twice_strain[3]).add(twice_strain[5]);
                     let stress_change = constants.stress(twice_strain, twice_trace);
-                    // Pressure is lifted as far as it may push sideways: Gershgorin's bound on the lowest eigenvalue.
+                    // The stress is shifted by Gershgorin's bound on its lowest eigenvalue, so that the tangent stays
+                    // positive semidefinite.
                     let mut stress = constants.stress(deformed.twice_strain, deformed.twice_trace);
                     if LOADED {
-                        stress = sum_six(stress, loads[index].entries::<L>(first));
+                        stress = sum_six(stress, extra[index].entries::<L>(first));
                     }
-                    let (xy, xz, yz) = (stress[1].size(), stress[2].size(), stress[4].size());
+                    let (xy, xz, yz) = (stress[1].abs(), stress[2].abs(), stress[4].abs());
                     let lift = [
-                        xy.add(xz).subtract(stress[0]),
-                        xy.add(yz).subtract(stress[3]),
-                        xz.add(yz).subtract(stress[5]),
+                        xy.add(xz).sub(stress[0]),
+                        xy.add(yz).sub(stress[3]),
+                        xz.add(yz).sub(stress[5]),
                     ];
-                    let lift = lift[0].greater(lift[1]).greater(lift[2]).greater(zero);
-                    for place in [0, 3, 5] {
-                        stress[place] = stress[place].add(lift);
+                    let lift = lift[0].max(lift[1]).max(lift[2]).max(zero);
+                    for diagonal in [0, 3, 5] {
+                        stress[diagonal] = stress[diagonal].add(lift);
                     }
                     let [ca, cb, cc] = deformed.cofactors;
-                    let load = if RINGS {
+                    let pressure_change = if NODAL {
                         pressure
                     } else {
-                        let swelling = dot(ca, da).add(dot(cb, db)).add(dot(cc, dc));
-                        constants.kappa.multiply(swelling)
+                        let volume_change = dot(ca, da).add(dot(cb, db)).add(dot(cc, dc));
+                        constants.kappa.mul(volume_change)
                     };
-                    let changed = scaled_matrix(deformed.cofactors, load);
-                    let changed = add_times(changed, deformed.gradient, stress_change);
-                    let changed = add_times(changed, change, stress);
-                    let minus = zero.subtract(volumes);
-                    let changed = scaled_matrix(changed, minus);
-                    of.spread(group, first, changed, inverse);
+                    let stress_differential = scaled_matrix(deformed.cofactors, pressure_change);
+                    let stress_differential = add_times(stress_differential, deformed.gradient, stress_change);
+                    let stress_differential = add_times(stress_differential, change, stress);
+                    let minus = zero.sub(volumes);
+                    let stress_differential = scaled_matrix(stress_differential, minus);
+                    tetrahedra.scatter_forces(group, first, stress_differential, inverse);
                 }
             }
         }
     }
 }
 
-impl WithLanes for FindGrowths<'_> {
+impl WithLanes for FindVolumeChanges<'_> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
-        let Self { ways, of } = self;
-        // SAFETY: the same contract; corners lead to positions, ways and sums.
+        let Self {
+            displacements,
+            tetrahedra,
+        } = self;
+        // SAFETY: the same contract; corners are indices of positions, displacements and sums.
         unsafe {
             let (zero, one) = (L::splat(0.0), L::splat(1.0));
             let quarter = L::splat(0.25);
-            for group in of.groups {
-                for first in turns::<L>() {
+            for group in tetrahedra.groups {
+                for first in batches::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
-                    let (edges, _) = Tetrahedra::edges::<L>(of.positions, group, first);
+                    let (edges, _) = Tetrahedra::edges::<L>(tetrahedra.positions, group, first);
                     let [a, b, c] = times_upper(edges, inverse);
-                    let growth = match ways {
-                        None => dot(a, cross(b, c)).subtract(one),
-                        Some(ways) => {
-                            let (edges, _) = Tetrahedra::edges::<L>(ways, group, first);
+                    let volume_strain = match displacements {
+                        None => dot(a, cross(b, c)).sub(one),
+                        Some(displacements) => {
+                            let (edges, _) = Tetrahedra::edges::<L>(displacements, group, first);
                             let [da, db, dc] = times_upper(edges, inverse);
                             dot(da, cross(b, c)).add(dot(db, cross(c, a))).add(dot(dc, cross(a, b)))
                         }
                     };
                     let volumes = Tetrahedra::volumes::<L>(group, first);
-                    let growth = growth.multiply(volumes).multiply(quarter);
+                    let volume_strain = volume_strain.mul(volumes).mul(quarter);
                     for corners in &group.corners {
-                        L::add_to_records(of.sums, corners.as_ptr().add(first), [growth, zero, zero]);
+                        L::scatter_add_records(
+                            tetrahedra.sums,
+                            corners.as_ptr().add(first),
+                            [volume_strain, zero, zero],
+                        );
                     }
                 }
             }
@@ -276,16 +293,20 @@ impl WithLanes for FindStresses<'_> {
 
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
-        let Self { law, stresses, of } = self;
-        // SAFETY: the same contract; corners lead to positions, and lanes are of a group.
+        let Self {
+            law,
+            stresses,
+            tetrahedra,
+        } = self;
+        // SAFETY: the same contract; corners are indices of positions, and lanes are of a group.
         unsafe {
-            let constants = Constants::<L>::without_rings(law);
-            for (group, stresses) in of.groups.iter().zip(stresses) {
-                for first in turns::<L>() {
+            let constants = Constants::<L>::without_nodal_pressure(law);
+            for (group, stresses) in tetrahedra.groups.iter().zip(stresses) {
+                for first in batches::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
-                    let deformed = of.deformed(group, first, inverse);
+                    let deformed = tetrahedra.deformed(group, first, inverse);
                     let [a, b, c, d, e, f] = constants.stress(deformed.twice_strain, deformed.twice_trace);
-                    let pressure = constants.kappa.multiply(deformed.growth);
+                    let pressure = constants.kappa.mul(deformed.volume_strain);
                     for (entry, to) in [a, b, c, d, e, f, pressure].into_iter().zip(&mut stresses.0) {
                         entry.store(to.as_mut_ptr().add(first));
                     }
@@ -300,33 +321,29 @@ impl WithLanes for FindEnergy<'_> {
 
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) -> f64 {
-        let Self { law, of } = self;
+        let Self { law, tetrahedra } = self;
         let mut energy = 0.0;
-        // SAFETY: the same contract; corners lead to positions.
+        // SAFETY: the same contract; corners are indices of positions.
         unsafe {
-            let constants = Constants::<L>::without_rings(law);
-            for group in of.groups {
-                for first in turns::<L>() {
+            let constants = Constants::<L>::without_nodal_pressure(law);
+            for group in tetrahedra.groups {
+                for first in batches::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
-                    let deformed = of.deformed(group, first, inverse);
+                    let deformed = tetrahedra.deformed(group, first, inverse);
                     let [xx, xy, xz, yy, yz, zz] = deformed.twice_strain;
-                    let across = dot([xy, xz, yz], [xy, xz, yz]);
-                    let squares = dot([xx, yy, zz], [xx, yy, zz]).add(across).add(across);
+                    let off_diagonal = dot([xy, xz, yz], [xy, xz, yz]);
+                    let squares = dot([xx, yy, zz], [xx, yy, zz]).add(off_diagonal).add(off_diagonal);
                     let trace = deformed.twice_trace;
-                    let growth = deformed.growth;
-                    // Of twice the strains: a quarter.
-                    let density = constants
-                        .lambda
-                        .multiply(trace)
-                        .multiply(trace)
-                        .multiply(L::splat(0.125));
-                    let density = constants.mu.multiply(squares).multiply_add(L::splat(0.25), density);
-                    let swollen = constants.kappa.multiply(growth).multiply(growth);
-                    let density = swollen.multiply_add(L::splat(0.5), density);
-                    let energies = density.multiply(Tetrahedra::volumes::<L>(group, first));
-                    let mut all = [0.0_f32; GROUP];
-                    energies.store(all.as_mut_ptr());
-                    energy += all.into_iter().map(f64::from).sum::<f64>();
+                    let volume_strain = deformed.volume_strain;
+                    // The strains are doubled, so their squares have a quarter of the usual factor.
+                    let density = constants.lambda.mul(trace).mul(trace).mul(L::splat(0.125));
+                    let density = constants.mu.mul(squares).mul_add(L::splat(0.25), density);
+                    let volume_term = constants.kappa.mul(volume_strain).mul(volume_strain);
+                    let density = volume_term.mul_add(L::splat(0.5), density);
+                    let energies = density.mul(Tetrahedra::volumes::<L>(group, first));
+                    let mut lane_energies = [0.0_f32; GROUP];
+                    energies.store(lane_energies.as_mut_ptr());
+                    energy += lane_energies.into_iter().map(f64::from).sum::<f64>();
                 }
             }
         }

@@ -1,13 +1,13 @@
-//! Gmsh, ASCII: versions 1, 2 and 4.1.
+//! Gmsh ASCII format, versions 1, 2 and 4.1.
 
 use std::collections::HashMap;
 
-use super::scanner::{Scanner, parse, shown};
+use super::scanner::{Scanner, parse, quoted};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
 use crate::base::{ensure, memory};
 
-/// The layouts of the nodes and elements.
+/// The versions of the layout of nodes and elements.
 #[derive(Clone, Copy, PartialEq)]
 enum Version {
     One,
@@ -23,7 +23,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
     while let Some(section) = scanner.next_word() {
         match (section, version) {
             (b"$MeshFormat", None) => version = Some(read_version(scanner)?),
-            // Version 1 has no such header.
+            // Version 1 has no header.
             (b"$NOD", None) => {
                 version = Some(Version::One);
                 nodes = Some(read_nodes(scanner, Version::One, &mut raw)?);
@@ -41,16 +41,16 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
                 scanner.expect(if section == b"$ELM" { "$ENDELM" } else { "$EndElements" })?;
                 has_elements = true;
             }
-            ([b'$', name @ ..], _) if !is_known(name) => skip_section(scanner, name)?,
-            _ => return Err(scanner.fail(format!("{} has no place here", shown(section)))),
+            ([b'$', name @ ..], _) if !is_read(name) => skip_section(scanner, name)?,
+            _ => return Err(scanner.fail(format!("{} has no place here", quoted(section)))),
         }
     }
     ensure!(has_elements, scanner.fail("the file ends without elements"));
     Ok(raw)
 }
 
-/// Whether a section is one that is read, so that another of its kind must not be skipped.
-fn is_known(name: &[u8]) -> bool {
+/// True for a section that is read, so that a repeated one must not be skipped.
+fn is_read(name: &[u8]) -> bool {
     matches!(name, b"MeshFormat" | b"NOD" | b"Nodes" | b"ELM" | b"Elements")
         || name.starts_with(b"End")
         || name.starts_with(b"END")
@@ -64,7 +64,7 @@ fn read_version(scanner: &mut Scanner) -> Result<Version> {
         _ => {
             return Err(scanner.fail(format!(
                 "version {} of Gmsh's format; 1, 2 and 4.1 can be read",
-                shown(word)
+                quoted(word)
             )));
         }
     };
@@ -80,9 +80,9 @@ fn read_version(scanner: &mut Scanner) -> Result<Version> {
     Ok(version)
 }
 
-/// Moves past the end of a section, whatever it holds.
+/// Skips a section of any content.
 fn skip_section(scanner: &mut Scanner, name: &[u8]) -> Result<()> {
-    let place = scanner.place();
+    let position = scanner.position();
     scanner.line();
     while scanner.remaining() > 0 {
         let line = scanner.line().trim_ascii();
@@ -91,10 +91,10 @@ fn skip_section(scanner: &mut Scanner, name: &[u8]) -> Result<()> {
             return Ok(());
         }
     }
-    Err(scanner.fail_at(place, format!("section {} has no end", shown(name))))
+    Err(scanner.fail_at(position, format!("section {} has no end", quoted(name))))
 }
 
-/// Reads the nodes; returns the vertex of each tag. Tags need be neither dense nor in order.
+/// Reads the nodes. Returns the vertex of each tag; tags may be sparse and in any order.
 fn read_nodes(scanner: &mut Scanner, version: Version, raw: &mut RawMesh) -> Result<HashMap<u64, u32>> {
     let mut nodes = HashMap::new();
     let add = |scanner: &Scanner, nodes: &mut HashMap<u64, u32>, tag: u64| -> Result<()> {
@@ -221,7 +221,7 @@ const TETRAHEDRON_OF_10: u64 = 11;
 const POINT: u64 = 15;
 const QUAD_OF_8: u64 = 16;
 
-/// How many nodes an element has; the corners come first.
+/// The number of nodes of an element type. The corners come first.
 fn node_count(scanner: &Scanner, kind: u64) -> Result<usize> {
     match kind {
         POINT => Ok(1),
@@ -238,7 +238,7 @@ fn node_count(scanner: &Scanner, kind: u64) -> Result<usize> {
     }
 }
 
-/// A tag of an entity, which may be negative.
+/// Skips an entity tag, which may be negative.
 fn entity_tag(scanner: &mut Scanner) -> Result<()> {
     scanner.number("entity tag").map(drop)
 }

@@ -1,4 +1,4 @@
-//! Mesh files.
+//! Mesh file formats.
 
 mod gmsh;
 mod obj;
@@ -10,18 +10,18 @@ mod vtk;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-use super::tidy::{LoadedMesh, NO_NODE, RawMesh};
+use super::repair::{LoadedMesh, NO_NODE, RawMesh};
 use crate::base::{above_zero, ensure};
 use crate::{Error, Result};
 use scanner::Scanner;
 
-/// How a mesh is written in a file.
+/// The format of a mesh file.
 ///
 /// ```
 /// use sinew::mesh::{MeshFormat, load};
 /// # let path = std::env::temp_dir().join(format!("sinew_mesh_format_{}.txt", std::process::id()));
 /// # std::fs::write(&path, "v 0 0 0\nv 100 0 0\nv 0 0 100\nf 1 3 2\n").expect("a file");
-/// // A file in millimetres, whose name says nothing about its format.
+/// A file in millimeters whose name has no known extension.
 /// let loaded = load(&path, MeshFormat::Obj, 0.001)?;
 /// assert_eq!(loaded.mesh.positions[1].x, 0.1);
 /// # std::fs::remove_file(&path).expect("the file");
@@ -29,38 +29,37 @@ use scanner::Scanner;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MeshFormat {
-    /// By the file's name: `.obj`, `.stl`, `.vtk`, `.msh`, `.node` or `.ele`, in any case.
+    /// The format is chosen by the extension: `.obj`, `.stl`, `.vtk`, `.msh`, `.node` or `.ele`, in any case.
     #[default]
     Auto,
-    /// Wavefront OBJ: `v` and `f`. Polygons become fans of triangles, lines and points are ignored.
+    /// Wavefront OBJ: `v` and `f`. Polygons become fans of triangles; lines and points are ignored.
     Obj,
-    /// STL, binary or ASCII. The normals are not read: the order of the corners says what is outside.
+    /// STL, binary or ASCII. Normals are ignored; the order of the corners defines the orientation.
     Stl,
     /// VTK legacy, versions 1 to 5, ASCII or binary: unstructured grids and polygonal data.
     Vtk,
     /// Gmsh, ASCII, versions 1, 2 and 4.1.
     Gmsh,
-    /// TetGen: a `.node` and an `.ele` file side by side, whichever of them is named.
+    /// TetGen: a `.node` and an `.ele` file in one folder, with the path of either.
     TetGen,
 }
 
-/// Reads a mesh and makes it tidy, as [`tidy`](super::tidy) describes. `scale` is what one unit of the file is in
-/// metres, above 0: 0.001 for a file in millimetres.
+/// Reads a mesh and repairs it, see [`tidy`](super::tidy). `scale` is the length of a file unit in meters, above 0:
+/// 0.001 for a file in millimeters.
 ///
-/// Triangles and tetrahedra are used, those of second order by their corners; other polygons become triangles, and the
-/// triangles keep the file's direction. Cells that are points or lines are ignored and counted. A file with other cells,
-/// such as hexahedra, is refused, since the mesh would have holes.
+/// Triangles and tetrahedra are read; second-order ones are reduced to their corners. Other polygons become triangles,
+/// and triangles keep the file's orientation. Cells that are points or lines are ignored and counted. A file with
+/// other cells, such as hexahedra, is an error, because the mesh would have holes.
 ///
-/// Errors: [`Error::InvalidArgument`] for a scale that is not above 0 and finite or takes a coordinate out of the range
-/// of `f32`, and for a name that does not tell the format; [`Error::Io`] for everything that is wrong with the file (it
-/// cannot be read, is cut short, is malformed or of another format, names a point it does not have, holds a coordinate
-/// that is not finite, or no triangles and tetrahedra at all), with its path and the line, in binary data the byte;
-/// [`Error::OutOfMemory`].
+/// Errors: [`Error::InvalidArgument`] if the scale is not finite and above 0, or makes a coordinate overflow `f32`, or
+/// the extension is unknown. [`Error::Io`] for all problems of the file: it cannot be read, is truncated, malformed or
+/// of another format, refers to a missing point, or has a coordinate that is not finite, or neither triangles nor
+/// tetrahedra. The message has the path and the line, or the byte offset in binary data. [`Error::OutOfMemory`].
 pub fn load(path: impl AsRef<Path>, format: MeshFormat, scale: f32) -> Result<LoadedMesh> {
     let path = path.as_ref();
     above_zero("scale", scale)?;
     let mut raw = match format {
-        MeshFormat::Auto => return load(path, format_of(path)?, scale),
+        MeshFormat::Auto => return load(path, format_from_extension(path)?, scale),
         MeshFormat::TetGen => tetgen::read(path)?,
         MeshFormat::Obj => obj::read(&mut Scanner::new(path, &read_file(path)?))?,
         MeshFormat::Stl => stl::read(&mut Scanner::new(path, &read_file(path)?))?,
@@ -88,8 +87,8 @@ pub fn load(path: impl AsRef<Path>, format: MeshFormat, scale: f32) -> Result<Lo
     Ok(loaded)
 }
 
-/// The format that a file's name tells.
-fn format_of(path: &Path) -> Result<MeshFormat> {
+/// The format of a file by its extension.
+fn format_from_extension(path: &Path) -> Result<MeshFormat> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     match extension.to_ascii_lowercase().as_str() {
         "obj" => Ok(MeshFormat::Obj),
@@ -104,7 +103,7 @@ fn format_of(path: &Path) -> Result<MeshFormat> {
     }
 }
 
-/// All bytes of a file.
+/// Reads all bytes of a file.
 fn read_file(path: &Path) -> Result<Vec<u8>> {
     let failed = |error: std::io::Error| match error.kind() {
         ErrorKind::OutOfMemory => Error::OutOfMemory,
@@ -120,7 +119,7 @@ fn read_file(path: &Path) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Refuses more vertices than can be named.
+/// Returns an error if `u32` cannot count the vertices.
 fn check_vertex_count(scanner: &Scanner, count: usize) -> Result<()> {
     if count > NO_NODE as usize {
         return Err(scanner.fail(format!("more than {NO_NODE} points")));

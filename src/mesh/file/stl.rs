@@ -12,17 +12,17 @@ const HEADER: usize = 80;
 const FACET: usize = 50;
 
 pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
-    // Binary headers may begin with "solid" as well, so the size decides.
+    // Binary headers can begin with "solid" too, so the size decides.
     let bytes = scanner.bytes();
-    let says_solid = scanner.peek_word().is_some_and(|word| is(word, "solid"));
-    if binary_size(bytes) == Some(bytes.len() as u64) || !says_solid {
+    let begins_with_solid = scanner.peek_word().is_some_and(|word| is(word, "solid"));
+    if binary_size(bytes) == Some(bytes.len() as u64) || !begins_with_solid {
         scanner.binary = true;
         return read_binary(scanner);
     }
     read_ascii(scanner)
 }
 
-/// How long a binary file of so many facets as this one says is.
+/// The size of a binary file with this file's number of facets.
 fn binary_size(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(HEADER..)?.first_chunk()?;
     let facets = FACET as u64 * u64::from(u32::from_le_bytes(*count));
@@ -73,7 +73,7 @@ fn read_ascii(scanner: &mut Scanner) -> Result<RawMesh> {
             }
             scanner.expect("normal")?;
             for _ in 0..3 {
-                // Some programs write "nan" for the normal of a collapsed facet.
+                // Some programs write "nan" for the normal of a degenerate facet.
                 scanner.word("a normal")?;
             }
             scanner.expect("outer")?;
@@ -91,7 +91,7 @@ fn read_ascii(scanner: &mut Scanner) -> Result<RawMesh> {
     Ok(raw)
 }
 
-/// Adds the triangle of the latest three vertices.
+/// Adds the triangle of the last three vertices.
 fn add_triangle(scanner: &Scanner, raw: &mut RawMesh) -> Result<()> {
     check_vertex_count(scanner, raw.vertices.len())?;
     let next = raw.vertices.len() as u32;

@@ -6,7 +6,7 @@ use super::scanner::Scanner;
 use super::{RawMesh, check_vertex_count, read_file};
 use crate::Result;
 
-/// Reads the pair of files of which `path` names either.
+/// Reads both files, given the path of either.
 pub fn read(path: &Path) -> Result<RawMesh> {
     let mut raw = RawMesh::default();
     let node_path = path.with_extension("node");
@@ -25,7 +25,7 @@ pub fn read(path: &Path) -> Result<RawMesh> {
     Ok(raw)
 }
 
-/// Reads the nodes; returns the number of the first, 0 or 1.
+/// Reads the nodes. Returns the index of the first, 0 or 1.
 fn read_nodes(scanner: &mut Scanner, raw: &mut RawMesh) -> Result<u64> {
     let count = scanner.count("points", 7)?;
     check_vertex_count(scanner, count)?;
@@ -85,7 +85,7 @@ fn read_elements(scanner: &mut Scanner, raw: &mut RawMesh, first: u64) -> Result
     expect_end(scanner)
 }
 
-/// Nothing but comments may follow: more would mean that the header counts wrongly.
+/// Returns an error if anything but comments follows: the header's count would be wrong.
 fn expect_end(scanner: &mut Scanner) -> Result<()> {
     match scanner.next_word() {
         None => Ok(()),

@@ -1,8 +1,8 @@
-//! VTK legacy: unstructured grids and polygonal data, ASCII and binary (big-endian).
+//! VTK legacy format: unstructured grids and polygonal data, ASCII and binary (big-endian).
 
 use glam::DVec3;
 
-use super::scanner::{Scanner, is, parse, shown};
+use super::scanner::{Scanner, is, parse, quoted};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
 use crate::base::memory;
@@ -18,7 +18,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
     let encoding = scanner.word("ASCII or BINARY")?;
     let binary = is(encoding, "BINARY");
     if !binary && !is(encoding, "ASCII") {
-        return Err(scanner.fail(format!("{} is neither ASCII nor BINARY", shown(encoding))));
+        return Err(scanner.fail(format!("{} is neither ASCII nor BINARY", quoted(encoding))));
     }
     scanner.expect("DATASET")?;
     let dataset = scanner.word("the kind of data")?;
@@ -26,7 +26,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
     if !grid && !is(dataset, "POLYDATA") {
         return Err(scanner.fail(format!(
             "{}: only UNSTRUCTURED_GRID and POLYDATA can be read",
-            shown(dataset)
+            quoted(dataset)
         )));
     }
     scanner.binary = binary;
@@ -35,7 +35,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
     let mut grid_cells = None;
     let mut grid_kinds = None;
     while let Some(section) = scanner.next_word() {
-        // Whatever belongs to points or cells comes after all of them.
+        // Point data and cell data follow all points and cells.
         if is(section, "POINT_DATA") || is(section, "CELL_DATA") {
             break;
         } else if is(section, "METADATA") {
@@ -48,13 +48,13 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
             grid_cells = Some(Connectivity::read(scanner, version, raw.vertices.len())?);
         } else if grid && is(section, "CELL_TYPES") && grid_kinds.is_none() {
             grid_kinds = Some(read_kinds(scanner)?);
-        } else if !grid && let Some(kind) = kind_of_section(section) {
+        } else if !grid && let Some(kind) = section_kind(section) {
             let cells = Connectivity::read(scanner, version, raw.vertices.len())?;
             for i in 0..cells.ends.len() {
                 add_cell(&mut raw, scanner, kind, cells.corners(i))?;
             }
         } else {
-            return Err(scanner.fail(format!("{} has no place here", shown(section))));
+            return Err(scanner.fail(format!("{} has no place here", quoted(section))));
         }
     }
     if grid {
@@ -71,7 +71,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
     Ok(raw)
 }
 
-// VTK's numbers for kinds of cells.
+// The cell types of VTK.
 const EMPTY: u64 = 0;
 const VERTEX: u64 = 1;
 const POLY_VERTEX: u64 = 2;
@@ -88,16 +88,16 @@ const QUADRATIC_TRIANGLE: u64 = 22;
 const QUADRATIC_QUAD: u64 = 23;
 const QUADRATIC_TETRAHEDRON: u64 = 24;
 
-/// What the cells of a section of polygonal data are.
-fn kind_of_section(section: &[u8]) -> Option<u64> {
+/// The cell type of a section of polygonal data.
+fn section_kind(section: &[u8]) -> Option<u64> {
     let kinds = [
         ("VERTICES", POLY_VERTEX),
         ("LINES", POLY_LINE),
         ("POLYGONS", POLYGON),
         ("TRIANGLE_STRIPS", TRIANGLE_STRIP),
     ];
-    let found = kinds.iter().find(|(name, _)| is(section, name));
-    found.map(|&(_, kind)| kind)
+    let matching = kinds.iter().find(|(name, _)| is(section, name));
+    matching.map(|&(_, kind)| kind)
 }
 
 fn add_cell(raw: &mut RawMesh, scanner: &Scanner, kind: u64, corners: &[u32]) -> Result<()> {
@@ -115,7 +115,7 @@ fn add_cell(raw: &mut RawMesh, scanner: &Scanner, kind: u64, corners: &[u32]) ->
         (TRIANGLE_STRIP, &[_, _, _, ..]) => {
             for (i, corners) in corners.windows(3).enumerate() {
                 let &[a, b, c] = corners else { continue };
-                // Every other triangle of a strip runs backwards.
+                // Every second triangle of a strip is reversed.
                 let triangle = if i % 2 == 0 { [a, b, c] } else { [b, a, c] };
                 memory::push(&mut raw.triangles, triangle)?;
             }
@@ -131,10 +131,10 @@ fn add_cell(raw: &mut RawMesh, scanner: &Scanner, kind: u64, corners: &[u32]) ->
     }
 }
 
-/// The points of all cells, one cell after another.
+/// The points of all cells, cell by cell.
 struct Connectivity {
     points: Vec<u32>,
-    /// Where each cell ends; the next begins there.
+    /// The end of each cell, where the next begins.
     ends: Vec<usize>,
 }
 
@@ -154,7 +154,7 @@ impl Connectivity {
             ends: Vec::new(),
         };
         if version < 5.0 {
-            // Each cell is the number of its points and these.
+            // Each cell consists of its number of points and the points.
             let count = scanner.count("cells", 4)?;
             let total = scanner.count("numbers of cells", 2)?;
             begin_data(scanner)?;
@@ -178,7 +178,7 @@ impl Connectivity {
             }
             return Ok(cells);
         }
-        // Where each cell begins, the end of the last, and then all points.
+        // The start of each cell, the end of the last one, and then all points.
         let offset_count = scanner.count("offsets", 2)?;
         let total = scanner.count("points of cells", 2)?;
         scanner.expect("OFFSETS")?;
@@ -232,13 +232,13 @@ fn read_kinds(scanner: &mut Scanner) -> Result<Vec<u64>> {
     memory::try_collected((0..count).map(|_| integer(scanner, DataType::I32)))
 }
 
-/// Moves over the text that describes an array: it ends with an empty line.
+/// Skips the description of an array, which ends with an empty line.
 fn skip_metadata(scanner: &mut Scanner) {
     scanner.line();
     while scanner.remaining() > 0 && !scanner.line().trim_ascii().is_empty() {}
 }
 
-/// Moves over the arrays of a field.
+/// Skips the arrays of a field.
 fn skip_field(scanner: &mut Scanner) -> Result<()> {
     scanner.word("the name of a field")?;
     let mut arrays = scanner.count("arrays", 8)?;
@@ -268,7 +268,7 @@ fn skip_field(scanner: &mut Scanner) -> Result<()> {
     Ok(())
 }
 
-/// What stands before data has been read; binary data begin on the next line.
+/// Ends the line before binary data.
 fn begin_data(scanner: &mut Scanner) -> Result<()> {
     if scanner.binary {
         scanner.end_line()?;
@@ -276,7 +276,7 @@ fn begin_data(scanner: &mut Scanner) -> Result<()> {
     Ok(())
 }
 
-/// How a binary value is written; always big-endian.
+/// The type of a value; binary values are big-endian.
 #[derive(Clone, Copy)]
 enum DataType {
     I8,
@@ -311,13 +311,13 @@ impl DataType {
             ("float", DataType::F32),
             ("double", DataType::F64),
         ];
-        let found = names.iter().find(|(name, _)| is(word, name));
-        found
+        let matching = names.iter().find(|(name, _)| is(word, name));
+        matching
             .map(|&(_, data_type)| data_type)
-            .ok_or_else(|| scanner.fail(format!("{} is no data type", shown(word))))
+            .ok_or_else(|| scanner.fail(format!("{} is no data type", quoted(word))))
     }
 
-    /// In bytes.
+    /// The size in bytes.
     fn size(self) -> usize {
         match self {
             DataType::I8 | DataType::U8 => 1,
@@ -328,7 +328,7 @@ impl DataType {
     }
 }
 
-/// A finite number.
+/// Reads a finite number.
 fn number(scanner: &mut Scanner, data_type: DataType) -> Result<f64> {
     if !scanner.binary {
         return scanner.number("coordinate");
@@ -349,13 +349,13 @@ fn number(scanner: &mut Scanner, data_type: DataType) -> Result<f64> {
     scanner.finite(number, "number")
 }
 
-/// A whole number that is not negative.
+/// Reads a nonnegative integer.
 fn integer(scanner: &mut Scanner, data_type: DataType) -> Result<u64> {
     if !scanner.binary {
         return scanner.integer("whole number");
     }
     let number = number(scanner, data_type)?;
-    // Indices are far below what f64 counts exactly.
+    // Indices are far below the limit of exact integers in f64.
     if number < 0.0 || number.fract() != 0.0 {
         return Err(scanner.fail(format!("{number} is no whole number")));
     }

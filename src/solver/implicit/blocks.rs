@@ -1,4 +1,4 @@
-//! The 3x3 blocks of the matrix on its diagonal, one for each node, and their inverses: the fine level of the preconditioner.
+//! Block-Jacobi level of the preconditioner: the 3x3 diagonal block of each node, and its inverse.
 
 use std::ops::Range;
 
@@ -11,32 +11,32 @@ use crate::soa::{TILE, Vectors, per_node, tile_count, tile_nodes};
 use crate::springs::{Springs, Tangent};
 use crate::threads::{Team, Tiles};
 
-/// A symmetric matrix as xx, yy, zz, yz, zx, xy.
+/// Entries of a symmetric matrix: xx, yy, zz, yz, zx, xy.
 pub(super) type Symmetric = [f32; 6];
 
-/// What rounding leaves, J; of the blocks alone, for coordinates that are off by 1 m, N/m.
+/// Energies due to rounding of coordinates, J. The fields of the blocks are per square of the coordinate error, N/m.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Noise {
-    /// The squared norm of inertia of what nodes are off.
+pub(super) struct RoundoffBound {
+    /// Squared inertia norm of the solution error.
     pub error: f64,
-    /// The product of the residual and what the preconditioner makes of it.
-    pub square: f64,
-    /// What the stored energy is off, which no inertia holds up.
+    /// Product of the residual and the preconditioned residual.
+    pub residual_sq: f64,
+    /// Error of the stored energy, without the effect of inertia.
     pub energy: f64,
 }
 
-saved! { Noise { error, square, energy } }
+saved! { RoundoffBound { error, residual_sq, energy } }
 
-/// What of the stiffness of rings stands on the diagonal, as a part of what it were if each tetrahedron kept its volume: about a node in
-/// the middle of even ones, of which some twenty have it in common.
-const PART_OF_RINGS: f32 = 0.05;
+/// Share of the ring stiffness on the diagonal, relative to tetrahedra that keep their volumes individually. It holds
+/// for an inner node of a regular mesh, which has about twenty tetrahedra.
+const RING_STIFFNESS_SHARE: f32 = 0.05;
 
-/// The blocks of a body.
+/// Diagonal blocks of a body.
 #[derive(Debug)]
 pub(super) struct Blocks {
-    /// The springs' part of each node.
+    /// Stiffness block of each node.
     stiffness: Vec<Symmetric>,
-    /// The inverses along each entry; 0 for what is pinned.
+    /// Inverse blocks, one array per entry; 0 for pinned nodes.
     inverse: [Vec<f32>; 6],
 }
 
@@ -53,8 +53,8 @@ impl Blocks {
         })
     }
 
-    /// Takes in forces at these positions.
-    pub fn gather(&mut self, forces: &Forces, positions: &Vectors, tangent: Tangent, team: &Team) {
+    /// Assembles the stiffness at these positions.
+    pub fn assemble(&mut self, forces: &Forces, positions: &Vectors, tangent: Tangent, team: &Team) {
         let node_count = positions.len();
         let written = Tiles::new(&mut self.stiffness, TILE);
         team.pass(tile_count(node_count), written, |tile, blocks| {
@@ -62,29 +62,30 @@ impl Blocks {
                 *block = block_of(node, &*forces.springs, positions, tangent);
             }
         });
-        forces.show_deformed(positions, PART_OF_RINGS, &mut |corners, gradients, deformed| {
+        forces.visit_deformed(positions, RING_STIFFNESS_SHARE, &mut |corners, gradients, deformed| {
             for (node, &gradient) in corners.into_iter().zip(gradients) {
                 self.add(node, deformed.clamped_stiffness(gradient, gradient));
             }
         });
-        forces.show_term_blocks(positions, &mut |nodes, blocks| {
-            for (place, &node) in nodes.iter().enumerate() {
-                self.add(node, blocks[place][place]);
+        forces.visit_term_blocks(positions, &mut |nodes, blocks| {
+            for (index, &node) in nodes.iter().enumerate() {
+                self.add(node, blocks[index][index]);
             }
         });
-        forces.show_cavity_diagonal(positions, &mut |node, block| self.add(node as u32, block));
+        forces.visit_cavity_diagonal(positions, &mut |node, block| self.add(node as u32, block));
     }
 
     fn add(&mut self, node: u32, matrix: DMat3) {
         let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
         let entries = [x.x, y.y, z.z, z.y, x.z, y.x];
-        for (entry, more) in self.stiffness[node as usize].iter_mut().zip(entries) {
-            *entry += more as f32;
+        for (entry, added) in self.stiffness[node as usize].iter_mut().zip(entries) {
+            *entry += added as f32;
         }
     }
 
-    /// Leaves a node that is held along some axes no stiffness along those: its inverse keeps the others apart from them.
-    pub fn hold(&mut self, node: usize, axes: BVec3) {
+    /// Removes the stiffness along the held axes of a partially held node, so that its inverse does not couple them
+    /// with the others.
+    pub fn decouple_axes(&mut self, node: usize, axes: BVec3) {
         let BVec3 { x, y, z } = axes;
         let held = [x, y, z, y | z, z | x, x | y];
         for (entry, held) in self.stiffness[node].iter_mut().zip(held) {
@@ -94,57 +95,57 @@ impl Blocks {
         }
     }
 
-    /// All that it was made of.
+    /// Hashes the data that the inverses are computed from.
     pub fn hash(&self, hasher: &mut StateHasher) {
         self.stiffness.iter().for_each(|block| hasher.write_floats(block));
     }
 
-    /// Makes the inverses, with this inertia of each node, N/m; 0: it is pinned.
+    /// Computes the inverses with this inertia of each node, N/m. An inertia of 0 marks a pinned node.
     pub fn invert(&mut self, inertia: &[f32], team: &Team) {
         let stiffness = &self.stiffness;
         let count = stiffness.len();
         let written = self.inverse.each_mut().map(|entry| Tiles::new(entry, TILE));
         team.pass(tile_count(count), written, |tile, mut inverse| {
-            for (place, node) in tile_nodes(tile, count).enumerate() {
+            for (index, node) in tile_nodes(tile, count).enumerate() {
                 let entries = inverse_of(stiffness[node], inertia[node]);
                 for (to, entry) in inverse.iter_mut().zip(entries) {
-                    to[place] = entry;
+                    to[index] = entry;
                 }
             }
         });
     }
 
-    /// Makes the inverse of one node's block anew, with so much more stiffness.
-    pub fn invert_one(&mut self, node: usize, inertia: f32, more: Symmetric) {
+    /// Recomputes the inverse of one node's block with added stiffness.
+    pub fn invert_one(&mut self, node: usize, inertia: f32, added: Symmetric) {
         let mut block = self.stiffness[node];
-        for (entry, more) in block.iter_mut().zip(more) {
-            *entry += more;
+        for (entry, added) in block.iter_mut().zip(added) {
+            *entry += added;
         }
         for (to, entry) in self.inverse.iter_mut().zip(inverse_of(block, inertia)) {
             to[node] = entry;
         }
     }
 
-    /// What rounding does to the residual, for each square of what coordinates are off.
-    pub fn noise(&self, inertia: &[f32]) -> Noise {
-        let mut noise = Noise::default();
+    /// Returns the effect of rounding on the residual, per square of the coordinate error.
+    pub fn roundoff(&self, inertia: &[f32]) -> RoundoffBound {
+        let mut roundoff = RoundoffBound::default();
         for (block, &inertia) in self.stiffness.iter().zip(inertia) {
             let stiffness = f64::from(block[0] + block[1] + block[2]) / 3.0;
             let inertia = f64::from(inertia);
             if inertia > 0.0 {
-                // Where springs are weak against inertia they hardly move a node.
+                // Springs that are weak compared to inertia hardly move a node.
                 let share = stiffness / (stiffness + inertia);
-                noise.error += inertia * share * share;
-                noise.square += stiffness * share;
-                noise.energy += stiffness;
+                roundoff.error += inertia * share * share;
+                roundoff.residual_sq += stiffness * share;
+                roundoff.energy += stiffness;
             }
         }
-        noise
+        roundoff
     }
 
-    /// The entries of the inverses of some nodes.
+    /// Entries of the inverses of these nodes.
     #[inline(always)]
-    pub fn of(&self, nodes: Range<usize>) -> [&[f32]; 6] {
+    pub fn inverse_slices(&self, nodes: Range<usize>) -> [&[f32]; 6] {
         self.inverse.each_ref().map(|entry| &entry[nodes.clone()])
     }
 }
@@ -153,8 +154,8 @@ fn block_of(node: usize, springs: &dyn Springs, positions: &Vectors, tangent: Ta
     let position = positions.get(node);
     let mut block = [0.0; 6];
     springs.visit(node, &mut |link| {
-        let way = positions.get(link.neighbour as usize) - position;
-        let (n, matrix) = tangent.of(node, &link, way);
+        let edge = positions.get(link.neighbor as usize) - position;
+        let (n, matrix) = tangent.direction_and_matrix(node, &link, edge);
         let scaled: Vec3 = n * matrix.x;
         block[0] += scaled.x * n.x + matrix.y;
         block[1] += scaled.y * n.y + matrix.y;
@@ -166,13 +167,13 @@ fn block_of(node: usize, springs: &dyn Springs, positions: &Vectors, tangent: Ta
     block
 }
 
-/// The inverse of a block with this inertia: in `f64`, because it may be nearly singular.
+/// Returns the inverse of a block with this inertia. It is computed in `f64` because the block may be nearly singular.
 fn inverse_of(block: Symmetric, inertia: f32) -> Symmetric {
     if inertia == 0.0 {
         return [0.0; 6];
     }
     let [xx, yy, zz, yz, zx, xy] = block.map(f64::from);
-    // What rounds to a singular matrix is kept from being one.
+    // Regularizes matrices that are singular due to rounding.
     let inertia = f64::from(inertia) + 1e-7 * (xx + yy + zz);
     let [xx, yy, zz] = [xx, yy, zz].map(|entry| entry + inertia);
     let minors = [

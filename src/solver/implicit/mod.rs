@@ -1,233 +1,235 @@
-//! IMPLICIT: one solved equation per step, stable at any step.
+//! IMPLICIT: solves one nonlinear equation per step and is stable at any step length.
 //!
-//! A step of length h goes from the positions x and velocities v to those at its end, where
-//! `v1 = w + t a(x1, v1)` and `x1 = x + y + s`, with `s = t² a`. For implicit Euler (order 1) t = h, w = v, y = h v. For the second
-//! backward difference formula (order 2; Curtiss, Hirschfelder 1952) with steps h after h' and q = h/h': t = h (1 + q)/(1 + 2q),
-//! w = v + c (v - v'), y = c (x - x') + t w, c = q²/(1 + 2q). Both are `M s / t² = f(x + y + s)`, and differ in y, w and t alone.
+//! A step of length h advances the positions x and velocities v: `v1 = w + t a(x1, v1)` and `x1 = x + y + s`, with
+//! `s = t² a`. Implicit Euler (order 1) has t = h, w = v and y = h v. The second backward difference formula (order 2;
+//! Curtiss, Hirschfelder 1952) uses the step before, of length h', and q = h/h':
+//! `t = h (1 + q)/(1 + 2q)`, `w = v + c (v - v')`, `y = c (x - x') + t w`, `c = q²/(1 + 2q)`.
+//! Both solve `M s / t² = f(x + y + s)`. They differ only in y, w and t.
 //!
-//! The unknown is s, what forces do within the step, not the position: the velocity is w + s/t, and nothing that is small is
-//! found as a difference of what is large.
+//! The unknown is s, the displacement that forces cause in the step, not the position. The velocity is w + s/t, so no
+//! small quantity is computed as a difference of large ones.
 
 mod blocks;
-mod coarse;
+mod coarse_space;
+mod conjugate_gradient;
 mod contact;
+mod contact_forces;
 mod energy;
-mod estimate;
-mod gradient;
+mod error_bound;
 mod iterations;
-mod loops;
-mod parts;
-mod pressed;
-mod rigid;
+mod node_kernels;
+mod rigid_modes;
 mod solution;
 mod step;
+mod subdivision;
 
 pub(crate) use solution::Solution;
 
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{Saved, Writer, saved};
 use crate::contact::Contacts;
-use crate::def::{BodyDefinition, MOST_ITERATIONS, Solver, SolverReport};
-use crate::forces::{Changes, Forces};
-use crate::geometry::Bounds;
+use crate::def::{BodyDefinition, MAX_ITERATIONS, Solver, SolverReport};
+use crate::forces::{ForceChanges, Forces};
+use crate::geometry::Aabb;
 use crate::soa::{PerNode, Vectors, tile_count};
 use crate::solver::System;
 use crate::solver::changed::Cached;
 use crate::solver::integrator::{CoupledBody, CoupledStep, IMPLICIT, Integrator};
-use crate::solver::needs::Need;
 use crate::solver::newton::Newton;
 use crate::solver::step_request::{StepRequest, StepStart};
-use crate::solver::verlet::{Stepped, TooLong, begin};
+use crate::solver::substep_count::StepPlan;
+use crate::solver::verlet::{Stepped, SubstepTooLong, begin};
 use crate::threads::Team;
-use blocks::{Blocks, Noise};
-use coarse::Coarse;
-use estimate::Spectrum;
-use gradient::Partial;
-use parts::{parts_near, take_part};
-use pressed::Pressed;
+use blocks::{Blocks, RoundoffBound};
+use coarse_space::CoarseSpace;
+use conjugate_gradient::PartialSums;
+use contact_forces::ContactForces;
+use error_bound::RitzBounds;
 use solution::History;
-use step::Formula;
+use step::StepFormula;
+use subdivision::{contact_substeps, solve_substep};
 
-/// The energy that a solved equation has gained is taken off where there are so many, rather than that the step is taken in more.
-const SLOWED_FROM: u32 = 256;
+/// From this many substeps on, an energy gain is removed from the velocities instead of subdividing the step further.
+const DAMP_FROM_SUBSTEPS: u32 = 256;
 
-/// What rounding makes of a coordinate, as a fraction of the body's extent.
+/// Rounding error of a coordinate, as a fraction of the body's extent.
 const ROUNDING: f64 = 1e-7;
 
-/// How a substep ended.
+/// Result of a substep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum End {
-    Fine,
-    /// With more energy than was put in.
-    Gained,
-    /// So near a tool that it is to be taken in shorter parts.
-    Near,
+enum SubstepOutcome {
+    Accepted,
+    /// The energy grew by more than the external work.
+    EnergyGained,
+    /// A tool is so near that the step needs shorter substeps.
+    NearContact,
     NotFinite,
 }
 
-/// What is known of the preconditioner from the steps before.
+/// Statistics of the preconditioner from previous steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Experience {
-    /// The smallest eigenvalue of the preconditioned matrix.
+struct PreconditionerStats {
+    /// Smallest eigenvalue of the preconditioned matrix.
     smallest: f64,
-    /// Products that the first solution with the preconditioner took.
-    fresh_products: u32,
-    /// Whether it has become so much worse that it is to be made again.
-    worn: bool,
+    /// Products of the first solve with the current preconditioner.
+    initial_products: u32,
+    /// True if the preconditioner has degraded so far that it must be rebuilt.
+    is_worn: bool,
 }
 
-saved! { Experience { smallest, fresh_products, worn } }
+saved! { PreconditionerStats { smallest, initial_products, is_worn } }
 
-/// What a body that is moved implicitly has beside its state.
+/// Data that an implicitly integrated body needs beside its state.
 #[derive(Debug)]
 pub(crate) struct Implicit {
-    /// 1 or 2.
+    /// Order of the formula, 1 or 2.
     order: u32,
-    /// The most products with the matrix for each equation asked for, and what is left of it for the step in progress.
+    /// Maximum number of matrix-vector products per requested equation, and the number left for the step in progress.
     budget: u32,
-    left: u32,
-    /// The most products in the step in progress, whatever the definition allows.
-    allowed: u32,
-    /// The part of a step's correction that may be missing.
+    budget_left: u32,
+    /// Limit of products for the step in progress, set by the caller of the step.
+    work_limit: u32,
+    /// Relative error allowed in the solution of a step.
     accuracy: f32,
     solution: Solution,
-    /// How the last equation that was solved makes velocities of what forces do.
-    taken: Formula,
-    /// s: what forces do within the step, m.
-    pushes: Vectors,
-    /// Where there are tools: how fast nodes go on their way, m/s.
-    means: Option<Vectors>,
-    // What follows, up to the spectrum, has room for no node where the equations are solved exactly.
-    /// What is added to it by one solution of the linearised equation, m.
+    /// Formula of the last solved equation.
+    last_formula: StepFormula,
+    /// s, the displacement that forces cause in the step, m.
+    force_displacements: Vectors,
+    /// Mean velocities over the substep, for contact with tools, m/s.
+    mean_velocities: Option<Vectors>,
+    // The fields from here to `ritz` have no nodes if the solver is NEWTON.
+    /// Correction of s from one linear solve, m.
     corrections: Vectors,
     residuals: Vectors,
-    searches: Vectors,
-    /// What forces make of the search direction: lent by the body while its equation is solved.
-    changes: Changes,
-    /// The matrix times the search direction, and what the preconditioner makes of the residual.
+    search_directions: Vectors,
+    /// Scratch data for force differences, borrowed from the body during a solve.
+    changes: ForceChanges,
+    /// The matrix times the search direction, and the preconditioned residual.
     products: Vectors,
     preconditioned: Vectors,
-    /// N/m; 0 for what is pinned.
+    /// M / t² and damping per node, N/m. It is 0 for a pinned node.
     inertia: Vec<f32>,
-    /// The sum of all.
-    all_inertia: f64,
-    /// For coordinates that are off by 1 m.
-    noise: Noise,
-    /// What `inertia` was made for: t, s; 0: nothing.
-    prepared: f32,
+    /// Sum of `inertia`.
+    total_inertia: f64,
+    /// Roundoff bound for coordinate errors of 1 m.
+    roundoff: RoundoffBound,
+    /// The t for which `inertia` was computed, s. It is 0 if `inertia` is out of date.
+    inertia_dt: f32,
     blocks: Blocks,
-    coarse: Coarse,
-    /// Nodes that tools press on, and what they take of the coarse level otherwise.
-    stiffened: Vec<(u32, [f32; 4])>,
-    /// The loads of the clusters from each tile.
+    coarse: CoarseSpace,
+    /// Nodes in contact with tools, and their regular values of the coarse functions.
+    stiffened_nodes: Vec<(u32, [f32; 4])>,
+    /// Loads on the clusters from each tile.
     loads: Vec<f32>,
-    partials: Vec<Partial>,
-    spectrum: Spectrum,
-    /// Whether the preconditioner is to be made again, from the current state: then what it is now means nothing.
-    stale: bool,
-    /// Whether that was so before the step in progress.
+    tile_sums: Vec<PartialSums>,
+    ritz: RitzBounds,
+    /// True if the preconditioner is out of date and must be rebuilt before use.
+    is_stale: bool,
+    /// `is_stale` before the step in progress.
     was_stale: bool,
-    /// That of the step in progress, and that of the current state.
-    memory: Experience,
-    kept: Experience,
-    /// Where the equations are solved exactly.
+    /// Statistics of the step in progress, and of the current state.
+    preconditioner_stats: PreconditionerStats,
+    committed_stats: PreconditionerStats,
+    /// The NEWTON solver, if the body uses it.
     newton: Option<Box<Newton>>,
-    /// The same with room for a cut that is not made yet.
-    roomier: Option<Box<Newton>>,
-    /// How the step in progress is taken, and how that was which led to the current state.
+    /// A NEWTON solver with capacity for a pending cut.
+    newton_after_cut: Option<Box<Newton>>,
+    /// Report of the step in progress, and of the last committed step.
     report: SolverReport,
-    told: SolverReport,
+    last_report: SolverReport,
 }
 
 saved! { Implicit {
-    order, budget, left, accuracy, solution, taken, pushes, means, corrections, residuals, searches, products,
-    preconditioned, inertia, all_inertia, noise, prepared, blocks, coarse, stiffened, loads, partials, spectrum, stale,
-    was_stale, memory, kept, newton, report, told } leaves { allowed: u32::MAX, changes: Changes::default(), roomier: None,
-} where Self::ends }
+    order, budget, budget_left, accuracy, solution, last_formula, force_displacements, mean_velocities, corrections,
+    residuals, search_directions, products, preconditioned, inertia, total_inertia, roundoff, inertia_dt, blocks,
+    coarse, stiffened_nodes, loads, tile_sums, ritz, is_stale, was_stale, preconditioner_stats, committed_stats, newton, report,
+    last_report } leaves { work_limit: u32::MAX, changes: ForceChanges::default(), newton_after_cut: None,
+} where Self::has_valid_budget }
 
-impl Experience {
+impl PreconditionerStats {
     const NONE: Self = Self {
         smallest: 1.0,
-        fresh_products: 0,
-        worn: false,
+        initial_products: 0,
+        is_worn: false,
     };
 }
 
 impl Implicit {
-    /// Whether a step of it ends as soon as one that a caller may ask for.
-    fn ends(&self) -> bool {
-        self.budget <= MOST_ITERATIONS
+    /// True if the iteration limit is one that a definition may have.
+    fn has_valid_budget(&self) -> bool {
+        self.budget <= MAX_ITERATIONS
     }
 
-    /// For nodes at these positions that these forces move; what is 0 in the definition is as by default.
+    /// Creates the solver for nodes at these positions. A definition value of 0 selects the default.
     pub fn new(definition: &BodyDefinition, positions: &Vectors, forces: &mut Forces) -> Result<Self> {
         let node_count = positions.len();
         let is_exact = definition.solver == Solver::Newton;
         let (accuracy, budget) = if is_exact {
-            // As good as nothing, and far above what rounding makes; for bodies of a million nodes.
+            // Tight, but far above rounding. The budget suffices for bodies of a million nodes.
             (1e-6, 100_000)
         } else {
-            // A fraction of what a step of a length worth taking is off by itself, and more products than a body can need that is to be
-            // stepped while somebody waits.
+            // A fraction of the discretization error of a useful step. The budget exceeds what any interactive body
+            // needs.
             (0.01, 1000)
         };
-        let nothing = Vectors::zeros(0)?;
-        let solved = if is_exact { &nothing } else { positions };
+        let no_nodes = Vectors::zeros(0)?;
+        let solved = if is_exact { &no_nodes } else { positions };
         let newton = is_exact.then(|| memory::boxed(Newton::new(forces)?)).transpose()?;
         if !is_exact {
             forces.make_room_for_changes()?;
         }
         let solved_count = solved.len();
         let vectors = || Vectors::zeros(solved_count);
-        let coarse = Coarse::new(solved)?;
+        let coarse = CoarseSpace::new(solved)?;
         let or = |given: u32, default| if given == 0 { default } else { given };
         let given = definition.accuracy;
         Ok(Self {
             order: or(definition.order, 2),
             budget: or(definition.iterations, budget),
-            left: 0,
-            allowed: u32::MAX,
+            budget_left: 0,
+            work_limit: u32::MAX,
             accuracy: if given > 0.0 { given } else { accuracy },
             solution: Solution::new(node_count, solved_count)?,
-            taken: Formula::new(1, 0.0, 0.0),
-            pushes: Vectors::zeros(node_count)?,
-            means: None,
+            last_formula: StepFormula::new(1, 0.0, 0.0),
+            force_displacements: Vectors::zeros(node_count)?,
+            mean_velocities: None,
             corrections: vectors()?,
             residuals: vectors()?,
-            searches: vectors()?,
-            changes: Changes::default(),
+            search_directions: vectors()?,
+            changes: ForceChanges::default(),
             products: vectors()?,
             preconditioned: vectors()?,
             inertia: memory::filled(0.0, solved_count)?,
-            all_inertia: 0.0,
-            noise: Noise::default(),
-            prepared: 0.0,
+            total_inertia: 0.0,
+            roundoff: RoundoffBound::default(),
+            inertia_dt: 0.0,
             blocks: Blocks::new(solved_count)?,
             loads: memory::filled(0.0, coarse.size() * tile_count(solved_count))?,
             coarse,
-            stiffened: Vec::new(),
-            partials: memory::filled(Partial::default(), tile_count(solved_count))?,
-            spectrum: Spectrum::new(solved_count)?,
-            stale: true,
+            stiffened_nodes: Vec::new(),
+            tile_sums: memory::filled(PartialSums::default(), tile_count(solved_count))?,
+            ritz: RitzBounds::new(solved_count)?,
+            is_stale: true,
             was_stale: true,
-            memory: Experience::NONE,
-            kept: Experience::NONE,
+            preconditioner_stats: PreconditionerStats::NONE,
+            committed_stats: PreconditionerStats::NONE,
             newton,
-            roomier: None,
+            newton_after_cut: None,
             report: SolverReport::BEFORE,
-            told: SolverReport::default(),
+            last_report: SolverReport::default(),
         })
     }
 
-    /// What there is for each node: beside histories, pushes and means where its equation is solved by conjugate gradients.
+    /// Returns all arrays with one entry per node. NEWTON has only histories, force displacements and mean velocities.
     fn per_node_mut(&mut self) -> impl Iterator<Item = &mut dyn PerNode> {
         let is_exact = self.newton.is_some();
         let all: [&mut dyn PerNode; 10] = [
-            &mut self.pushes,
-            &mut self.means,
+            &mut self.force_displacements,
+            &mut self.mean_velocities,
             &mut self.corrections,
             &mut self.residuals,
-            &mut self.searches,
+            &mut self.search_directions,
             &mut self.products,
             &mut self.preconditioned,
             &mut self.inertia,
@@ -240,74 +242,74 @@ impl Implicit {
         histories.chain(all.into_iter().take(if is_exact { 2 } else { 10 }))
     }
 
-    /// Begins a step anew, from the current state.
-    fn begin_anew(&mut self) {
+    /// Restarts the step from the current state.
+    fn restart(&mut self) {
         (self.report.error, self.report.has_converged) = (0.0, true);
-        self.memory = self.kept;
-        self.spectrum.assume(self.kept.smallest);
+        self.preconditioner_stats = self.committed_stats;
+        self.ritz.assume(self.committed_stats.smallest);
     }
 
-    /// What rounding leaves in a body that reaches so far, m.
-    fn noise(&self, extent: f32) -> Noise {
+    /// Returns the roundoff bound for a body of this extent, m.
+    fn roundoff(&self, extent: f32) -> RoundoffBound {
         let square = (ROUNDING * f64::from(extent)).powi(2);
-        Noise {
-            error: square * self.noise.error,
-            square: square * self.noise.square,
-            energy: square * self.noise.energy,
+        RoundoffBound {
+            error: square * self.roundoff.error,
+            residual_sq: square * self.roundoff.residual_sq,
+            energy: square * self.roundoff.energy,
         }
     }
 
-    /// Notes how many products a solution took.
-    fn wear(&mut self, products: u32) {
-        let fresh = &mut self.memory.fresh_products;
-        if *fresh == 0 {
-            *fresh = products;
-        } else if products > 2 * *fresh + 8 {
-            self.memory.worn = true;
+    /// Records the number of products of a solve and detects a degraded preconditioner.
+    fn record_products(&mut self, products: u32) {
+        let initial = &mut self.preconditioner_stats.initial_products;
+        if *initial == 0 {
+            *initial = products;
+        } else if products > 2 * *initial + 8 {
+            self.preconditioner_stats.is_worn = true;
         }
     }
 }
 
 impl Integrator for Implicit {
-    fn step(&mut self, body: &mut System, request: &StepRequest, again: Option<StepStart>, team: &Team) -> Stepped {
-        self.allowed = request.work;
-        let start = again.unwrap_or_else(|| StepStart::new(body.carry, request.substeps.max(1)));
+    fn step(&mut self, body: &mut System, request: &StepRequest, restart: Option<StepStart>, team: &Team) -> Stepped {
+        self.work_limit = request.work;
+        let start = restart.unwrap_or_else(|| StepStart::new(body.carry, request.substeps.max(1)));
         self.run(body, request, start, team)
     }
 
-    fn need(&mut self, body: &mut System, request: &StepRequest, _team: &Team) -> Need {
-        Need {
+    fn plan_step(&mut self, body: &mut System, request: &StepRequest, _team: &Team) -> StepPlan {
+        StepPlan {
             start: body.carry,
-            substeps: parts_near(request.dt).max(request.substeps),
-            masses_for: 0.0,
+            substeps: contact_substeps(request.dt).max(request.substeps),
+            scaling_substep: 0.0,
         }
     }
 
     fn begin(&mut self, body: &mut System, _walk: &mut CoupledBody, step: &CoupledStep) -> Stepped<()> {
-        begin(body, &step.request.of(body));
+        begin(body, &step.request.for_body(body));
         self.report = SolverReport::BEFORE;
-        self.allowed = step.request.work;
-        self.left = self.budget.min(self.allowed);
-        self.grant(step.substeps);
-        self.begin_anew();
+        self.work_limit = step.request.work;
+        self.budget_left = self.budget.min(self.work_limit);
+        self.reserve_budget(step.substeps);
+        self.restart();
         Ok(())
     }
 
     fn substep(&mut self, body: &mut System, _walk: &mut CoupledBody, step: &CoupledStep, index: u32) -> Stepped<()> {
-        let request = &step.request.of(body);
-        // There may be no more substeps to try it in.
-        let is_last_resort = step.is_last || step.substeps >= SLOWED_FROM;
-        let part_of = [index, step.substeps];
-        match take_part(body, self, request, part_of, [is_last_resort, false], step.team) {
-            End::Fine => Ok(()),
-            _ => Err(TooLong {
+        let request = &step.request.for_body(body);
+        // The step may have no more substeps to try.
+        let is_last_resort = step.is_last || step.substeps >= DAMP_FROM_SUBSTEPS;
+        let index_and_count = [index, step.substeps];
+        match solve_substep(body, self, request, index_and_count, [is_last_resort, false], step.team) {
+            SubstepOutcome::Accepted => Ok(()),
+            _ => Err(SubstepTooLong {
                 stable_substep: 0.25 * step.substep(),
             }),
         }
     }
 
-    fn end(&mut self, body: &mut System, _walk: &mut CoupledBody, _step: &CoupledStep, _given: Bounds) -> Stepped<()> {
-        self.solution.settle_deflection();
+    fn end(&mut self, body: &mut System, _walk: &mut CoupledBody, _step: &CoupledStep, _given: Aabb) -> Stepped<()> {
+        self.solution.restart_after_deflection();
         body.state.advance();
         Ok(())
     }
@@ -320,105 +322,109 @@ impl Integrator for Implicit {
         Some(&mut self.solution)
     }
 
-    fn put_back(&mut self) {
-        self.stale = self.was_stale;
+    fn rollback(&mut self) {
+        self.is_stale = self.was_stale;
     }
 
     fn commit(&mut self) {
-        self.solution.settled = 1 - self.solution.settled;
-        self.told = self.report;
-        self.kept = self.memory;
-        self.kept.smallest = self.spectrum.known_smallest();
-        self.stale |= self.kept.worn;
-        self.was_stale = self.stale;
+        self.solution.current_index = 1 - self.solution.current_index;
+        self.last_report = self.report;
+        self.committed_stats = self.preconditioner_stats;
+        self.committed_stats.smallest = self.ritz.last_smallest();
+        self.is_stale |= self.committed_stats.is_worn;
+        self.was_stale = self.is_stale;
     }
 
-    fn forget(&mut self, known: Cached) {
+    fn forget(&mut self, cached: Cached) {
         let history = self.solution.current_mut();
-        match known {
+        match cached {
             Cached::Energy | Cached::EquationEnergy => history.energy = None,
-            Cached::Matrix => (self.stale, self.was_stale) = (true, true),
+            Cached::Preconditioner => (self.is_stale, self.was_stale) = (true, true),
             Cached::History => {
                 (history.step, history.energy) = (0.0, None);
                 history.remainders.clear();
-                history.pressed.iter_mut().for_each(Pressed::forget);
+                history.contact_forces.iter_mut().for_each(ContactForces::forget);
                 if let Some(newton) = &mut self.newton {
-                    newton.forget_remainders(self.solution.settled);
+                    newton.forget_remainders(self.solution.current_index);
                 }
             }
             _ => {}
         }
     }
 
-    fn told(&self) -> SolverReport {
-        self.told
+    fn last_report(&self) -> SolverReport {
+        self.last_report
     }
 
     fn hash(&self, hasher: &mut StateHasher) {
         let history = self.solution.current();
         let History {
-            ways,
-            gains,
+            displacements,
+            velocity_changes,
             remainders,
             step,
             energy,
             credit,
-            pressed: _,
+            contact_forces: _,
         } = history;
-        for vectors in [ways, gains, remainders] {
+        for vectors in [displacements, velocity_changes, remainders] {
             hasher.write_vectors(vectors.iter());
         }
         hasher.write_floats(&[*step, self.accuracy]);
-        let [energy, size] = energy.map_or([f64::NAN; 2], |total| [total.energy, total.size]);
-        hasher.write_doubles(&[energy, size, *credit]);
-        hasher.write_vectors(history.pressing().into_iter().flat_map(Vectors::iter));
+        let [energy, magnitude] = energy.map_or([f64::NAN; 2], |total| [total.energy, total.magnitude]);
+        hasher.write_doubles(&[energy, magnitude, *credit]);
+        hasher.write_vectors(history.active_contact_forces().into_iter().flat_map(Vectors::iter));
         hasher.write_u64(u64::from(self.order) << 32 | u64::from(self.budget));
         if let Some(newton) = &self.newton {
-            newton.hash(self.solution.settled, hasher);
+            newton.hash(self.solution.current_index, hasher);
         }
-        hasher.write_u64(u64::from(self.stale));
-        if !self.stale {
-            hasher.write_u64(self.kept.smallest.to_bits());
-            hasher.write_u64(u64::from(self.kept.fresh_products));
+        hasher.write_u64(u64::from(self.is_stale));
+        if !self.is_stale {
+            hasher.write_u64(self.committed_stats.smallest.to_bits());
+            hasher.write_u64(u64::from(self.committed_stats.initial_products));
             self.blocks.hash(hasher);
             self.coarse.hash(hasher);
         }
     }
 
     fn save(&self, to: &mut Writer) {
-        to.put(&[IMPLICIT]);
+        to.write(&[IMPLICIT]);
         Saved::save(self, to);
     }
 
     fn reserve_springs(&mut self, count: usize) -> Result<()> {
-        self.newton.as_mut().map_or(Ok(()), |newton| newton.make_room(count))
+        self.newton.as_mut().map_or(Ok(()), |newton| newton.reserve(count))
     }
 
     fn reserve_contacts(&mut self, contacts: &mut Contacts) -> Result<()> {
         let count = contacts.reserve_holds()?;
-        if self.means.is_none() {
-            self.means = Some(Vectors::zeros(self.pushes.len())?);
+        if self.mean_velocities.is_none() {
+            self.mean_velocities = Some(Vectors::zeros(self.force_displacements.len())?);
         }
-        // Up to four nodes move what a contact presses.
+        // A contact acts on up to four nodes.
         let nodes = (4 * count).min(self.inertia.len());
-        Ok(self.stiffened.try_reserve(nodes)?)
+        Ok(self.stiffened_nodes.try_reserve(nodes)?)
     }
 
     fn prepare_cut(&mut self, forces: &Forces, more: usize) -> Result<()> {
-        let roomier = |newton: &Newton| memory::boxed(newton.roomier(forces, more)?);
-        self.roomier = self.newton.as_deref().map(roomier).transpose()?;
+        let enlarge = |newton: &Newton| memory::boxed(newton.enlarged(forces, more)?);
+        self.newton_after_cut = self.newton.as_deref().map(enlarge).transpose()?;
         Ok(())
     }
 
     fn copy_motion(&mut self, source: usize, node: usize) {
         let history = self.solution.current_mut();
-        for vectors in [&mut history.ways, &mut history.gains, &mut history.remainders] {
+        for vectors in [
+            &mut history.displacements,
+            &mut history.velocity_changes,
+            &mut history.remainders,
+        ] {
             if node < vectors.len() {
                 vectors.set(node, vectors.get(source));
             }
         }
         if let Some(newton) = &mut self.newton {
-            newton.copy_remainder(self.solution.settled, source, node);
+            newton.copy_remainder(self.solution.current_index, source, node);
         }
     }
 }
@@ -429,21 +435,21 @@ impl PerNode for Implicit {
         if self.newton.is_some() {
             return Ok(());
         }
-        self.spectrum.reserve(count)?;
+        self.ritz.reserve(count)?;
         memory::reserve(&mut self.loads, self.coarse.size() * tile_count(count))?;
-        memory::reserve(&mut self.partials, tile_count(count))
+        memory::reserve(&mut self.tile_sums, tile_count(count))
     }
 
     fn grow(&mut self, count: usize) {
-        if let Some(roomier) = self.roomier.take() {
-            self.newton = Some(roomier);
+        if let Some(newton_after_cut) = self.newton_after_cut.take() {
+            self.newton = Some(newton_after_cut);
         }
         self.per_node_mut().for_each(|it| it.grow(count));
-        self.prepared = 0.0;
+        self.inertia_dt = 0.0;
         if self.newton.is_some() {
             return;
         }
         self.loads.resize(self.coarse.size() * tile_count(count), 0.0);
-        self.partials.resize(tile_count(count), Partial::default());
+        self.tile_sums.resize(tile_count(count), PartialSums::default());
     }
 }

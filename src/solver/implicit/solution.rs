@@ -1,157 +1,164 @@
-//! Where equations have led a body, which contacts with other tissue change after each.
+//! History of implicit solutions, and its changes by contact with other tissue.
 
 use glam::Vec3;
 
-use super::energy::Total;
-use super::pressed::Pressed;
+use super::contact_forces::ContactForces;
+use super::energy::EnergyTotals;
 use crate::base::Result;
 use crate::codec::saved;
 use crate::nodes::current_and_next;
 use crate::soa::Vectors;
 
-/// What the last step leaves to the next, for order 2.
+/// Data of the last step that the second-order formula uses.
 #[derive(Debug)]
 pub(crate) struct History {
-    /// How far each node went, m.
-    pub ways: Vectors,
-    /// How its velocity changed, m/s.
-    pub gains: Vectors,
-    /// What its position lacks of where it is, m: less than the last place of its coordinates (Kahan 1965). NEWTON keeps its own.
+    /// Displacements, m.
+    pub displacements: Vectors,
+    /// Velocity changes, m/s.
+    pub velocity_changes: Vectors,
+    /// Rounding remainders: exact minus stored positions, m (Kahan 1965). NEWTON has its own.
     pub remainders: Vectors,
-    /// s; 0: there is none.
+    /// Length of the step, s; 0 if there is no history.
     pub step: f32,
-    /// Kinetic and elastic energy at its end, J, where they are known.
-    pub(super) energy: Option<Total>,
-    /// What was lost not long ago, and may come back: the energy of a step's formula is not quite this one.
+    /// Kinetic and elastic energy at the end of the step, J, if known.
+    pub(super) energy: Option<EnergyTotals>,
+    /// Recent energy loss that may be recovered: the formula conserves a slightly different energy.
     pub credit: f64,
-    /// What other tissue presses it with, where it meets some.
-    pub(super) pressed: Option<Pressed>,
+    /// Forces by other tissue, if the body can be in contact with it.
+    pub(super) contact_forces: Option<ContactForces>,
 }
 
-saved! { History { ways, gains, remainders, step, energy, credit, pressed } }
+saved! { History { displacements, velocity_changes, remainders, step, energy, credit, contact_forces } }
 
 impl History {
-    /// For so many nodes, and those of them whose remainders are kept.
+    /// Creates a history for `node_count` nodes, of which `solved_count` have remainders.
     fn new(node_count: usize, solved_count: usize) -> Result<Self> {
         Ok(Self {
-            ways: Vectors::zeros(node_count)?,
-            gains: Vectors::zeros(node_count)?,
+            displacements: Vectors::zeros(node_count)?,
+            velocity_changes: Vectors::zeros(node_count)?,
             remainders: Vectors::zeros(solved_count)?,
             step: 0.0,
             energy: None,
             credit: 0.0,
-            pressed: None,
+            contact_forces: None,
         })
     }
 }
 
-/// Where equations have led a body in the last step, and lead it in the one in progress.
+/// Histories of the last step and of the step in progress.
 #[derive(Debug)]
 pub(crate) struct Solution {
     pub(super) histories: [History; 2],
-    /// Which of them belongs to the current state.
-    pub(super) settled: usize,
-    /// How long the substep that was just solved is, s.
-    pub(super) latest: f32,
-    /// Whether other tissue changed what the last equation led to.
+    /// Index of the history of the current state.
+    pub(super) current_index: usize,
+    /// Length of the last solved substep, s.
+    pub(super) substep_duration: f32,
+    /// True if other tissue changed the result of the last equation.
     pub(super) is_deflected: bool,
-    /// Whether the body is attached to another in the step in progress: what that does is not carried on, and substeps are of order 1.
+    /// True if the body is attached to another one in this step. Attachment forces are not extrapolated, so substeps
+    /// use first order.
     pub is_attached: bool,
 }
 
-saved! { Solution { histories, settled, latest, is_deflected, is_attached } }
+saved! { Solution { histories, current_index, substep_duration, is_deflected, is_attached } }
 
 impl Solution {
-    /// For so many nodes, and those of them whose remainders are kept.
+    /// Creates histories for `node_count` nodes, of which `solved_count` have remainders.
     pub(super) fn new(node_count: usize, solved_count: usize) -> Result<Self> {
         Ok(Self {
             histories: [
                 History::new(node_count, solved_count)?,
                 History::new(node_count, solved_count)?,
             ],
-            settled: 0,
-            latest: 0.0,
+            current_index: 0,
+            substep_duration: 0.0,
             is_deflected: false,
             is_attached: false,
         })
     }
 
-    /// Whether what it keeps of steps belongs to so many nodes.
+    /// True if the histories belong to this number of nodes.
     pub fn is_sound(&self, count: usize) -> bool {
         self.histories.iter().all(|history| history.is_sound(count))
     }
 
-    /// That of the current state.
+    /// History of the current state.
     pub(super) fn current(&self) -> &History {
-        &self.histories[self.settled]
+        &self.histories[self.current_index]
     }
 
     pub(super) fn current_mut(&mut self) -> &mut History {
-        &mut self.histories[self.settled]
+        &mut self.histories[self.current_index]
     }
 
     pub(super) fn current_and_next(&mut self) -> [&mut History; 2] {
-        current_and_next(&mut self.histories, self.settled)
+        current_and_next(&mut self.histories, self.current_index)
     }
 
-    /// That of the step in progress.
+    /// History of the step in progress.
     pub(super) fn next(&self) -> &History {
-        &self.histories[1 - self.settled]
+        &self.histories[1 - self.current_index]
     }
 
     pub(super) fn next_mut(&mut self) -> &mut History {
-        &mut self.histories[1 - self.settled]
+        &mut self.histories[1 - self.current_index]
     }
 
-    /// What the step before the next substep left.
+    /// History before the next substep.
     pub(super) fn last(&self, is_first: bool) -> &History {
-        &self.histories[self.place(is_first)]
+        &self.histories[self.history_index(is_first)]
     }
 
-    /// Which of them that is.
-    pub(super) fn place(&self, is_first: bool) -> usize {
-        if is_first { self.settled } else { 1 - self.settled }
+    /// Index of the history before the next substep.
+    pub(super) fn history_index(&self, is_first: bool) -> usize {
+        if is_first {
+            self.current_index
+        } else {
+            1 - self.current_index
+        }
     }
 
-    /// How much faster a node became in the last step, m/s.
-    pub fn gain_of(&self, node: usize) -> Vec3 {
-        self.current().gains.get(node)
+    /// Velocity change of a node in the last step, m/s.
+    pub fn velocity_change(&self, node: usize) -> Vec3 {
+        self.current().velocity_changes.get(node)
     }
 
-    /// How fast a node goes on its way in the substep that was just solved, m/s.
-    pub fn mean(&self, node: usize) -> Vec3 {
-        self.next().ways.get(node) / self.latest
+    /// Mean velocity of a node in the last solved substep, m/s.
+    pub fn mean_velocity(&self, node: usize) -> Vec3 {
+        self.next().displacements.get(node) / self.substep_duration
     }
 
-    /// What it is attached to has a node go so much faster in a substep of `duration` seconds: no gain that will go on.
-    pub fn draw(&mut self, node: usize, given: Vec3, duration: f32) {
+    /// Adds a velocity by an attachment to a node, in a substep of `duration` seconds. It is not extrapolated.
+    pub fn add_mean_velocity(&mut self, node: usize, velocity_change: Vec3, duration: f32) {
         let history = self.next_mut();
-        history.ways.set(node, history.ways.get(node) + given * duration);
+        history
+            .displacements
+            .set(node, history.displacements.get(node) + velocity_change * duration);
         history.energy = None;
     }
 
-    /// Nodes were moved after the substep that was just solved: its energy is no longer known.
-    pub fn part(&mut self) {
+    /// Forgets the energy after nodes were moved.
+    pub fn invalidate_energy(&mut self) {
         self.next_mut().energy = None;
     }
 
-    /// Other tissue has a node go with this mean velocity instead, m/s: by how much it becomes faster.
-    pub fn deflect(&mut self, node: usize, mean: Vec3) -> Vec3 {
-        let given = mean - self.mean(node);
-        if given != Vec3::ZERO {
-            let latest = self.latest;
+    /// Replaces the mean velocity of a node, in contact with other tissue, m/s. Returns the change.
+    pub fn set_mean_velocity(&mut self, node: usize, mean: Vec3) -> Vec3 {
+        let velocity_change = mean - self.mean_velocity(node);
+        if velocity_change != Vec3::ZERO {
+            let substep_duration = self.substep_duration;
             let history = self.next_mut();
-            history.ways.set(node, mean * latest);
-            // What it gives is no gain that will go on.
-            history.gains.set(node, Vec3::ZERO);
+            history.displacements.set(node, mean * substep_duration);
+            // A contact impulse is not extrapolated.
+            history.velocity_changes.set(node, Vec3::ZERO);
             history.energy = None;
             self.is_deflected = true;
         }
-        given
+        velocity_change
     }
 
-    /// After a part that ended otherwise than its equation did the next is one of order 1.
-    pub fn settle_deflection(&mut self) {
+    /// Restarts with first order if the substep did not end as its equation did.
+    pub fn restart_after_deflection(&mut self) {
         if std::mem::take(&mut self.is_deflected) {
             self.next_mut().step = 0.0;
         }

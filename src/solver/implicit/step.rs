@@ -1,41 +1,44 @@
-//! A part of a step of IMPLICIT, one solved equation: where it aims, and what is made of what Newton's iterations find.
+//! One substep of IMPLICIT, one solved equation: prediction, solution, and update of velocities and history.
 
 use glam::Vec3;
 
 use super::energy::EnergyBefore;
-use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
-use super::{End, Experience, Implicit};
+use super::node_kernels::{
+    AddScaled, FinishMotion, PositionDefect, PredictPositions, PredictVelocities, UpdateRemainders,
+};
+use super::{Implicit, PreconditionerStats, SubstepOutcome};
 use crate::base::{Stage, Stopwatch};
 use crate::codec::saved;
 use crate::soa::{Records, Vectors, WriteRecords, copy_axes, tile_count, tile_nodes};
 use crate::solver::System;
-use crate::solver::kick::{Survey, look};
-use crate::solver::newton::{Aimed, Newton};
+use crate::solver::kick::{TileStats, tile_stats};
+use crate::solver::newton::{Newton, StepProblem};
 use crate::solver::step_request::StepRequest;
 use crate::springs::Tangent;
 use crate::threads::{Items, Team};
 
-/// The largest ratio of a step to the last with which the formula of order 2 is used: it is stable up to 2.41.
-const LARGEST_RATIO: f64 = 2.0;
+/// Largest ratio of a step to the last at which the second-order formula is used. The formula is stable up to 2.41.
+const MAX_STEP_RATIO: f64 = 2.0;
 
-/// The multipliers of contacts are improved so often at most: then what is left has a function to minimise.
-pub(super) const MULTIPLIERS: u32 = 20;
+/// Maximum number of multiplier updates of contacts per equation. After that the multipliers are fixed, so that the
+/// rest is a minimization.
+pub(super) const MAX_MULTIPLIER_UPDATES: u32 = 20;
 
-/// How one step is made from what was before.
+/// Coefficients of the integration formula of a step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Formula {
+pub(super) struct StepFormula {
     /// t, s.
     pub(super) time: f64,
-    /// c: what part of the last way and of the last gain goes on.
+    /// c, the weight of the last displacement and of the last velocity change.
     pub carried: f64,
 }
 
-saved! { Formula { time, carried } }
+saved! { StepFormula { time, carried } }
 
-impl Formula {
+impl StepFormula {
     pub(super) fn new(order: u32, step: f64, last_step: f64) -> Self {
         let ratio = if last_step > 0.0 { step / last_step } else { 0.0 };
-        if order == 1 || ratio == 0.0 || ratio > LARGEST_RATIO {
+        if order == 1 || ratio == 0.0 || ratio > MAX_STEP_RATIO {
             Self {
                 time: step,
                 carried: 0.0,
@@ -50,113 +53,121 @@ impl Formula {
     }
 }
 
-/// One solved equation.
+/// One substep with its equation.
 #[derive(Clone, Copy)]
 pub(super) struct Substep<'a> {
     pub request: &'a StepRequest<'a>,
-    /// s
+    /// Length, s.
     pub step: f64,
-    /// Fractions of the step asked for.
+    /// Start and end, as fractions of the requested step.
     pub start: f64,
     pub end: f64,
     pub is_first: bool,
-    /// With those that come after it in the step.
+    /// Number of equations left in the step, including this one.
     pub(super) equations: u32,
-    /// Whether it stands whatever it did not foresee of contacts.
-    pub(super) stands: bool,
-    pub(super) formula: Formula,
+    /// True if the substep is accepted even if contacts were not predicted well.
+    pub(super) is_forced: bool,
+    pub(super) formula: StepFormula,
     pub team: &'a Team<'a>,
 }
 
 impl Substep<'_> {
-    /// Takes it, with order 1 where that of order 2 gains energy; as a last resort, or where no product is left to try
-    /// anything else, what was gained is taken off again. Then tools stop what would enter them.
-    pub(super) fn take_safely(self, body: &mut System, implicit: &mut Implicit, is_last_resort: bool) -> End {
+    /// Takes the substep. If the second-order formula gains energy, the substep is repeated with first order. As a last
+    /// resort, or if no product is left, the gain is removed from the velocities. Then tools stop nodes that would
+    /// enter them.
+    pub(super) fn step_with_fallbacks(
+        self,
+        body: &mut System,
+        implicit: &mut Implicit,
+        is_last_resort: bool,
+    ) -> SubstepOutcome {
         let watch = Stopwatch::start(self.request.profile);
         let before = self.energy_before(body, implicit);
         let report = implicit.report;
-        let mut end = self.take(body, implicit, before);
-        if matches!(end, End::Gained | End::NotFinite) && self.may_be_of_order_1(implicit) {
+        let mut outcome = self.try_formula(body, implicit, before);
+        if matches!(outcome, SubstepOutcome::EnergyGained | SubstepOutcome::NotFinite)
+            && self.can_retry_first_order(implicit)
+        {
             (implicit.report.error, implicit.report.has_converged) = (report.error, report.has_converged);
-            end = self.of_order_1().take(body, implicit, before);
+            outcome = self.first_order().try_formula(body, implicit, before);
         }
-        if end == End::Gained && (is_last_resort || implicit.left == 0) {
+        if outcome == SubstepOutcome::EnergyGained && (is_last_resort || implicit.budget_left == 0) {
             self.slow_down(body, implicit, before);
-            end = End::Fine;
+            outcome = SubstepOutcome::Accepted;
         }
-        if end == End::Fine {
-            end = self.meet(body, implicit);
+        if outcome == SubstepOutcome::Accepted {
+            outcome = self.resolve_contacts(body, implicit);
         }
-        if end == End::Fine {
+        if outcome == SubstepOutcome::Accepted {
             if let Some(contacts) = &mut body.contacts {
-                contacts.remember(self.request.tools);
+                contacts.store_warm_starts(self.request.tools);
             }
             let next = body.state.next_positions();
-            body.forces.age(self.step, next, self.team);
-            if body.forces.remember() {
-                // What was stored is lost by then.
-                implicit.solution.part();
+            body.forces.advance(self.step, next, self.team);
+            if body.forces.has_history() {
+                // Forces with internal variables have dissipated stored energy.
+                implicit.solution.invalidate_energy();
             }
         }
         watch.stop(self.request.profile, Stage::Solver);
-        end
+        outcome
     }
 
-    /// Whether the step can be taken again by implicit Euler, and was not. What a later substep began with has been written over: then the whole
-    /// step is taken again.
-    pub(super) fn may_be_of_order_1(&self, implicit: &Implicit) -> bool {
-        self.formula.carried != 0.0 && self.is_first && implicit.left > 0
+    /// True if the step can be repeated with implicit Euler and was not yet. A later substep cannot, because its
+    /// initial data are overwritten; then the whole step is repeated.
+    pub(super) fn can_retry_first_order(&self, implicit: &Implicit) -> bool {
+        self.formula.carried != 0.0 && self.is_first && implicit.budget_left > 0
     }
 
-    /// The same step by implicit Euler.
-    pub(super) fn of_order_1(&self) -> Self {
+    /// Returns the same substep with implicit Euler.
+    pub(super) fn first_order(&self) -> Self {
         Self {
-            formula: Formula::new(1, self.step, 0.0),
+            formula: StepFormula::new(1, self.step, 0.0),
             ..*self
         }
     }
 
-    fn take(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> End {
-        body.forces.foresee(self.step);
-        match self.foreseeing(body, implicit) {
-            Some(foreseeing) => foreseeing.take_formula(body, implicit, before),
-            None => End::Near,
+    fn try_formula(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> SubstepOutcome {
+        body.forces.predict(self.step);
+        match self.with_predicted_contacts(body, implicit) {
+            Some(substep) => substep.solve_formula(body, implicit, before),
+            None => SubstepOutcome::NearContact,
         }
     }
 
-    fn take_formula(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> End {
+    fn solve_formula(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> SubstepOutcome {
         if let Some(mut newton) = implicit.newton.take() {
-            self.aim(body, implicit);
-            self.solve_exactly(body, implicit, &mut newton);
+            self.predict_velocities(body, implicit);
+            self.solve_newton(body, implicit, &mut newton);
             implicit.newton = Some(newton);
         } else {
             self.prepare(body, implicit);
-            self.aim(body, implicit);
+            self.predict_velocities(body, implicit);
             implicit.changes = std::mem::take(&mut body.forces.changes);
-            let is_finite = self.minimise(body, implicit);
+            let is_finite = self.minimize(body, implicit);
             body.forces.changes = std::mem::take(&mut implicit.changes);
             if !is_finite {
-                return End::NotFinite;
+                return SubstepOutcome::NotFinite;
             }
         }
         if self.finish(body, implicit) {
-            self.account(body, implicit, before)
+            self.check_energy(body, implicit, before)
         } else {
-            End::NotFinite
+            SubstepOutcome::NotFinite
         }
     }
 
-    /// t of its formula, s.
+    /// t of the formula, s.
     pub(super) fn time(&self) -> f64 {
         self.formula.time
     }
 
-    /// c of its formula.
+    /// c of the formula.
     pub(super) fn carried(&self) -> f64 {
         self.formula.carried
     }
 
-    /// The tangent of the springs for this step.
+    /// Tangent of the springs for this substep.
     pub(super) fn tangent(&self) -> Tangent {
         Tangent {
             floor: 0.0,
@@ -164,25 +175,25 @@ impl Substep<'_> {
         }
     }
 
-    /// Makes inertia and preconditioner those of this step.
+    /// Updates inertia and preconditioner for this substep.
     fn prepare(&self, body: &System, implicit: &mut Implicit) {
-        /// What viscosity adds goes with the step: within this factor the preconditioner serves.
+        /// Viscous stiffness depends on the step. The preconditioner is kept while t changes by less than this factor.
         const SIMILAR: f32 = 2.0;
         let time = self.formula.time as f32;
-        let is_similar = (implicit.prepared / SIMILAR..=implicit.prepared * SIMILAR).contains(&time);
-        implicit.stale |= !is_similar && body.forces.remember();
+        let is_similar = (implicit.inertia_dt / SIMILAR..=implicit.inertia_dt * SIMILAR).contains(&time);
+        implicit.is_stale |= !is_similar && body.forces.has_history();
         let positions = body.state.newest().0;
-        if implicit.stale {
+        if implicit.is_stale {
             let (forces, tangent) = (&body.forces, self.tangent());
-            implicit.blocks.gather(forces, positions, tangent, self.team);
+            implicit.blocks.assemble(forces, positions, tangent, self.team);
             implicit
                 .coarse
-                .gather(forces, &body.inverse_masses, &body.pins, positions, tangent);
+                .assemble(forces, &body.inverse_masses, &body.pins, positions, tangent);
             for pin in body.pins.partial() {
-                implicit.blocks.hold(pin.node as usize, pin.axes);
+                implicit.blocks.decouple_axes(pin.node as usize, pin.axes);
             }
         }
-        if time != implicit.prepared || implicit.stale {
+        if time != implicit.inertia_dt || implicit.is_stale {
             let per_mass = 1.0 / (self.formula.time * self.formula.time);
             for (node, inertia) in implicit.inertia.iter_mut().enumerate() {
                 let rate = body
@@ -197,28 +208,28 @@ impl Substep<'_> {
                     0.0
                 };
             }
-            implicit.all_inertia = implicit.inertia.iter().map(|&inertia| f64::from(inertia)).sum();
+            implicit.total_inertia = implicit.inertia.iter().map(|&inertia| f64::from(inertia)).sum();
             implicit.blocks.invert(&implicit.inertia, self.team);
             implicit.coarse.invert(&implicit.inertia, &body.pins);
-            implicit.noise = implicit.blocks.noise(&implicit.inertia);
-            implicit.prepared = time;
+            implicit.roundoff = implicit.blocks.roundoff(&implicit.inertia);
+            implicit.inertia_dt = time;
         }
-        if implicit.stale {
-            implicit.stale = false;
-            implicit.memory = Experience::NONE;
-            implicit.spectrum.assume(1.0);
+        if implicit.is_stale {
+            implicit.is_stale = false;
+            implicit.preconditioner_stats = PreconditionerStats::NONE;
+            implicit.ritz.assume(1.0);
         }
     }
 
-    /// Puts the velocities where they would be without forces, and begins with no pushes at all: what forces did before is
-    /// the better guess where motion is smooth, and where stiff springs turn it is far worse than none.
-    fn aim(&self, body: &mut System, implicit: &mut Implicit) {
+    /// Sets the velocities to their force-free prediction w and starts from s = 0. The last s would be a better start
+    /// for smooth motion, but a far worse one where stiff springs rotate.
+    fn predict_velocities(&self, body: &mut System, implicit: &mut Implicit) {
         let node_count = body.node_count();
         let state = body.state.substep();
         let first = self.is_first.then_some(state.first_velocities);
-        let gains = &implicit.solution.last(self.is_first).gains;
+        let velocity_changes = &implicit.solution.last(self.is_first).velocity_changes;
         let carried = self.formula.carried as f32;
-        implicit.pushes.clear();
+        implicit.force_displacements.clear();
         let written = (state.velocities.tiles_mut(), body.pins.tiles_mut());
         let (kernel, dt) = (body.kernel, self.request.dt);
         self.team
@@ -227,20 +238,20 @@ impl Substep<'_> {
                 if let Some(first) = first {
                     copy_axes(&mut velocities, first.slices(nodes.clone()));
                 }
-                kernel.run(Add {
+                kernel.run(AddScaled {
                     factor: carried,
-                    from: gains.slices(nodes.clone()),
+                    from: velocity_changes.slices(nodes.clone()),
                     to: velocities.each_mut().map(|axis| &mut **axis),
                 });
                 for pin in pins {
-                    let place = pin.node as usize - nodes.start;
-                    pin.put(&mut velocities, place, pin.travel / dt);
+                    let index = pin.node as usize - nodes.start;
+                    pin.write_held(&mut velocities, index, pin.travel / dt);
                 }
             });
     }
 
-    /// Puts the nodes where `pushes` has them.
-    pub(super) fn place(&self, body: &mut System, implicit: &Implicit) {
+    /// Sets the next positions to x + y + s.
+    pub(super) fn update_positions(&self, body: &mut System, implicit: &Implicit) {
         let node_count = body.node_count();
         let state = body.state.substep();
         let history = implicit.solution.last(self.is_first);
@@ -261,26 +272,26 @@ impl Substep<'_> {
             written,
             |tile, (mut next, predicted, pins, records)| {
                 let nodes = tile_nodes(tile, node_count);
-                kernel.run(Place {
+                kernel.run(PredictPositions {
                     carried,
                     time,
                     positions: positions.slices(nodes.clone()),
                     velocities: velocities.slices(nodes.clone()),
-                    ways: history.ways.slices(nodes.clone()),
-                    pushes: implicit.pushes.slices(nodes.clone()),
+                    displacements: history.displacements.slices(nodes.clone()),
+                    force_displacements: implicit.force_displacements.slices(nodes.clone()),
                     remainders: history.remainders.slices(nodes.clone()),
                     next: &mut next,
                 });
                 if let Some(mut predicted) = predicted {
-                    kernel.run(Predict {
+                    kernel.run(PredictVelocities {
                         time,
                         velocities: velocities.slices(nodes.clone()),
-                        pushes: implicit.pushes.slices(nodes.clone()),
+                        force_displacements: implicit.force_displacements.slices(nodes.clone()),
                         predicted: &mut predicted,
                     });
                 }
                 for pin in pins {
-                    pin.put(&mut next, pin.node as usize - nodes.start, pin.place(end));
+                    pin.write_held(&mut next, pin.node as usize - nodes.start, pin.position_at(end));
                 }
                 if let Some(records) = records {
                     let axes = next.each_ref().map(|axis| &**axis);
@@ -290,158 +301,166 @@ impl Substep<'_> {
         );
     }
 
-    /// Makes the search direction what the next positions lack of where `pushes` has the nodes.
-    pub(super) fn find_lacks(&self, body: &System, implicit: &mut Implicit) {
+    /// Writes the rounding errors of the next positions, relative to x + y + s, to the search direction.
+    pub(super) fn find_position_defects(&self, body: &System, implicit: &mut Implicit) {
         let node_count = body.node_count();
         let (positions, velocities) = body.state.newest();
         let next = body.state.next_positions();
-        let (history, pushes) = (implicit.solution.last(self.is_first), &implicit.pushes);
+        let (history, force_displacements) = (implicit.solution.last(self.is_first), &implicit.force_displacements);
         let time = self.formula.time as f32;
         let carried = self.formula.carried as f32;
         let records = implicit.changes.records.as_mut().map(Records::tiles_mut);
-        let written = (implicit.searches.tiles_mut(), records);
+        let written = (implicit.search_directions.tiles_mut(), records);
         let kernel = body.kernel;
         self.team
-            .pass(tile_count(node_count), written, |tile, (mut lacks, records)| {
+            .pass(tile_count(node_count), written, |tile, (mut defects, records)| {
                 let nodes = tile_nodes(tile, node_count);
-                kernel.run(Lack {
+                kernel.run(PositionDefect {
                     carried,
                     time,
                     positions: positions.slices(nodes.clone()),
                     velocities: velocities.slices(nodes.clone()),
-                    ways: history.ways.slices(nodes.clone()),
-                    pushes: pushes.slices(nodes.clone()),
+                    displacements: history.displacements.slices(nodes.clone()),
+                    force_displacements: force_displacements.slices(nodes.clone()),
                     remainders: history.remainders.slices(nodes.clone()),
                     next: next.slices(nodes.clone()),
-                    lacks: &mut lacks,
+                    defects: &mut defects,
                 });
                 for pin in body.pins.of_tile(tile) {
-                    pin.put(&mut lacks, pin.node as usize - nodes.start, Vec3::ZERO);
+                    pin.write_held(&mut defects, pin.node as usize - nodes.start, Vec3::ZERO);
                 }
                 if let Some(records) = records {
-                    let axes = lacks.each_ref().map(|axis| &**axis);
+                    let axes = defects.each_ref().map(|axis| &**axis);
                     kernel.run(WriteRecords { axes, records });
                 }
             });
     }
 
-    /// How many products this equation may take: its share of what is left, and one at least.
+    /// Product budget of this equation: an equal share of the remaining budget, at least 1.
     pub(super) fn budget(&self, implicit: &Implicit) -> u32 {
-        (implicit.left / self.equations).max(1)
+        (implicit.budget_left / self.equations).max(1)
     }
 
-    /// Finds the pushes to the last digit that counts.
-    fn solve_exactly(&self, body: &mut System, implicit: &mut Implicit, newton: &mut Newton) {
-        /// What contacts may still lack, as a part of what they do.
+    /// Solves the equation with NEWTON to its full accuracy.
+    fn solve_newton(&self, body: &mut System, implicit: &mut Implicit, newton: &mut Newton) {
+        /// Allowed constraint error of contacts, relative to their contribution.
         const CONTACTS: f64 = 1e-4;
-        for multipliers in 0..=MULTIPLIERS {
-            self.solve_pressed(body, implicit, newton);
+        for multipliers in 0..=MAX_MULTIPLIER_UPDATES {
+            self.solve_newton_once(body, implicit, newton);
             let Some(contacts) = &mut body.contacts else {
                 break;
             };
-            let push = |node: usize| implicit.pushes.get(node).as_dvec3();
-            if multipliers == MULTIPLIERS || contacts.holds.missing(push) <= CONTACTS {
+            let displacement = |node: usize| implicit.force_displacements.get(node).as_dvec3();
+            if multipliers == MAX_MULTIPLIER_UPDATES || contacts.multipliers.multiplier_error(displacement) <= CONTACTS
+            {
                 break;
             }
-            contacts.holds.improve(push, |_, _| ());
+            contacts.multipliers.update_multipliers(displacement, |_, _| ());
         }
     }
 
-    /// The same, with the multipliers that contacts have.
-    fn solve_pressed(&self, body: &mut System, implicit: &mut Implicit, newton: &mut Newton) {
-        let (from, to) = (implicit.solution.place(self.is_first), 1 - implicit.solution.settled);
-        let aimed = Aimed {
+    /// Solves the equation with NEWTON for fixed multipliers of contacts.
+    fn solve_newton_once(&self, body: &mut System, implicit: &mut Implicit, newton: &mut Newton) {
+        let (from, to) = (
+            implicit.solution.history_index(self.is_first),
+            1 - implicit.solution.current_index,
+        );
+        let problem = StepProblem {
             time: self.formula.time,
             carried: self.formula.carried,
             gravity: self.request.gravity,
             end: self.end,
-            ways: &implicit.solution.last(self.is_first).ways,
-            pressed: implicit.solution.next().pressing(),
+            displacements: &implicit.solution.last(self.is_first).displacements,
+            contact_forces: implicit.solution.next().active_contact_forces(),
             from,
             to,
             budget: self.budget(implicit),
             accuracy: f64::from(implicit.accuracy),
             tolerance: f64::from(self.request.tolerance),
         };
-        let found = newton.solve(body, &aimed, &mut implicit.pushes);
-        implicit.left = implicit.left.saturating_sub(found.products);
+        let result = newton.solve(body, &problem, &mut implicit.force_displacements);
+        implicit.budget_left = implicit.budget_left.saturating_sub(result.products);
         let report = &mut implicit.report;
-        report.iterations += found.products;
-        report.solves += found.iterations;
-        report.error = report.error.max(found.error as f32);
-        report.has_converged &= found.converged;
+        report.iterations += result.products;
+        report.solves += result.iterations;
+        report.error = report.error.max(result.error as f32);
+        report.has_converged &= result.converged;
     }
 
-    /// Makes velocities and history of what was found; whether all is finite.
+    /// Computes velocities and history from the solution. Returns true if all values are finite.
     fn finish(&self, body: &mut System, implicit: &mut Implicit) -> bool {
-        implicit.taken = self.formula;
-        implicit.solution.latest = self.step as f32;
+        implicit.last_formula = self.formula;
+        implicit.solution.substep_duration = self.step as f32;
         let node_count = body.node_count();
-        let turn = self.lost_turn(body, implicit);
-        let (kernel, dt, part) = (body.kernel, self.request.dt, (self.end - self.start) as f32);
+        let rotation = self.angular_momentum_correction(body, implicit);
+        let (kernel, dt, duration_fraction) = (body.kernel, self.request.dt, (self.end - self.start) as f32);
         let time = self.formula.time as f32;
         let carried = self.formula.carried as f32;
-        let [settled, next] = implicit.solution.current_and_next();
-        let from = self.is_first.then_some(&*settled);
+        let [current, next] = implicit.solution.current_and_next();
+        let from = self.is_first.then_some(&*current);
         next.step = self.step as f32;
         let state = body.state.substep();
         let (starts, positions) = (state.positions, &*state.next_positions);
-        let pushes = &implicit.pushes;
+        let force_displacements = &implicit.force_displacements;
         let is_exact = implicit.newton.is_some();
         let before = self.is_first.then_some(state.first_velocities);
         let written = (
             state.velocities.tiles_mut(),
-            next.ways.tiles_mut(),
-            next.gains.tiles_mut(),
+            next.displacements.tiles_mut(),
+            next.velocity_changes.tiles_mut(),
             (!is_exact).then(|| next.remainders.tiles_mut()),
             body.pins.tiles_mut(),
-            Items::new(&mut body.surveys),
+            Items::new(&mut body.tile_stats),
         );
         self.team.pass(
             tile_count(node_count),
             written,
-            |tile, (mut velocities, mut ways, mut gains, remainders, pins, survey)| {
+            |tile, (mut velocities, mut displacements, mut velocity_changes, remainders, pins, survey)| {
                 let nodes = tile_nodes(tile, node_count);
                 if let Some(from) = from {
-                    copy_axes(&mut ways, from.ways.slices(nodes.clone()));
-                    copy_axes(&mut gains, from.gains.slices(nodes.clone()));
+                    copy_axes(&mut displacements, from.displacements.slices(nodes.clone()));
+                    copy_axes(&mut velocity_changes, from.velocity_changes.slices(nodes.clone()));
                 }
-                kernel.run(Finish {
+                kernel.run(FinishMotion {
                     carried,
                     time,
-                    pushes: pushes.slices(nodes.clone()),
+                    force_displacements: force_displacements.slices(nodes.clone()),
                     before: before.map(|before| before.slices(nodes.clone())),
                     velocities: &mut velocities,
-                    ways: &mut ways,
-                    gains: &mut gains,
+                    displacements: &mut displacements,
+                    velocity_changes: &mut velocity_changes,
                 });
-                if let Some(turn) = &turn {
-                    turn.add(positions.slices(nodes.clone()), &mut velocities, &mut gains);
+                if let Some(rotation) = &rotation {
+                    rotation.add(positions.slices(nodes.clone()), &mut velocities, &mut velocity_changes);
                 }
                 if let Some(mut remainders) = remainders {
                     if let Some(from) = from {
                         copy_axes(&mut remainders, from.remainders.slices(nodes.clone()));
                     }
-                    kernel.run(Remain {
-                        ways: ways.each_ref().map(|axis| &**axis),
+                    kernel.run(UpdateRemainders {
+                        displacements: displacements.each_ref().map(|axis| &**axis),
                         starts: starts.slices(nodes.clone()),
                         ends: positions.slices(nodes.clone()),
                         remainders: &mut remainders,
                     });
                     for pin in &*pins {
-                        pin.put(&mut remainders, pin.node as usize - nodes.start, Vec3::ZERO);
+                        pin.write_held(&mut remainders, pin.node as usize - nodes.start, Vec3::ZERO);
                     }
                 }
                 for pin in pins {
-                    let place = pin.node as usize - nodes.start;
-                    pin.put(&mut velocities, place, pin.travel / dt);
-                    pin.put(&mut ways, place, pin.travel * part);
-                    pin.put(&mut gains, place, Vec3::ZERO);
+                    let index = pin.node as usize - nodes.start;
+                    pin.write_held(&mut velocities, index, pin.travel / dt);
+                    pin.write_held(&mut displacements, index, pin.travel * duration_fraction);
+                    pin.write_held(&mut velocity_changes, index, Vec3::ZERO);
                 }
                 let velocities = velocities.map(|axis| &*axis);
-                *survey = look(kernel, velocities, Some(positions.slices(nodes)));
+                *survey = tile_stats(kernel, velocities, Some(positions.slices(nodes)));
             },
         );
-        body.surveys.iter().copied().fold(Survey::NOTHING, Survey::and).finite
+        body.tile_stats
+            .iter()
+            .copied()
+            .fold(TileStats::EMPTY, TileStats::merge)
+            .finite
     }
 }

@@ -1,168 +1,168 @@
-//! Newton's method downhill: second derivatives, a line search, and inertia that holds the nodes back where the function is far
-//! from what its derivatives promise, and fades where it is not.
+//! Minimization by Newton's method with exact second derivatives and a line search. Added inertia (a shift of the
+//! matrix) regularizes steps for which the quadratic model is poor. It decreases as the model improves.
 
 use glam::DVec3;
 
-use super::equation::{Equation, Tangent};
-use super::factor;
-use super::gradient::{Gradient, dot, longest};
+use super::conjugate_gradient::{ConjugateGradient, dot, max_norm};
+use super::equation::{Equation, HessianKind};
+use super::incomplete_cholesky;
 use super::matrix::Matrix;
-use super::network::Network;
+use super::sparsity::Sparsity;
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::forces::Forces;
 
-/// What may be missing of the solution of each linearised equation.
-const PART: f64 = 0.01;
+/// Relative error allowed in each linear solve.
+const LINEAR_TOLERANCE: f64 = 0.01;
 
-/// The part of what the slope promises that a way must bring (Armijo 1966).
-const ENOUGH: f64 = 1e-4;
+/// Minimum decrease as a fraction of the decrease that the slope predicts (Armijo 1966).
+const ARMIJO: f64 = 1e-4;
 
-/// Where a way brings more than this part of what was promised, the function bends less than the matrix says: it is worth
-/// going on.
-const MORE: f64 = 1.3;
+/// Ratio of actual to predicted decrease above which a longer step is tried. The function then curves less than the
+/// matrix.
+const EXTEND_RATIO: f64 = 1.3;
 
-/// What rounding makes of a sum, as a part of its terms.
+/// Rounding error of a sum, relative to its terms.
 const ROUNDING: f64 = 1e-13;
 
-/// Everything a descent needs, made beforehand.
+/// Preallocated data of a minimization.
 #[derive(Debug)]
 pub(super) struct Descent {
-    pub network: Network,
+    pub sparsity: Sparsity,
     pub equation: Equation,
-    /// What acts on each node, held ones too, N.
+    /// Force on each node, including held ones, N.
     pub residuals: Vec<DVec3>,
-    pub gradient: Gradient,
+    pub cg: ConjugateGradient,
     matrix: Matrix,
     factor: Matrix,
 }
 
-saved! { Descent { network, equation, residuals, gradient, matrix, factor } }
+saved! { Descent { sparsity, equation, residuals, cg, matrix, factor } }
 
-/// When a descent is done.
+/// Stopping criteria of a minimization.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Goal {
-    /// Corrections as short as this need none after them, m.
+pub(super) struct DescentGoal {
+    /// Length below which a correction is the last one, m.
     pub absolute: f64,
-    /// Or as short as this part of the longest way.
+    /// The same, relative to the largest displacement.
     pub relative: f64,
-    /// Corrections as short as this that become no shorter are what rounding makes, m.
+    /// Length below which corrections that stop decreasing are due to rounding, m.
     pub rounding: f64,
-    /// The most linearised equations, and products in all.
+    /// Maximum number of linear solves, and of products in all.
     pub iterations: u32,
     pub budget: u32,
-    /// Inertia that is added at first, at least, and as soon as it is needed, 1/s².
+    /// Initial shift, minimum shift, and shift after the first poor step, 1/s².
     pub shift: f64,
     pub least_shift: f64,
     pub next_shift: f64,
 }
 
-/// How a descent ended.
+/// Result of a minimization.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::solver) struct DescentReport {
     pub iterations: u32,
     pub products: u32,
-    /// The longest way of the last correction, m.
+    /// Largest displacement of the last correction, m.
     pub error: f64,
     pub converged: bool,
 }
 
 impl Descent {
-    /// Of a body that these forces move.
+    /// Creates the data for a body with these forces.
     pub fn new(forces: &Forces) -> Result<Self> {
         let node_count = forces.springs.node_count();
-        let network = Network::new(forces)?;
-        let pair_count = network.pair_count();
+        let sparsity = Sparsity::new(forces)?;
+        let pair_count = sparsity.pair_count();
         Ok(Self {
-            equation: Equation::new(node_count, network.ring_count(), network.member_count())?,
+            equation: Equation::new(node_count, sparsity.ring_count(), sparsity.member_count())?,
             residuals: memory::filled(DVec3::ZERO, node_count)?,
-            gradient: Gradient::new(node_count, network.ring_count())?,
+            cg: ConjugateGradient::new(node_count, sparsity.ring_count())?,
             matrix: Matrix::new(node_count, pair_count)?,
             factor: Matrix::new(node_count, pair_count)?,
-            network,
+            sparsity,
         })
     }
 
-    /// Makes room for so many springs in all.
-    pub fn make_room(&mut self, spring_count: usize) -> Result<()> {
-        let pair_count = self.network.make_room(spring_count)?;
-        self.matrix.make_room(pair_count)?;
-        self.factor.make_room(pair_count)
+    /// Reserves capacity for this number of springs.
+    pub fn reserve(&mut self, spring_count: usize) -> Result<()> {
+        let pair_count = self.sparsity.reserve(spring_count)?;
+        self.matrix.reserve(pair_count)?;
+        self.factor.reserve(pair_count)
     }
 
-    /// Writes what acts on each node.
-    pub fn weigh(&mut self) {
-        self.equation.residuals(&self.network, &mut self.residuals);
+    /// Computes the force on each node.
+    pub fn update_residuals(&mut self) {
+        self.equation.residuals(&self.sparsity, &mut self.residuals);
     }
 
-    /// Goes down until the goal is reached.
-    pub fn run(&mut self, goal: &Goal) -> DescentReport {
-        let mut found = DescentReport {
+    /// Minimizes until the goal is reached.
+    pub fn run(&mut self, goal: &DescentGoal) -> DescentReport {
+        let mut report = DescentReport {
             error: f64::INFINITY,
             ..DescentReport::default()
         };
         let mut shift = goal.shift;
-        let mut vain = 0;
-        let mut farthest = 0.0_f64;
-        while found.iterations < goal.iterations && found.products < goal.budget {
-            found.iterations += 1;
-            self.weigh();
-            if self.correct(Tangent::Exact, shift, goal, &mut found) {
-                // First along the direction that bends down, then by a matrix that has none.
-                let length = longest(&self.gradient.corrections);
-                self.slide(if found.error.is_finite() { found.error } else { length });
-                self.weigh();
-                self.correct(Tangent::Clamped, shift, goal, &mut found);
+        let mut stagnant_count = 0;
+        let mut largest_displacement = 0.0_f64;
+        while report.iterations < goal.iterations && report.products < goal.budget {
+            report.iterations += 1;
+            self.update_residuals();
+            if self.solve_correction(HessianKind::Exact, shift, goal, &mut report) {
+                // Follow the direction of negative curvature, then use a positive semidefinite matrix.
+                let length = max_norm(&self.cg.corrections);
+                self.follow_search_direction(if report.error.is_finite() { report.error } else { length });
+                self.update_residuals();
+                self.solve_correction(HessianKind::Clamped, shift, goal, &mut report);
             }
-            let promised = dot(&self.residuals, &self.gradient.corrections);
-            let size = longest(&self.gradient.corrections);
-            if !(promised > 0.0 && size.is_finite()) {
-                // Nothing is left to be corrected, or nothing can be said.
-                found.converged = size == 0.0;
-                found.error = size;
+            let predicted = dot(&self.residuals, &self.cg.corrections);
+            let size = max_norm(&self.cg.corrections);
+            if !(predicted > 0.0 && size.is_finite()) {
+                // No correction is left, or the result is not finite.
+                report.converged = size == 0.0;
+                report.error = size;
                 break;
             }
-            self.equation.holds.let_go();
-            let (gone, gain) = self.go(promised);
-            let used = shift;
-            farthest = farthest.max(longest(&self.equation.ways));
-            if gain > 0.75 && gone >= 1.0 {
+            self.equation.multipliers.forbid_tension();
+            let (step_fraction, decrease_ratio) = self.line_search(predicted);
+            let used_shift = shift;
+            largest_displacement = largest_displacement.max(max_norm(&self.equation.displacements));
+            if decrease_ratio > 0.75 && step_fraction >= 1.0 {
                 shift *= 0.1;
-            } else if gain < 0.25 || gone < 0.5 {
+            } else if decrease_ratio < 0.25 || step_fraction < 0.5 {
                 shift = (4.0 * shift).max(goal.next_shift);
             }
             if shift < goal.least_shift.max(1e-3 * goal.next_shift) {
                 shift = goal.least_shift;
             }
-            vain = if gone > 0.0 && size < 0.5 * found.error {
+            stagnant_count = if step_fraction > 0.0 && size < 0.5 * report.error {
                 0
             } else {
-                vain + 1
+                stagnant_count + 1
             };
-            found.error = size * gone.max(1.0);
-            let held_back = shift.min(used) * self.inertia_of_correction();
-            let is_short = found.error <= goal.absolute.max(goal.relative * farthest);
-            // So short, what the function changes by is rounding too, and may lead nowhere.
-            let is_nothing = size <= goal.absolute;
-            let is_noise = size <= goal.rounding && vain >= 3;
-            if (is_short && gone >= 1.0 || is_nothing || is_noise) && held_back <= 0.1 * promised {
-                found.converged = true;
+            report.error = size * step_fraction.max(1.0);
+            let shift_work = shift.min(used_shift) * self.inertia_of_correction();
+            let is_short = report.error <= goal.absolute.max(goal.relative * largest_displacement);
+            // The decrease by such a short correction is due to rounding and may be negative.
+            let is_negligible = size <= goal.absolute;
+            let is_noise = size <= goal.rounding && stagnant_count >= 3;
+            if (is_short && step_fraction >= 1.0 || is_negligible || is_noise) && shift_work <= 0.1 * predicted {
+                report.converged = true;
                 break;
             }
         }
-        found
+        report
     }
 
-    /// Finds a direction in which the function bends down, where it is level, and goes some way along it: whether there is
-    /// one.
-    pub fn leave_saddle(&mut self, shift: f64, length: f64, found: &mut DescentReport, budget: u32) -> bool {
+    /// Finds a descent direction of negative curvature at a stationary point and moves along it. Returns true if there
+    /// is one.
+    pub fn leave_saddle(&mut self, shift: f64, length: f64, report: &mut DescentReport, budget: u32) -> bool {
         self.equation
-            .assemble(&self.network, Tangent::Factor, shift, &mut self.factor);
-        factor::factorise(&mut self.factor, &self.network);
+            .assemble(&self.sparsity, HessianKind::Factor, shift, &mut self.factor);
+        incomplete_cholesky::factorize(&mut self.factor, &self.sparsity);
         self.equation
-            .assemble(&self.network, Tangent::Exact, shift, &mut self.matrix);
+            .assemble(&self.sparsity, HessianKind::Exact, shift, &mut self.matrix);
         let equation = &self.equation;
-        // Numbers that look random, so that no direction is at right angles to them.
+        // Pseudorandom numbers, so that no eigenvector is orthogonal to the right-hand side.
         let mut seed = 1_u64;
         let mut number = || {
             seed = seed
@@ -170,123 +170,129 @@ impl Descent {
                 .wrapping_add(1_442_695_040_888_963_407);
             (seed >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
         };
-        let right = |node: usize| {
+        let rhs = |node: usize| {
             let vector = DVec3::new(number(), number(), number());
             equation.free_part(node, vector)
         };
-        let solved = self.gradient.solve(
-            &self.network,
+        let solved = self.cg.solve(
+            &self.sparsity,
             equation,
             [&self.matrix, &self.factor],
-            right,
+            rhs,
             1e-3,
             budget,
         );
-        found.products += solved.products;
+        report.products += solved.products;
         if !solved.is_negative {
             return false;
         }
-        self.slide(length)
+        self.follow_search_direction(length)
     }
 
-    /// Goes along the direction that was found to bend down, `length` m at first, and on as long as the function falls; whether it
-    /// did.
-    fn slide(&mut self, length: f64) -> bool {
-        let searches = &self.gradient.searches;
-        let change = |part: f64| self.equation.change(&self.network, searches, part)[0];
-        let first = length / longest(searches);
-        let mut part = if change(first) <= change(-first) { first } else { -first };
-        let mut lowest = change(part);
+    /// Moves along the search direction of negative curvature, first by `length` m, then further while the function
+    /// decreases. Returns true if it has decreased.
+    fn follow_search_direction(&mut self, length: f64) -> bool {
+        let search_directions = &self.cg.search_directions;
+        let change = |fraction: f64| self.equation.change(&self.sparsity, search_directions, fraction)[0];
+        let first = length / max_norm(search_directions);
+        let mut fraction = if change(first) <= change(-first) { first } else { -first };
+        let mut lowest = change(fraction);
         for _ in 0..30 {
             let is_falling = lowest < 0.0;
-            let next = if is_falling { 2.0 * part } else { 0.5 * part };
+            let next = if is_falling { 2.0 * fraction } else { 0.5 * fraction };
             let change = change(next);
             if is_falling && !(change < lowest) {
                 break;
             }
-            (part, lowest) = (next, change);
+            (fraction, lowest) = (next, change);
         }
         if !(lowest < 0.0) {
             return false;
         }
-        for (way, search) in self.equation.ways.iter_mut().zip(searches) {
-            *way += *search * part;
+        for (displacement, search) in self.equation.displacements.iter_mut().zip(search_directions) {
+            *displacement += *search * fraction;
         }
         true
     }
 
-    /// Solves the linearised equation; whether its matrix was found indefinite.
-    fn correct(&mut self, tangent: Tangent, shift: f64, goal: &Goal, found: &mut DescentReport) -> bool {
-        self.equation.press();
+    /// Solves the linearized equation. Returns true if the matrix is indefinite.
+    fn solve_correction(
+        &mut self,
+        kind: HessianKind,
+        shift: f64,
+        goal: &DescentGoal,
+        report: &mut DescentReport,
+    ) -> bool {
+        self.equation.update_contacts();
         self.equation
-            .assemble(&self.network, Tangent::Factor, shift, &mut self.factor);
-        factor::factorise(&mut self.factor, &self.network);
-        self.equation.assemble(&self.network, tangent, shift, &mut self.matrix);
+            .assemble(&self.sparsity, HessianKind::Factor, shift, &mut self.factor);
+        incomplete_cholesky::factorize(&mut self.factor, &self.sparsity);
+        self.equation.assemble(&self.sparsity, kind, shift, &mut self.matrix);
         let (equation, residuals) = (&self.equation, &self.residuals);
-        let right = |node: usize| equation.free_part(node, residuals[node]);
-        let budget = goal.budget.saturating_sub(found.products);
-        let solved = self.gradient.solve(
-            &self.network,
+        let rhs = |node: usize| equation.free_part(node, residuals[node]);
+        let budget = goal.budget.saturating_sub(report.products);
+        let solved = self.cg.solve(
+            &self.sparsity,
             equation,
             [&self.matrix, &self.factor],
-            right,
-            PART,
+            rhs,
+            LINEAR_TOLERANCE,
             budget,
         );
-        found.products += solved.products;
+        report.products += solved.products;
         solved.is_negative
     }
 
-    /// Goes along the correction as far as the function falls enough: what part of it, and what that brought as a part of what
-    /// was promised.
-    fn go(&mut self, promised: f64) -> (f64, f64) {
-        let corrections = &self.gradient.corrections;
-        let mut part = 1.0;
+    /// Moves along the correction until the function has decreased enough. Returns the fraction of the correction, and
+    /// the ratio of actual to predicted decrease.
+    fn line_search(&mut self, predicted: f64) -> (f64, f64) {
+        let corrections = &self.cg.corrections;
+        let mut fraction = 1.0;
         for _ in 0..50 {
-            let [change, terms] = self.equation.change(&self.network, corrections, part);
+            let [change, terms] = self.equation.change(&self.sparsity, corrections, fraction);
             let is_noise = change.abs() <= ROUNDING * terms;
-            if change <= -ENOUGH * part * promised || is_noise {
-                let gain = if is_noise {
+            if change <= -ARMIJO * fraction * predicted || is_noise {
+                let decrease_ratio = if is_noise {
                     1.0
                 } else {
-                    -change / (part * (1.0 - 0.5 * part) * promised)
+                    -change / (fraction * (1.0 - 0.5 * fraction) * predicted)
                 };
-                if gain > MORE && part == 1.0 {
-                    part = self.go_on(change);
+                if decrease_ratio > EXTEND_RATIO && fraction == 1.0 {
+                    fraction = self.extend_step(change);
                 }
-                for (way, correction) in self.equation.ways.iter_mut().zip(corrections) {
-                    *way += *correction * part;
+                for (displacement, correction) in self.equation.displacements.iter_mut().zip(corrections) {
+                    *displacement += *correction * fraction;
                 }
-                return (part, gain);
+                return (fraction, decrease_ratio);
             }
-            // Where a parabola through what is known is lowest.
-            let lowest = 0.5 * part * promised / (promised + change / part);
-            part = if lowest.is_finite() {
-                lowest.clamp(0.1 * part, 0.5 * part)
+            // Minimum of the interpolating parabola.
+            let lowest = 0.5 * fraction * predicted / (predicted + change / fraction);
+            fraction = if lowest.is_finite() {
+                lowest.clamp(0.1 * fraction, 0.5 * fraction)
             } else {
-                0.1 * part
+                0.1 * fraction
             };
         }
         (0.0, 0.0)
     }
 
-    /// How far along the correction the function goes on falling, in powers of two.
-    fn go_on(&self, change: f64) -> f64 {
-        let (mut part, mut lowest) = (1.0, change);
+    /// Doubles the step while the function decreases. Returns the fraction of the correction.
+    fn extend_step(&self, change: f64) -> f64 {
+        let (mut fraction, mut lowest) = (1.0, change);
         for _ in 0..30 {
             let [change, _] = self
                 .equation
-                .change(&self.network, &self.gradient.corrections, 2.0 * part);
+                .change(&self.sparsity, &self.cg.corrections, 2.0 * fraction);
             if !(change < lowest) {
                 break;
             }
-            (part, lowest) = (2.0 * part, change);
+            (fraction, lowest) = (2.0 * fraction, change);
         }
-        part
+        fraction
     }
 
     fn inertia_of_correction(&self) -> f64 {
-        let corrections = self.gradient.corrections.iter().zip(&self.equation.masses);
+        let corrections = self.cg.corrections.iter().zip(&self.equation.masses);
         corrections
             .map(|(correction, mass)| mass * correction.length_squared())
             .sum()

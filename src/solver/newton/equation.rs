@@ -1,88 +1,92 @@
-//! What is made as small as it can be: `Phi(s) = sum (c s² / 2 - b s) + E(x + s)`, with E the energy of the springs.
+//! Objective function: `Phi(s) = sum (c s² / 2 - b s) + E(x + s)`, where E is the internal energy.
 //!
-//! In a step of time t, c is `m/t² + gamma/t`, and b all forces that do not depend on s; at rest c is 0. Damping along springs
-//! has such a function too as long as the directions of the springs are held: each iteration has its own.
+//! In a step with coefficient t, c is `m/t² + gamma/t` and b contains all forces that do not depend on s. In static
+//! equilibrium, c is 0. Spring damping has such a potential, too, if the spring directions are fixed; each iteration
+//! updates them.
 
 use glam::{DMat3, DVec3};
 
 use super::matrix::Matrix;
-use super::network::{Element, Network, PAIRS, Tetrahedron};
+use super::sparsity::{Element, PAIRS, Sparsity, Tetrahedron};
 use crate::base::{Result, memory, outer, trace};
 use crate::codec::saved;
-use crate::contact::Holds;
-use crate::elements::Deformed;
+use crate::contact::ContactMultipliers;
+use crate::elements::DeformedTet;
 use crate::nodes::Pins;
-use crate::solver::held::without_held;
+use crate::solver::masked_axes::mask_axes;
 use crate::springs::Link;
 
-/// The function, and where on it we are.
+/// Objective function and current state.
 #[derive(Debug)]
 pub(super) struct Equation {
-    /// x: where nodes are without a way, m.
-    pub anchors: Vec<DVec3>,
-    /// s, m; 0 for nodes that are held.
-    pub ways: Vec<DVec3>,
+    /// x, positions for s = 0, m.
+    pub predicted_positions: Vec<DVec3>,
+    /// s, m; 0 for held nodes.
+    pub displacements: Vec<DVec3>,
     /// c, N/m.
     pub inertia: Vec<f64>,
     /// b, N.
     pub loads: Vec<DVec3>,
-    /// kg; 0 for nodes that are held.
+    /// Masses, kg; 0 for held nodes.
     pub masses: Vec<f64>,
-    /// Velocities without a way, m/s: for springs with damping alone.
-    pub drifts: Vec<DVec3>,
-    /// What tools do.
-    pub holds: Holds,
-    /// Lent by the body while it is solved: along the axes that a node is held along its way is 0.
+    /// Velocities for s = 0, m/s. They are used by spring damping only.
+    pub predicted_velocities: Vec<DVec3>,
+    /// Contact constraints of tools.
+    pub multipliers: ContactMultipliers,
+    /// Pins, borrowed from the body during a solve. Displacements along held axes are 0.
     pub pins: Pins,
-    /// What a way counts as a velocity, 1/s; 0: nothing is damped.
+    /// Velocity per displacement, 1/s; 0 without damping.
     pub rate: f64,
-    /// Of the nodes where volume is kept by rings, Pa, at the ways of which forces and matrices were made last.
+    /// Nodal pressures of rings, Pa, at the displacements of the last forces and matrices.
     pressures: Vec<f64>,
-    /// There too, of each tetrahedron: how its volume grows with the place of each corner, m².
-    areas: Vec<[DVec3; 4]>,
+    /// Gradient of each tetrahedron's volume at its corners, m², at the same displacements.
+    volume_gradients: Vec<[DVec3; 4]>,
 }
 
-saved! { Equation { anchors, ways, inertia, loads, masses, drifts, holds, pins, rate, pressures, areas } }
+saved! { Equation {
+    predicted_positions, displacements, inertia, loads, masses, predicted_velocities, multipliers, pins, rate, pressures,
+    volume_gradients,
+} }
 
-/// What of the stiffness of rings stands in the factor, as a part of what it were if each tetrahedron kept its volume.
-const PART_OF_RINGS: f32 = 0.05;
+/// Share of the ring stiffness in the factor, relative to tetrahedra that keep their volumes individually.
+const RING_STIFFNESS_SHARE: f32 = 0.05;
 
-/// Which matrix is made.
+/// Kind of matrix to assemble.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Tangent {
+pub(super) enum HessianKind {
     /// All second derivatives.
     Exact,
-    /// Without what pressed springs do sideways: positive semidefinite.
+    /// Without the lateral softening of compressed springs: positive semidefinite.
     Clamped,
-    /// The same as far as it has the pattern of the network, to be factorised.
+    /// `Clamped`, restricted to the sparsity pattern, for the factor.
     Factor,
 }
 
-/// A spring where it is.
-struct Spring {
-    way: DVec3,
+/// State of a spring.
+struct CurrentSpring {
+    edge: DVec3,
     length: f64,
     direction: DVec3,
-    /// How fast it lengthens, m/s.
+    /// Rate of elongation, m/s.
     speed: f64,
 }
 
 impl Equation {
-    /// For so many nodes, rings, and tetrahedra in rings.
+    /// Creates the equation for these numbers of nodes, of rings, and of tetrahedra in rings.
     pub fn new(node_count: usize, ring_count: usize, member_count: usize) -> Result<Self> {
         let vectors = || memory::filled(DVec3::ZERO, node_count);
         Ok(Self {
-            anchors: vectors()?,
-            ways: vectors()?,
+            predicted_positions: vectors()?,
+            displacements: vectors()?,
             inertia: memory::filled(0.0, node_count)?,
             loads: vectors()?,
             masses: memory::filled(0.0, node_count)?,
-            drifts: vectors()?,
-            holds: Holds::default(),
+            predicted_velocities: vectors()?,
+            multipliers: ContactMultipliers::default(),
             pins: Pins::default(),
             rate: 0.0,
             pressures: memory::filled(0.0, ring_count)?,
-            areas: memory::reserved(member_count)?,
+            volume_gradients: memory::reserved(member_count)?,
         })
     }
 
@@ -91,7 +95,7 @@ impl Equation {
         self.masses[node] > 0.0
     }
 
-    /// The part of a node's vector along axes along which it is free to move.
+    /// Components of a node's vector along free axes.
     #[inline]
     pub fn free_part(&self, node: usize, vector: DVec3) -> DVec3 {
         if self.is_free(node) {
@@ -103,107 +107,113 @@ impl Equation {
 
     #[inline(always)]
     pub fn position(&self, node: usize) -> DVec3 {
-        self.anchors[node] + self.ways[node]
+        self.predicted_positions[node] + self.displacements[node]
     }
 
-    /// How far all nodes reach along an axis, m.
+    /// Largest extent of the nodes along an axis, m.
     pub fn extent(&self) -> f64 {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for node in 0..self.anchors.len() {
+        for node in 0..self.predicted_positions.len() {
             low = low.min(self.position(node));
             high = high.max(self.position(node));
         }
         (high - low).max_element()
     }
 
-    /// Minus the slope, N: what acts on each node, held ones too.
-    pub fn residuals(&mut self, network: &Network, residuals: &mut [DVec3]) {
-        self.find_pressures(network);
+    /// Computes minus the gradient, N: the force on each node, including held ones.
+    pub fn residuals(&mut self, sparsity: &Sparsity, residuals: &mut [DVec3]) {
+        self.find_pressures(sparsity);
         for (node, residual) in residuals.iter_mut().enumerate() {
-            *residual = self.loads[node] - self.ways[node] * self.inertia[node];
+            *residual = self.loads[node] - self.displacements[node] * self.inertia[node];
         }
-        for (_, node, link) in network.springs() {
+        for (_, node, link) in sparsity.springs() {
             let spring = self.spring(node, link);
             let pull = stiffness(link) * (spring.length - rest_length(link)) + damping(link) * spring.speed;
             let force = spring.direction * pull;
             residuals[node] += force;
-            residuals[link.neighbour as usize] -= force;
+            residuals[link.neighbor as usize] -= force;
         }
-        for element in network.tetrahedra() {
+        for element in sparsity.tetrahedra() {
             let tetrahedron = element.of;
-            let deformed = self.deformed(&element).under_mean(&self.pressures, tetrahedron);
+            let deformed = self.deformed(&element).with_mean_pressure(&self.pressures, tetrahedron);
             for (corner, gradient) in tetrahedron.corners.into_iter().zip(tetrahedron.rest.gradients()) {
                 residuals[corner] += deformed.force(gradient);
             }
         }
         let at = |node: usize| self.position(node);
-        network
-            .beside
-            .show_forces(&at, &mut |node, force| residuals[node] += force);
-        let way = |node: usize| self.ways[node];
-        self.holds
-            .show_forces(way, |node, force| residuals[node] += self.free_part(node, force));
+        sparsity
+            .non_spring
+            .visit_forces(&at, &mut |node, force| residuals[node] += force);
+        let displacement = |node: usize| self.displacements[node];
+        self.multipliers.visit_forces(displacement, |node, force| {
+            residuals[node] += self.free_part(node, force)
+        });
     }
 
-    /// How the function changes where the ways become longer by `part` of `corrections`, and the sum of what it changes by
-    /// at single nodes and springs, without sign: J. Differences are never those of sums.
-    pub fn change(&self, network: &Network, corrections: &[DVec3], part: f64) -> [f64; 2] {
+    /// Returns the change of the function for the displacement `fraction * corrections`, and the sum of the magnitudes
+    /// of its terms, J. Each term is computed without differences of large sums.
+    pub fn change(&self, sparsity: &Sparsity, corrections: &[DVec3], fraction: f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
         let mut add = |change: f64| {
             sums[0] += change;
             sums[1] += change.abs();
         };
         for (node, &correction) in corrections.iter().enumerate() {
-            let (way, inertia) = (correction * part, self.inertia[node]);
-            add(way.dot(self.ways[node] * inertia - self.loads[node]) + 0.5 * inertia * way.length_squared());
+            let (displacement, inertia) = (correction * fraction, self.inertia[node]);
+            add(displacement.dot(self.displacements[node] * inertia - self.loads[node])
+                + 0.5 * inertia * displacement.length_squared());
         }
-        for (_, node, link) in network.springs() {
-            let neighbour = link.neighbour as usize;
+        for (_, node, link) in sparsity.springs() {
+            let neighbor = link.neighbor as usize;
             let spring = self.spring(node, link);
-            let more = (corrections[neighbour] - corrections[node]) * part;
-            let then = spring.way + more;
-            let both = spring.length + then.length();
-            if both > 0.0 {
-                let longer = more.dot(spring.way + then) / both;
-                add(0.5 * stiffness(link) * longer * (both - 2.0 * rest_length(link)));
+            let edge_change = (corrections[neighbor] - corrections[node]) * fraction;
+            let new_edge = spring.edge + edge_change;
+            let length_sum = spring.length + new_edge.length();
+            if length_sum > 0.0 {
+                let elongation = edge_change.dot(spring.edge + new_edge) / length_sum;
+                add(0.5 * stiffness(link) * elongation * (length_sum - 2.0 * rest_length(link)));
             }
-            let along = more.dot(spring.direction);
+            let along = edge_change.dot(spring.direction);
             add(0.5 * damping(link) * along * (2.0 * spring.speed + self.rate * along));
         }
-        for element in network.tetrahedra() {
+        for element in sparsity.tetrahedra() {
             let tetrahedron = element.of;
-            let more = edges(&tetrahedron.corners, |node| corrections[node] * part);
-            let [of_strain, of_volume, of_load, _] = self.deformed(&element).change(&tetrahedron.rest, more);
-            add(of_strain);
-            add(of_volume);
-            add(of_load);
+            let edge_changes = edges(&tetrahedron.corners, |node| corrections[node] * fraction);
+            let [strain_change, volume_change, load_change, _] =
+                self.deformed(&element).change(&tetrahedron.rest, edge_changes);
+            add(strain_change);
+            add(volume_change);
+            add(load_change);
         }
-        for node in 0..network.ring_count() {
-            let (mut growth, mut more) = (0.0, 0.0);
-            for element in network.ring(node) {
+        for node in 0..sparsity.ring_count() {
+            let (mut volume_change, mut increment) = (0.0, 0.0);
+            for element in sparsity.ring(node) {
                 let tetrahedron = element.of;
                 let deformed = self.deformed(&element);
-                growth += 0.25 * deformed.swelling();
-                let longer = edges(&tetrahedron.corners, |node| corrections[node] * part);
-                more += 0.25 * deformed.change(&tetrahedron.rest, longer)[3];
+                volume_change += 0.25 * deformed.volume_change();
+                let edge_changes = edges(&tetrahedron.corners, |node| corrections[node] * fraction);
+                increment += 0.25 * deformed.change(&tetrahedron.rest, edge_changes)[3];
             }
-            let volume = network.volumes[node];
+            let volume = sparsity.volumes[node];
             if volume > 0.0 {
-                add(0.5 * network.kappa() / volume * more * (2.0 * growth + more));
-                add(network.ring_load(node) * more);
+                add(0.5 * sparsity.kappa() / volume * increment * (2.0 * volume_change + increment));
+                add(sparsity.ring_load(node) * increment);
             }
         }
-        let (way, more) = (|node: usize| self.ways[node], |node: usize| corrections[node] * part);
-        network
-            .beside
-            .show_changes(&|node| self.position(node), &more, &mut add);
-        self.holds.show_changes(way, more, add);
+        let (displacement, increment) = (
+            |node: usize| self.displacements[node],
+            |node: usize| corrections[node] * fraction,
+        );
+        sparsity
+            .non_spring
+            .visit_changes(&|node| self.position(node), &increment, &mut add);
+        self.multipliers.visit_energy_changes(displacement, increment, add);
         sums
     }
 
-    /// The second derivatives, with `shift` (1/s²) times the mass added.
-    pub fn assemble(&mut self, network: &Network, tangent: Tangent, shift: f64, matrix: &mut Matrix) {
-        self.find_pressures(network);
+    /// Assembles the second derivatives plus `shift` (1/s²) times the masses.
+    pub fn assemble(&mut self, sparsity: &Sparsity, kind: HessianKind, shift: f64, matrix: &mut Matrix) {
+        self.find_pressures(sparsity);
         for (node, block) in matrix.diagonal.iter_mut().enumerate() {
             *block = if self.is_free(node) {
                 DMat3::from_diagonal(DVec3::splat(self.inertia[node] + shift * self.masses[node]))
@@ -211,206 +221,210 @@ impl Equation {
                 DMat3::IDENTITY
             };
         }
-        matrix.beside.resize(network.pair_count(), DMat3::ZERO);
-        for (place, node, link) in network.springs() {
-            let neighbour = link.neighbour as usize;
-            let block = self.stiffness_of(node, link, tangent);
-            for end in [node, neighbour] {
+        matrix.off_diagonal.resize(sparsity.pair_count(), DMat3::ZERO);
+        for (index, node, link) in sparsity.springs() {
+            let neighbor = link.neighbor as usize;
+            let block = self.stiffness_of(node, link, kind);
+            for end in [node, neighbor] {
                 if self.is_free(end) {
                     matrix.diagonal[end] += block;
                 }
             }
-            let joins = self.is_free(node) && self.is_free(neighbour);
-            matrix.beside[place] = if joins { -block } else { DMat3::ZERO };
+            let joins = self.is_free(node) && self.is_free(neighbor);
+            matrix.off_diagonal[index] = if joins { -block } else { DMat3::ZERO };
         }
-        for element in network.tetrahedra() {
-            self.add_tetrahedron(element, tangent, matrix);
+        for element in sparsity.tetrahedra() {
+            self.add_tetrahedron(element, kind, matrix);
         }
-        self.add_terms(network, tangent, matrix);
-        if tangent == Tangent::Exact {
-            self.add_pressure(network, matrix);
+        self.add_terms(sparsity, kind, matrix);
+        if kind == HessianKind::Exact {
+            self.add_pressure(sparsity, matrix);
         }
-        self.holds.show_blocks(|node, block| {
+        self.multipliers.visit_blocks(|node, block| {
             if self.is_free(node) {
-                matrix.diagonal[node] += whole(block);
+                matrix.diagonal[node] += symmetric_matrix(block);
             }
         });
         if self.pins.are_partial() {
-            self.leave_out_held(network, matrix);
+            self.remove_held_axes(sparsity, matrix);
         }
     }
 
-    /// Takes out of a matrix the rows and columns of axes that nodes are held along, but for the diagonal, which stays positive.
-    fn leave_out_held(&self, network: &Network, matrix: &mut Matrix) {
+    /// Removes the rows and columns of held axes. Their diagonal entries remain positive.
+    fn remove_held_axes(&self, sparsity: &Sparsity, matrix: &mut Matrix) {
         let held = |node: usize| self.pins.partial_axes_of(node as u32);
-        for node in 0..network.node_count() {
-            for place in network.row(node) {
-                let nodes = [node, network.neighbour(place)];
-                matrix.beside[place] = without_held(matrix.beside[place], nodes.map(held));
+        for node in 0..sparsity.node_count() {
+            for index in sparsity.row(node) {
+                let nodes = [node, sparsity.neighbor(index)];
+                matrix.off_diagonal[index] = mask_axes(matrix.off_diagonal[index], nodes.map(held));
             }
         }
         for pin in self.pins.partial() {
             let block = &mut matrix.diagonal[pin.node as usize];
-            *block = without_held(*block, [pin.axes; 2]);
+            *block = mask_axes(*block, [pin.axes; 2]);
             let size = trace(block);
             let size = if size > 0.0 { size } else { 1.0 };
             *block += DMat3::from_diagonal(DVec3::select(pin.axes, DVec3::splat(size), DVec3::ZERO));
         }
     }
 
-    fn add_tetrahedron(&self, mut element: Element, tangent: Tangent, matrix: &mut Matrix) {
+    fn add_tetrahedron(&self, mut element: Element, kind: HessianKind, matrix: &mut Matrix) {
         let (law, tetrahedron) = (&mut element.law, element.of);
-        if tangent == Tangent::Factor && law.rings {
-            law.rings = false;
-            law.kappa *= PART_OF_RINGS;
+        if kind == HessianKind::Factor && law.nodal_pressure {
+            law.nodal_pressure = false;
+            law.kappa *= RING_STIFFNESS_SHARE;
         }
         let deformed = self.deformed(&element);
         let gradients = tetrahedron.rest.gradients();
-        let pressed = deformed.under_mean(&self.pressures, tetrahedron);
-        let stiffness = |a: usize, b: usize| match tangent {
-            Tangent::Exact => pressed.stiffness(gradients[a], gradients[b]),
-            Tangent::Clamped | Tangent::Factor => deformed.clamped_stiffness(gradients[a], gradients[b]),
+        let with_pressure = deformed.with_mean_pressure(&self.pressures, tetrahedron);
+        let stiffness = |a: usize, b: usize| match kind {
+            HessianKind::Exact => with_pressure.stiffness(gradients[a], gradients[b]),
+            HessianKind::Clamped | HessianKind::Factor => deformed.clamped_stiffness(gradients[a], gradients[b]),
         };
         let corners = tetrahedron.corners;
         for corner in (0..4).filter(|&corner| self.is_free(corners[corner])) {
             matrix.diagonal[corners[corner]] += stiffness(corner, corner);
         }
-        for ([a, b], place) in PAIRS.into_iter().zip(tetrahedron.places) {
+        for ([a, b], index) in PAIRS.into_iter().zip(tetrahedron.pair_indices) {
             if self.is_free(corners[a]) && self.is_free(corners[b]) {
                 let (high, low) = if corners[a] > corners[b] { (a, b) } else { (b, a) };
-                matrix.beside[place] += stiffness(high, low);
+                matrix.off_diagonal[index] += stiffness(high, low);
             }
         }
     }
 
-    fn add_terms(&self, network: &Network, tangent: Tangent, matrix: &mut Matrix) {
-        let (at, is_exact) = (|node: usize| self.position(node), tangent == Tangent::Exact);
-        network.beside.show_blocks(&at, is_exact, &mut |nodes, blocks| {
-            if tangent == Tangent::Factor && nodes.len() > 2 {
-                self.add_pairs(network, nodes, blocks, matrix);
+    fn add_terms(&self, sparsity: &Sparsity, kind: HessianKind, matrix: &mut Matrix) {
+        let (at, is_exact) = (|node: usize| self.position(node), kind == HessianKind::Exact);
+        sparsity.non_spring.visit_blocks(&at, is_exact, &mut |nodes, blocks| {
+            if kind == HessianKind::Factor && nodes.len() > 2 {
+                self.add_pairs(sparsity, nodes, blocks, matrix);
                 return;
             }
-            for (a, &of_a) in nodes.iter().enumerate() {
-                if !self.is_free(of_a as usize) {
+            for (a, &node_a) in nodes.iter().enumerate() {
+                if !self.is_free(node_a as usize) {
                     continue;
                 }
-                matrix.diagonal[of_a as usize] += blocks[a][a];
-                for (b, &of_b) in nodes.iter().enumerate() {
-                    if of_b < of_a && self.is_free(of_b as usize) {
-                        matrix.beside[network.place([of_a, of_b])] += blocks[a][b];
+                matrix.diagonal[node_a as usize] += blocks[a][a];
+                for (b, &node_b) in nodes.iter().enumerate() {
+                    if node_b < node_a && self.is_free(node_b as usize) {
+                        matrix.off_diagonal[sparsity.pair_index([node_a, node_b])] += blocks[a][b];
                     }
                 }
             }
         });
     }
 
-    /// Adds what pressure does as a surface turns. It draws one way as much as it pushes another: there is nothing of it that a matrix
-    /// without negative curvature could have.
-    fn add_pressure(&self, network: &Network, matrix: &mut Matrix) {
+    /// Adds the coupling by pressure on a rotating surface. It is indefinite, so the clamped matrix has none of it.
+    fn add_pressure(&self, sparsity: &Sparsity, matrix: &mut Matrix) {
         let at = |node: usize| self.position(node);
-        network.beside.show_pressure_blocks(&at, &mut |[a, b], block| {
+        sparsity.non_spring.visit_pressure_blocks(&at, &mut |[a, b], block| {
             if self.is_free(a as usize) && self.is_free(b as usize) {
-                matrix.beside[network.place([a, b])] += if a > b { block } else { block.transpose() };
+                matrix.off_diagonal[sparsity.pair_index([a, b])] += if a > b { block } else { block.transpose() };
             }
         });
     }
 
-    /// Adds to a matrix that is to be factorised a term of several nodes, as springs between those that draw each other: of a matrix
-    /// whose nodes push each other too an incomplete factor may be anything.
-    fn add_pairs(&self, network: &Network, nodes: &[u32], blocks: &[[DMat3; 4]; 4], matrix: &mut Matrix) {
-        for (a, &of_a) in nodes.iter().enumerate() {
-            for (b, &of_b) in nodes[..a].iter().enumerate() {
+    /// Adds a term of several nodes to the matrix for the factor, as springs between nodes that attract each other.
+    /// With repulsive couplings the incomplete factor could be arbitrarily bad.
+    fn add_pairs(&self, sparsity: &Sparsity, nodes: &[u32], blocks: &[[DMat3; 4]; 4], matrix: &mut Matrix) {
+        for (a, &node_a) in nodes.iter().enumerate() {
+            for (b, &node_b) in nodes[..a].iter().enumerate() {
                 let [x, y, z] = [0, 1, 2].map(|axis| blocks[a][b].col(axis)[axis]);
                 let stiffness = -(x + y + z) / 3.0;
                 if !(stiffness > 0.0) {
                     continue;
                 }
                 let block = DMat3::from_diagonal(DVec3::splat(stiffness));
-                let ends = [of_a, of_b].map(|node| node as usize);
+                let ends = [node_a, node_b].map(|node| node as usize);
                 for end in ends.into_iter().filter(|&end| self.is_free(end)) {
                     matrix.diagonal[end] += block;
                 }
                 if ends.into_iter().all(|end| self.is_free(end)) {
-                    matrix.beside[network.place([of_a, of_b])] -= block;
+                    matrix.off_diagonal[sparsity.pair_index([node_a, node_b])] -= block;
                 }
             }
         }
     }
 
-    /// Brings the pressures of rings up to the ways, and what their changes depend on.
-    fn find_pressures(&mut self, network: &Network) {
+    /// Updates the ring pressures and volume gradients to the current displacements.
+    fn find_pressures(&mut self, sparsity: &Sparsity) {
         if self.pressures.is_empty() {
             return;
         }
         self.pressures.fill(0.0);
-        self.areas.clear();
-        for element in network.tetrahedra() {
+        self.volume_gradients.clear();
+        for element in sparsity.tetrahedra() {
             let (deformed, tetrahedron) = (self.deformed(&element), element.of);
             for corner in tetrahedron.corners {
-                self.pressures[corner] += 0.25 * deformed.swelling();
+                self.pressures[corner] += 0.25 * deformed.volume_change();
             }
-            let areas = tetrahedron.rest.gradients().map(|gradient| deformed.area(gradient));
-            self.areas.push(areas);
+            let volume_gradients = tetrahedron.rest.gradients().map(|gradient| deformed.area(gradient));
+            self.volume_gradients.push(volume_gradients);
         }
-        network.press(&mut self.pressures);
+        sparsity.convert_to_pressures(&mut self.pressures);
         for (node, pressure) in self.pressures.iter_mut().enumerate() {
-            *pressure += network.ring_load(node);
+            *pressure += sparsity.ring_load(node);
         }
     }
 
-    /// Adds to the products with a matrix what rings have beside it; `changes` are for the work.
-    fn add_products_of_rings(&self, network: &Network, vectors: &[DVec3], products: &mut [DVec3], changes: &mut [f64]) {
+    /// Adds the ring part of products with the matrix. `changes` is scratch space.
+    fn add_ring_products(&self, sparsity: &Sparsity, vectors: &[DVec3], products: &mut [DVec3], changes: &mut [f64]) {
         changes.fill(0.0);
-        let tetrahedra = || network.tetrahedra().map(|element| element.of.corners).zip(&self.areas);
-        for (corners, areas) in tetrahedra() {
-            let grows = |(corner, area): (usize, &DVec3)| 0.25 * area.dot(vectors[corner]);
-            let growth: f64 = corners.into_iter().zip(areas).map(grows).sum();
+        let tetrahedra = || {
+            sparsity
+                .tetrahedra()
+                .map(|element| element.of.corners)
+                .zip(&self.volume_gradients)
+        };
+        for (corners, volume_gradients) in tetrahedra() {
+            let volume_change = |(corner, area): (usize, &DVec3)| 0.25 * area.dot(vectors[corner]);
+            let growth: f64 = corners.into_iter().zip(volume_gradients).map(volume_change).sum();
             for corner in corners {
                 changes[corner] += growth;
             }
         }
-        network.press(changes);
-        for (corners, areas) in tetrahedra() {
+        sparsity.convert_to_pressures(changes);
+        for (corners, volume_gradients) in tetrahedra() {
             let change: f64 = corners.iter().map(|&corner| 0.25 * changes[corner]).sum();
-            for (corner, area) in corners.into_iter().zip(areas) {
+            for (corner, area) in corners.into_iter().zip(volume_gradients) {
                 products[corner] += self.free_part(corner, *area * change);
             }
         }
     }
 
-    fn deformed(&self, element: &Element) -> Deformed {
+    fn deformed(&self, element: &Element) -> DeformedTet {
         let edges = edges(&element.of.corners, |node| self.position(node));
-        Deformed::new(element.law, &element.of.rest, edges).loaded(element.load)
+        DeformedTet::new(element.law, &element.of.rest, edges).with_extra_stress(element.load)
     }
 
-    /// Brings what contacts do up to the ways, of which the matrix is made.
-    pub fn press(&mut self) {
-        let ways = &self.ways;
-        self.holds.press(|node| ways[node]);
+    /// Updates contact forces to the current displacements, for the matrix.
+    pub fn update_contacts(&mut self) {
+        let displacements = &self.displacements;
+        self.multipliers.evaluate(|node| displacements[node]);
     }
 
-    /// Adds to the products with a matrix what contacts of several nodes have beside its diagonal, rings and volumes of
-    /// cavities; `changes` has a number for each ring.
-    pub fn add_products(&self, network: &Network, vectors: &[DVec3], products: &mut [DVec3], changes: &mut [f64]) {
+    /// Adds the parts of products that the assembled matrix lacks: rings, cavities, and off-diagonal blocks of
+    /// contacts. `changes` has one entry per ring.
+    pub fn add_products(&self, sparsity: &Sparsity, vectors: &[DVec3], products: &mut [DVec3], changes: &mut [f64]) {
         if !changes.is_empty() {
-            self.add_products_of_rings(network, vectors, products, changes);
+            self.add_ring_products(sparsity, vectors, products, changes);
         }
         let at = |node: usize| self.position(node);
-        network.beside.show_products(&at, vectors, &mut |node, product| {
+        sparsity.non_spring.visit_products(&at, vectors, &mut |node, product| {
             products[node] += self.free_part(node, product);
         });
         let vector = |node: usize| vectors[node];
-        self.holds.show_products(vector, |node, product| {
+        self.multipliers.visit_products(vector, |node, product| {
             products[node] += self.free_part(node, product);
         });
-        self.holds.show_blocks(|node, block| {
-            products[node] -= self.free_part(node, whole(block) * vectors[node]);
+        self.multipliers.visit_blocks(|node, block| {
+            products[node] -= self.free_part(node, symmetric_matrix(block) * vectors[node]);
         });
     }
 
-    /// The matrix of a spring, `x n n^T + y I`.
-    fn stiffness_of(&self, node: usize, link: &Link, tangent: Tangent) -> DMat3 {
-        let Spring {
+    /// Stiffness matrix of a spring, `x n n^T + y I`.
+    fn stiffness_of(&self, node: usize, link: &Link, kind: HessianKind) -> DMat3 {
+        let CurrentSpring {
             length,
             direction,
             speed,
@@ -422,36 +436,37 @@ impl Equation {
         } else if length > 0.0 {
             stiffness * (1.0 - rest_length / length)
         } else {
-            // Where the ends coincide there is no side to be pushed to.
+            // Coincident ends have no lateral direction.
             0.0
         };
         if length > 0.0 {
             across += damping(link) * speed / length;
         }
-        if tangent != Tangent::Exact {
+        if kind != HessianKind::Exact {
             across = across.max(0.0);
         }
         let along = stiffness + damping(link) * self.rate - across;
         outer(direction, direction) * along + DMat3::from_diagonal(DVec3::splat(across))
     }
 
-    /// The energy of springs, elements, terms, cavities and loads, J, with the origin of coordinates at `origin`.
-    pub fn potential(&mut self, network: &Network, origin: DVec3) -> f64 {
-        let elastic: f64 = network
+    /// Returns the potential energy of springs, elements, terms, cavities and loads, J. The coordinates are relative to
+    /// `origin`.
+    pub fn potential(&mut self, sparsity: &Sparsity, origin: DVec3) -> f64 {
+        let elastic: f64 = sparsity
             .springs()
             .map(|(_, node, link)| 0.5 * stiffness(link) * (self.spring(node, link).length - rest_length(link)).powi(2))
             .sum();
-        let mut of_elements: f64 = network
+        let mut element_energy: f64 = sparsity
             .tetrahedra()
             .map(|element| self.deformed(&element).energy())
             .sum();
-        self.find_pressures(network);
-        for (pressure, volume) in self.pressures.iter().zip(&network.volumes) {
-            of_elements += 0.5 * pressure * pressure * volume / network.kappa();
+        self.find_pressures(sparsity);
+        for (pressure, volume) in self.pressures.iter().zip(&sparsity.volumes) {
+            element_energy += 0.5 * pressure * pressure * volume / sparsity.kappa();
         }
-        let [of_terms, stored, work] = network.beside.energy(&|node| self.position(node));
+        let [term_energy, stored, work] = sparsity.non_spring.energy(&|node| self.position(node));
         let loads = self.loads.iter().enumerate();
-        elastic + of_elements + of_terms + stored
+        elastic + element_energy + term_energy + stored
             - work
             - loads
                 .map(|(node, load)| load.dot(self.position(node) + origin))
@@ -459,21 +474,21 @@ impl Equation {
     }
 
     #[inline(always)]
-    fn spring(&self, node: usize, link: &Link) -> Spring {
-        let neighbour = link.neighbour as usize;
-        let way = self.position(neighbour) - self.position(node);
-        let length = way.length();
-        // Where both are at the same place it points along x, from the node with the lower number, which is the neighbour.
-        let direction = if length > 0.0 { way / length } else { DVec3::NEG_X };
+    fn spring(&self, node: usize, link: &Link) -> CurrentSpring {
+        let neighbor = link.neighbor as usize;
+        let edge = self.position(neighbor) - self.position(node);
+        let length = edge.length();
+        // If the ends coincide, the direction is along x, from the node with the lower number, which is the neighbor.
+        let direction = if length > 0.0 { edge / length } else { DVec3::NEG_X };
         let speed = if self.rate > 0.0 {
-            let velocity =
-                self.drifts[neighbour] - self.drifts[node] + (self.ways[neighbour] - self.ways[node]) * self.rate;
+            let velocity = self.predicted_velocities[neighbor] - self.predicted_velocities[node]
+                + (self.displacements[neighbor] - self.displacements[node]) * self.rate;
             velocity.dot(direction)
         } else {
             0.0
         };
-        Spring {
-            way,
+        CurrentSpring {
+            edge,
             length,
             direction,
             speed,
@@ -481,18 +496,18 @@ impl Equation {
     }
 }
 
-impl Deformed {
-    /// Under the mean of its nodes' pressures, where they have any, Pa.
-    fn under_mean(self, pressures: &[f64], tetrahedron: &Tetrahedron) -> Self {
+impl DeformedTet {
+    /// Applies the mean pressure of the corners, if there are ring pressures, Pa.
+    fn with_mean_pressure(self, pressures: &[f64], tetrahedron: &Tetrahedron) -> Self {
         if pressures.is_empty() {
             return self;
         }
         let pressures = tetrahedron.corners.map(|corner| 0.25 * pressures[corner]);
-        self.under(pressures.iter().sum())
+        self.with_pressure(pressures.iter().sum())
     }
 }
 
-/// The edges from the first of four corners to the others.
+/// Edges from the first corner to the others.
 fn edges([a, b, c, d]: &[usize; 4], at: impl Fn(usize) -> DVec3) -> DMat3 {
     let first = at(*a);
     DMat3::from_cols(at(*b) - first, at(*c) - first, at(*d) - first)
@@ -510,6 +525,6 @@ fn damping(link: &Link) -> f64 {
     f64::from(link.damping)
 }
 
-fn whole([xx, yy, zz, yz, zx, xy]: [f64; 6]) -> DMat3 {
+fn symmetric_matrix([xx, yy, zz, yz, zx, xy]: [f64; 6]) -> DMat3 {
     DMat3::from_cols_array(&[xx, xy, zx, xy, yy, yz, zx, yz, zz])
 }

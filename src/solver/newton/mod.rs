@@ -1,92 +1,94 @@
-//! NEWTON: the equations of IMPLICIT, solved to the last digits that count, in `f64`; and states of rest.
+//! NEWTON: solves the equations of IMPLICIT in `f64` to near rounding accuracy, and finds static equilibria.
 //!
-//! A step is where a function of all ways is smallest (`equation.rs`): what a step of IMPLICIT is too, up to the hundredth part
-//! that it leaves. It is found downhill (`descent.rs`) by Newton's method with all second derivatives, by conjugate gradients with
-//! an incomplete factor of the matrix (`gradient.rs`, `factor.rs`), and is done when a correction is short in metres, not when
-//! a residual is small. A state of rest is where the function without inertia is smallest.
+//! A step minimizes a function of all displacements (`equation.rs`). IMPLICIT minimizes the same function to about one
+//! percent. The minimization (`descent.rs`) is Newton's method with all second derivatives. Its linear solver is a
+//! conjugate gradient with an incomplete Cholesky factor (`conjugate_gradient.rs`, `incomplete_cholesky.rs`). It
+//! converges when a correction is short in meters, not when a residual is small. A static equilibrium minimizes the
+//! function without inertia.
 //!
-//! What rounds positions to `f32` at the end of a step is kept and belongs to the next.
+//! Positions are rounded to `f32` at the end of a step. The remainders are stored for the next step.
 
+mod conjugate_gradient;
 mod descent;
 mod equation;
-mod factor;
-mod gradient;
+mod incomplete_cholesky;
 mod matrix;
-mod network;
-mod rest;
+mod rest_state;
+mod sparsity;
 mod step;
 
-pub(crate) use rest::rest_state;
-pub use rest::{RestStateDefinition, RestStateReport};
-pub(super) use step::Aimed;
+pub(crate) use rest_state::rest_state;
+pub use rest_state::{RestStateDefinition, RestStateReport};
+pub(super) use step::StepProblem;
 
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::forces::Forces;
 use crate::soa::Vectors;
 use descent::Descent;
-use step::exact;
+use step::exact_position;
 
-/// What a body that is moved by NEWTON has beside what IMPLICIT needs.
+/// Data that NEWTON needs beside those of IMPLICIT.
 #[derive(Debug)]
 pub(crate) struct Newton {
     descent: Descent,
-    /// What positions lack to be those that were found, m: of the current state and of the step in progress.
+    /// Exact minus stored positions, m: of the current state and of the step in progress.
     remainders: [Vectors; 2],
-    /// For the energy of elements.
-    growths: Vec<f64>,
+    /// Scratch space for the energy of elements.
+    volume_changes: Vec<f64>,
 }
 
-saved! { Newton { descent, remainders, growths } }
+saved! { Newton { descent, remainders, volume_changes } }
 
 impl Newton {
-    /// For a body that these forces move.
+    /// Creates the solver for a body with these forces.
     pub fn new(forces: &Forces) -> Result<Self> {
         let node_count = forces.springs.node_count();
         Ok(Self {
             descent: Descent::new(forces)?,
             remainders: [Vectors::zeros(node_count)?, Vectors::zeros(node_count)?],
-            growths: memory::filled(0.0, forces.ring_count())?,
+            volume_changes: memory::filled(0.0, forces.ring_count())?,
         })
     }
 
-    /// The same for the nodes that these forces have now, with room for so many springs more; positions keep what they lack.
-    pub fn roomier(&self, forces: &Forces, more: usize) -> Result<Self> {
-        let mut roomier = Self::new(forces)?;
-        roomier.make_room(forces.springs.spring_count() + more)?;
-        for (vectors, before) in roomier.remainders.iter_mut().zip(&self.remainders) {
+    /// Creates a solver for the current nodes of these forces, with capacity for `more` springs. It copies the
+    /// remainders.
+    pub fn enlarged(&self, forces: &Forces, more: usize) -> Result<Self> {
+        let mut enlarged = Self::new(forces)?;
+        enlarged.reserve(forces.springs.spring_count() + more)?;
+        for (vectors, before) in enlarged.remainders.iter_mut().zip(&self.remainders) {
             for (node, vector) in before.iter().enumerate() {
                 vectors.set(node, vector);
             }
         }
-        Ok(roomier)
+        Ok(enlarged)
     }
 
-    /// A new node lacks what another does.
-    pub fn copy_remainder(&mut self, place: usize, source: usize, node: usize) {
-        let remainders = &mut self.remainders[place];
+    /// Copies the remainder of `source` to a new node.
+    pub fn copy_remainder(&mut self, slot: usize, source: usize, node: usize) {
+        let remainders = &mut self.remainders[slot];
         remainders.set(node, remainders.get(source));
     }
 
-    /// Makes room for so many springs in all, so that a step needs no memory.
-    pub fn make_room(&mut self, spring_count: usize) -> Result<()> {
-        self.descent.make_room(spring_count)
+    /// Reserves capacity for this number of springs, so that a step does not allocate.
+    pub fn reserve(&mut self, spring_count: usize) -> Result<()> {
+        self.descent.reserve(spring_count)
     }
 
-    /// Positions are exactly what they are.
-    pub fn forget_remainders(&mut self, place: usize) {
-        self.remainders[place].clear();
+    /// Clears the remainders: the stored positions are exact.
+    pub fn forget_remainders(&mut self, slot: usize) {
+        self.remainders[slot].clear();
     }
 
-    /// The energy of these forces, J, with nodes at these positions and what they lack; and the work that a constant pressure has done.
-    pub fn elastic(&mut self, forces: &Forces, positions: &Vectors, place: usize) -> [f64; 2] {
-        let remainders = &self.remainders[place];
-        let at = |node: usize| exact(positions.get(node), remainders.get(node));
-        forces.exact_energy(at, &mut self.growths)
+    /// Returns the stored energy at these positions plus remainders, and the work of constant pressures, J.
+    pub fn elastic(&mut self, forces: &Forces, positions: &Vectors, slot: usize) -> [f64; 2] {
+        let remainders = &self.remainders[slot];
+        let position = |node: usize| exact_position(positions.get(node), remainders.get(node));
+        forces.exact_energy(position, &mut self.volume_changes)
     }
 
-    /// What the next step depends on.
-    pub fn hash(&self, place: usize, hasher: &mut StateHasher) {
-        hasher.write_vectors(self.remainders[place].iter());
+    /// Hashes the data that the next step depends on.
+    pub fn hash(&self, slot: usize, hasher: &mut StateHasher) {
+        hasher.write_vectors(self.remainders[slot].iter());
     }
 }

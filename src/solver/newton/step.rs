@@ -1,79 +1,84 @@
-//! A step of NEWTON: the equation made of the body, and the state made of its solution.
+//! A step of NEWTON: sets up the equation from the body and writes the solution back.
 
 use glam::{DVec3, Vec3};
 
 use super::Newton;
-use super::descent::{DescentReport, Goal};
+use super::descent::{DescentGoal, DescentReport};
 use crate::soa::Vectors;
 use crate::solver::System;
 
-/// Linearised equations solved in a step at most.
+/// Maximum number of linear solves per step.
 const ITERATIONS: u32 = 300;
 
-/// What rounding in `f64` may make of a position, and what storing it in `f32` does, as parts of the body's extent.
+/// Rounding errors of a position, in `f64` and when stored in `f32`, as fractions of the body's extent.
 const ROUNDING: f64 = 1e-12;
-const STORED: f64 = 6e-8;
+const STORAGE_ROUNDING: f64 = 6e-8;
 
-/// A step whose velocities are where they would be without forces.
-pub(in crate::solver) struct Aimed<'a> {
+/// Input of a step whose velocities are at their force-free prediction.
+pub(in crate::solver) struct StepProblem<'a> {
     /// t, s.
     pub time: f64,
-    /// c: the part of the last ways that goes on.
+    /// c, the weight of the last displacements.
     pub carried: f64,
     pub gravity: Vec3,
-    /// Where the substep ends, as a fraction of the step asked for.
+    /// End of the substep, as a fraction of the requested step.
     pub end: f64,
-    /// How far each node went in the last step.
-    pub ways: &'a Vectors,
-    /// What other tissue presses with, N.
-    pub pressed: Option<&'a Vectors>,
-    /// Which remainders belong to the positions now, and to those at the end.
+    /// Displacement of each node in the last step, m.
+    pub displacements: &'a Vectors,
+    /// Contact forces by other tissue, N.
+    pub contact_forces: Option<&'a Vectors>,
+    /// Indices of the remainders for the current and for the next positions.
     pub from: usize,
     pub to: usize,
     pub budget: u32,
     pub accuracy: f64,
-    /// m; 0: none.
+    /// Allowed error of positions, m; 0: none.
     pub tolerance: f64,
 }
 
 impl Newton {
-    /// Solves the step's equation, from these pushes on; leaves the positions at its end and the pushes that lead
-    /// there.
-    pub(in crate::solver) fn solve(&mut self, body: &mut System, aimed: &Aimed, pushes: &mut Vectors) -> DescentReport {
-        self.descent.network.read(&body.forces);
-        self.descent.network.beside = std::mem::take(&mut body.forces.beside);
-        self.set_up(body, aimed, pushes);
+    /// Solves the equation, starting from these force displacements. Writes the positions at the end of the step and
+    /// the final force displacements.
+    pub(in crate::solver) fn solve(
+        &mut self,
+        body: &mut System,
+        problem: &StepProblem,
+        force_displacements: &mut Vectors,
+    ) -> DescentReport {
+        self.descent.sparsity.update(&body.forces);
+        self.descent.sparsity.non_spring = std::mem::take(&mut body.forces.auxiliary);
+        self.set_up(body, problem, force_displacements);
         self.descent.equation.pins = std::mem::take(&mut body.pins);
         if let Some(contacts) = &mut body.contacts {
-            self.descent.equation.holds = std::mem::take(&mut contacts.holds);
+            self.descent.equation.multipliers = std::mem::take(&mut contacts.multipliers);
         }
         let extent = self.descent.equation.extent();
-        let rate = 1.0 / aimed.time;
-        let found = self.descent.run(&Goal {
-            absolute: (ROUNDING * extent).max(0.1 * aimed.tolerance),
-            relative: aimed.accuracy,
-            rounding: STORED * extent,
+        let rate = 1.0 / problem.time;
+        let report = self.descent.run(&DescentGoal {
+            absolute: (ROUNDING * extent).max(0.1 * problem.tolerance),
+            relative: problem.accuracy,
+            rounding: STORAGE_ROUNDING * extent,
             iterations: ITERATIONS,
-            budget: aimed.budget,
+            budget: problem.budget,
             shift: 0.0,
             least_shift: 0.0,
             next_shift: rate * rate,
         });
-        self.descent.weigh();
-        self.descent.equation.press();
-        body.forces.beside = std::mem::take(&mut self.descent.network.beside);
+        self.descent.update_residuals();
+        self.descent.equation.update_contacts();
+        body.forces.auxiliary = std::mem::take(&mut self.descent.sparsity.non_spring);
         body.pins = std::mem::take(&mut self.descent.equation.pins);
         if let Some(contacts) = &mut body.contacts {
-            contacts.holds = std::mem::take(&mut self.descent.equation.holds);
+            contacts.multipliers = std::mem::take(&mut self.descent.equation.multipliers);
         }
-        self.take_over(body, aimed, pushes);
-        found
+        self.write_back(body, problem, force_displacements);
+        report
     }
 
-    fn set_up(&mut self, body: &mut System, aimed: &Aimed, pushes: &Vectors) {
+    fn set_up(&mut self, body: &mut System, problem: &StepProblem, force_displacements: &Vectors) {
         let equation = &mut self.descent.equation;
-        let rate = 1.0 / aimed.time;
-        let gravity = aimed.gravity.as_dvec3();
+        let rate = 1.0 / problem.time;
+        let gravity = problem.gravity.as_dvec3();
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let dampings = body.damping.as_ref().map(|damping| damping.rates());
         let state = body.state.substep();
@@ -81,9 +86,9 @@ impl Newton {
         for node in 0..body.masses.len() {
             let velocity = state.velocities.get(node).as_dvec3();
             let mass = f64::from(body.masses[node]);
-            equation.drifts[node] = velocity;
+            equation.predicted_velocities[node] = velocity;
             equation.loads[node] = gravity * mass;
-            equation.ways[node] = DVec3::ZERO;
+            equation.displacements[node] = DVec3::ZERO;
             equation.masses[node] = 0.0;
             equation.inertia[node] = 0.0;
             if body.inverse_masses[node] == 0.0 {
@@ -91,44 +96,49 @@ impl Newton {
             }
             let damping = dampings.map_or(0.0, |rates| f64::from(rates[node])) * mass;
             let position = state.positions.get(node);
-            let exact = exact(position, self.remainders[aimed.from].get(node));
-            equation.anchors[node] = exact + aimed.ways.get(node).as_dvec3() * aimed.carried + velocity * aimed.time;
-            equation.ways[node] = pushes.get(node).as_dvec3();
+            let start = exact_position(position, self.remainders[problem.from].get(node));
+            equation.predicted_positions[node] =
+                start + problem.displacements.get(node).as_dvec3() * problem.carried + velocity * problem.time;
+            equation.displacements[node] = force_displacements.get(node).as_dvec3();
             equation.masses[node] = mass;
             equation.inertia[node] = (mass * rate + damping) * rate;
             equation.loads[node] -= velocity * damping;
-            for applied in applied.into_iter().chain(aimed.pressed) {
+            for applied in applied.into_iter().chain(problem.contact_forces) {
                 equation.loads[node] += applied.get(node).as_dvec3();
             }
         }
         for pin in body.pins.iter() {
             let node = pin.node as usize;
-            equation.anchors[node] = DVec3::select(pin.axes, pin.place(aimed.end).as_dvec3(), equation.anchors[node]);
-            // What holds it is told without what damping does along these axes.
+            equation.predicted_positions[node] = DVec3::select(
+                pin.axes,
+                pin.position_at(problem.end).as_dvec3(),
+                equation.predicted_positions[node],
+            );
+            // Pin reactions exclude damping along held axes.
             let weight = gravity * f64::from(body.masses[node]);
             equation.loads[node] = DVec3::select(pin.axes, weight, equation.loads[node]);
         }
     }
 
-    fn take_over(&mut self, body: &mut System, aimed: &Aimed, pushes: &mut Vectors) {
+    fn write_back(&mut self, body: &mut System, problem: &StepProblem, force_displacements: &mut Vectors) {
         let equation = &self.descent.equation;
         let next_positions = body.state.substep().next_positions;
-        let remainders = &mut self.remainders[aimed.to];
+        let remainders = &mut self.remainders[problem.to];
         for node in 0..next_positions.len() {
             let exact = equation.position(node);
             let position = exact.as_vec3();
             next_positions.set(node, position);
             remainders.set(node, (exact - position.as_dvec3()).as_vec3());
-            pushes.set(node, equation.ways[node].as_vec3());
+            force_displacements.set(node, equation.displacements[node].as_vec3());
         }
         for pin in body.pins.iter_mut() {
-            pin.solved = -self.descent.residuals[pin.node as usize].as_vec3();
+            pin.reaction = -self.descent.residuals[pin.node as usize].as_vec3();
         }
     }
 }
 
-/// A position with what it lacks, unless it has been put elsewhere since.
-pub(super) fn exact(position: Vec3, remainder: Vec3) -> DVec3 {
+/// Returns a position plus its remainder. If the position was changed since, the remainder is ignored.
+pub(super) fn exact_position(position: Vec3, remainder: Vec3) -> DVec3 {
     let exact = position.as_dvec3() + remainder.as_dvec3();
     if exact.as_vec3() == position {
         exact

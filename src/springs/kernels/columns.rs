@@ -1,16 +1,17 @@
-//! The links of a tile in columns: one link each of sixteen nodes that lie side by side.
+//! The links of a tile in columns. A column holds one link of each of sixteen consecutive nodes.
 //!
-//! A column is a *run* where the neighbours lie side by side too, so that one load fetches them, and a *gather* where they
-//! do not. Its springs share their parameters, or bring their own. What fills no column well, such as most links of a node
-//! that has far more than those around it, is a *stray*: sixteen of those, of any nodes, are worked on at a time.
+//! A column is a *run* if its neighbors are consecutive too, so that one load reads them, and a *gather* otherwise. The
+//! springs of a column share their parameters or have their own. A *stray* is a link outside of columns, such as most
+//! links of a node that has far more links than the nodes around it. Strays of any nodes are evaluated sixteen at a
+//! time.
 //!
-//! Whatever is read without a check at every step is checked here when it is put in.
+//! Values that kernels read without a check are checked here on insertion.
 
 use std::ops::Range;
 
 use super::layout::{
-    Column, ColumnEnds, FarIndices, GatherColumn, Line, LinkPlace, NearIndices, Neighbours, OWN, OwnRun, Parameters,
-    RunColumn, SpringMaterial,
+    Column, ColumnEnds, ColumnParameters, F32x16, FarIndices, GatherColumn, LinkLocation, NearIndices, Neighbors,
+    OWN_PARAMETERS, OwnRun, RunColumn, SpringParameters,
 };
 use super::strays::Strays;
 use crate::base::{Result, memory};
@@ -19,23 +20,23 @@ use crate::order::LANES;
 use crate::soa::{MARGIN, TILE};
 use crate::springs::Link;
 
-/// How far ahead a gather with small indices reaches.
-const WINDOW: usize = 1 << 16;
+/// The number of nodes that 16-bit indices can address.
+const NEAR_WINDOW: usize = 1 << 16;
 
-/// How many links of a node are looked for at a time.
-const AT_ONCE: usize = 16;
+/// The number of links of a node that one search covers.
+const LINKS_PER_SEARCH: usize = 16;
 
 /// The links of the nodes of one tile.
 #[derive(Debug)]
 pub(crate) struct Columns {
-    /// The tile's first node, and how many it has.
+    /// The first node of the tile, and its number of nodes.
     pub(super) first: usize,
     pub(super) count: usize,
-    /// Nodes of the body.
+    /// The number of nodes in the body.
     pub(super) node_count: usize,
-    /// The nodes that the kernel reads; sixteen more at most at the ends of a body.
+    /// The nodes that the kernel reads, with at most sixteen more at the ends of a body.
     pub(super) reads: Range<isize>,
-    /// What small indices count from.
+    /// The node that 16-bit indices are relative to.
     pub(super) window: usize,
     pub(super) blocks: Vec<ColumnEnds>,
     pub(super) runs: Vec<RunColumn>,
@@ -44,14 +45,14 @@ pub(crate) struct Columns {
     pub(super) near_indices: Vec<NearIndices>,
     pub(super) far: Vec<GatherColumn>,
     pub(super) far_indices: Vec<FarIndices>,
-    /// The parameters of columns that bring their own, in the order of the blocks, and in a block runs first, then near and
-    /// far gathers.
-    pub(super) own_rest_lengths: Vec<Line>,
-    /// Empty where all of them are `own_stiffness`.
-    pub(super) own_stiffnesses: Vec<Line>,
+    /// The parameters of columns with per-spring parameters, block by block. Within a block runs come first, then near
+    /// gathers, then far gathers.
+    pub(super) own_rest_lengths: Vec<F32x16>,
+    /// Empty if all stiffnesses equal `own_stiffness`.
+    pub(super) own_stiffnesses: Vec<F32x16>,
     pub(super) own_stiffness: f32,
-    /// Empty in a body whose springs have no damping.
-    pub(super) own_dampings: Vec<Line>,
+    /// Empty in a body without spring damping.
+    pub(super) own_dampings: Vec<F32x16>,
     pub(super) damped: bool,
     pub(super) strays: Strays,
 }
@@ -62,8 +63,8 @@ saved! { Columns {
 } }
 
 impl Columns {
-    /// No links yet of `nodes`, of a body of `node_count`. Springs that bring their own parameters have this stiffness;
-    /// `None`: each its own.
+    /// Creates empty columns for `nodes` of a body with `node_count` nodes. Columns with per-spring parameters use this
+    /// uniform stiffness; with `None` each spring has its own.
     pub fn new(nodes: Range<usize>, node_count: usize, own_stiffness: Option<f32>, damped: bool) -> Self {
         assert!(nodes.start.is_multiple_of(LANES) && nodes.end <= node_count && nodes.len() <= TILE);
         Self {
@@ -73,8 +74,8 @@ impl Columns {
             reads: nodes.start as isize..nodes.end.next_multiple_of(LANES) as isize,
             window: nodes
                 .start
-                .saturating_sub(WINDOW / 2)
-                .min(node_count.saturating_sub(WINDOW)),
+                .saturating_sub(NEAR_WINDOW / 2)
+                .min(node_count.saturating_sub(NEAR_WINDOW)),
             blocks: Vec::new(),
             runs: Vec::new(),
             own_runs: Vec::new(),
@@ -91,21 +92,21 @@ impl Columns {
         }
     }
 
-    /// The columns of the next sixteen nodes; those that are shared are of `materials`.
-    pub fn push_block(&mut self, columns: &[Column], materials: &[SpringMaterial]) -> Result<()> {
+    /// Appends the columns of the next sixteen nodes. Shared parameters refer to `table`.
+    pub fn push_block(&mut self, columns: &[Column], table: &[SpringParameters]) -> Result<()> {
         let first = self.first + self.blocks.len() * LANES;
         let nodes = (self.first + self.count).saturating_sub(first).min(LANES);
         assert!(nodes > 0, "a block beyond the tile's last node");
-        let kinds: [fn(&Self, &Neighbours) -> bool; 3] = [
-            |_, neighbours| matches!(neighbours, Neighbours::Run(_)),
+        let kinds: [fn(&Self, &Neighbors) -> bool; 3] = [
+            |_, neighbors| matches!(neighbors, Neighbors::Run(_)),
             Self::is_near,
             Self::is_far,
         ];
         for kind in kinds {
             for column in columns {
-                if kind(self, &column.neighbours) {
+                if kind(self, &column.neighbors) {
                     assert!(column.lanes != 0 && u32::from(column.lanes) < 1 << nodes);
-                    self.push_column(first, column, materials)?;
+                    self.push_column(first, column, table)?;
                 }
             }
         }
@@ -121,7 +122,7 @@ impl Columns {
         )
     }
 
-    /// Adds nodes without links, up to this one in the order of the body. Changes nothing where it fails.
+    /// Appends nodes without links up to the body's node `end`. Changes nothing on failure.
     pub fn grow(&mut self, end: usize) -> Result<()> {
         let count = end - self.first;
         assert!(count <= TILE);
@@ -129,16 +130,16 @@ impl Columns {
         memory::reserve(&mut self.blocks, blocks)?;
         let (_, empty) = match self.blocks.len() {
             0 => Default::default(),
-            known => self.ends(known - 1),
+            block_count => self.ends(block_count - 1),
         };
         self.blocks.resize(blocks, empty);
         self.count = count;
-        self.reach(end);
-        self.reads_also(self.first as isize..end.next_multiple_of(LANES) as isize);
+        self.extend_node_count(end);
+        self.extend_reads(self.first as isize..end.next_multiple_of(LANES) as isize);
         Ok(())
     }
 
-    /// Takes away the last nodes of the body, of which those of the tile have no links, up to this one.
+    /// Removes the last nodes of the body, down to `end` in this tile. The removed nodes have no links.
     pub fn shrink_nodes(&mut self, end: usize, node_count: usize) {
         self.count = end - self.first;
         self.blocks.truncate(self.count.div_ceil(LANES));
@@ -155,13 +156,13 @@ impl Columns {
         self.node_count = self.node_count.min(node_count);
         self.strays.shrink(node_count);
         if self.reads.end > node_count as isize {
-            self.turn_back();
+            self.clamp_unused_lanes();
         }
     }
 
-    /// Has lanes without a link lead to nodes that there are.
-    fn turn_back(&mut self) {
-        // A run ends within the margin where one of its lanes has a link.
+    /// Redirects unused lanes to existing nodes.
+    fn clamp_unused_lanes(&mut self) {
+        // A run with any used lane ends within the margin.
         let end = self.node_count.next_multiple_of(LANES) + MARGIN;
         self.reads.end = self.reads.end.min(end as isize);
         for run in self.runs.iter_mut().filter(|run| run.lanes == 0) {
@@ -183,92 +184,88 @@ impl Columns {
         }
     }
 
-    /// The body has so many nodes now.
-    pub fn reach(&mut self, node_count: usize) {
+    /// Raises the body's number of nodes.
+    pub fn extend_node_count(&mut self, node_count: usize) {
         self.node_count = self.node_count.max(node_count);
-        self.strays.reach(node_count);
+        self.strays.extend_node_count(node_count);
     }
 
-    /// A column of the sixteen nodes from `first` on.
-    fn push_column(&mut self, first: usize, column: &Column, materials: &[SpringMaterial]) -> Result<()> {
+    /// Adds a column of the sixteen nodes starting at `first`.
+    fn push_column(&mut self, first: usize, column: &Column, table: &[SpringParameters]) -> Result<()> {
         let Column { lanes, .. } = *column;
-        let material = self.push_parameters(&column.parameters)?;
-        match column.neighbours {
-            Neighbours::Run(offset) => {
-                // Where one lane has a neighbour, those of the others lie within the margins.
+        let entry = self.push_parameters(&column.parameters)?;
+        match column.neighbors {
+            Neighbors::Run(offset) => {
+                // If one lane has a neighbor, the other lanes stay within the margins.
                 const { assert!(MARGIN >= LANES) };
                 for lane in set_lanes(lanes) {
-                    let neighbour = (first + lane).checked_add_signed(offset as isize);
-                    assert!(neighbour.is_some_and(|neighbour| neighbour < self.node_count));
+                    let neighbor = (first + lane).checked_add_signed(offset as isize);
+                    assert!(neighbor.is_some_and(|neighbor| neighbor < self.node_count));
                 }
                 let start = first as isize + offset as isize;
-                self.reads_also(start..start + LANES as isize);
-                if material == OWN {
+                self.extend_reads(start..start + LANES as isize);
+                if entry == OWN_PARAMETERS {
                     return memory::push(&mut self.own_runs, OwnRun { offset, lanes });
                 }
-                let shared = &materials[usize::from(material)];
+                let shared = &table[usize::from(entry)];
                 let run = RunColumn {
                     offset,
                     lanes,
-                    material,
+                    entry,
                     stiffness: shared.stiffness,
                     half_tension: shared.half_tension(),
                 };
                 memory::push(&mut self.runs, run)
             }
-            Neighbours::Gather(neighbours) => {
-                assert!(
-                    neighbours
-                        .iter()
-                        .all(|&neighbour| (neighbour as usize) < self.node_count)
-                );
-                for node in neighbours {
-                    self.reads_also(node as isize..node as isize + 1);
+            Neighbors::Gather(neighbors) => {
+                assert!(neighbors.iter().all(|&neighbor| (neighbor as usize) < self.node_count));
+                for node in neighbors {
+                    self.extend_reads(node as isize..node as isize + 1);
                 }
-                let gather = GatherColumn { lanes, material };
-                if self.is_near(&column.neighbours) {
-                    let indices = neighbours.map(|neighbour| (neighbour as usize - self.window) as u16);
+                let gather = GatherColumn { lanes, entry };
+                if self.is_near(&column.neighbors) {
+                    let indices = neighbors.map(|neighbor| (neighbor as usize - self.window) as u16);
                     memory::push(&mut self.near, gather)?;
                     memory::push(&mut self.near_indices, NearIndices(indices))
                 } else {
                     memory::push(&mut self.far, gather)?;
-                    memory::push(&mut self.far_indices, FarIndices(neighbours))
+                    memory::push(&mut self.far_indices, FarIndices(neighbors))
                 }
             }
         }
     }
 
-    fn reads_also(&mut self, nodes: Range<isize>) {
+    fn extend_reads(&mut self, nodes: Range<isize>) {
         self.reads.start = self.reads.start.min(nodes.start);
         self.reads.end = self.reads.end.max(nodes.end);
     }
 
-    /// How many neighbours are gathered, of nodes without them too.
-    pub fn gathers(&self) -> usize {
+    /// The number of gathered neighbors, unused lanes included.
+    pub fn gather_count(&self) -> usize {
         LANES * (self.near.len() + self.far.len())
     }
 
-    /// The nodes whose positions forces are made of.
+    /// The range of nodes whose positions the forces depend on.
     pub fn reads(&self) -> Range<isize> {
         self.reads.clone()
     }
 
-    fn is_near(&self, neighbours: &Neighbours) -> bool {
-        let near = self.window..self.window + WINDOW;
-        matches!(neighbours, Neighbours::Gather(nodes) if nodes.iter().all(|&node| near.contains(&(node as usize))))
+    fn is_near(&self, neighbors: &Neighbors) -> bool {
+        let near = self.window..self.window + NEAR_WINDOW;
+        matches!(neighbors, Neighbors::Gather(nodes) if nodes.iter().all(|&node| near.contains(&(node as usize))))
     }
 
-    fn is_far(&self, neighbours: &Neighbours) -> bool {
-        matches!(neighbours, Neighbours::Gather(_)) && !self.is_near(neighbours)
+    fn is_far(&self, neighbors: &Neighbors) -> bool {
+        matches!(neighbors, Neighbors::Gather(_)) && !self.is_near(neighbors)
     }
 
-    fn push_parameters(&mut self, parameters: &Parameters) -> Result<u16> {
+    fn push_parameters(&mut self, parameters: &ColumnParameters) -> Result<u16> {
         match parameters {
-            &Parameters::Shared(material) => {
-                assert!(material != OWN);
-                Ok(material)
+            &ColumnParameters::Shared(entry) => {
+                assert!(entry != OWN_PARAMETERS);
+                Ok(entry)
             }
-            Parameters::Own {
+            ColumnParameters::Own {
                 stiffnesses,
                 rest_lengths,
                 dampings,
@@ -280,12 +277,12 @@ impl Columns {
                 if self.damped {
                     memory::push(&mut self.own_dampings, *dampings)?;
                 }
-                Ok(OWN)
+                Ok(OWN_PARAMETERS)
             }
         }
     }
 
-    /// Gives back what was reserved too much while columns were put in.
+    /// Releases excess capacity after all columns were added.
     pub fn shrink(&mut self) -> Result<()> {
         memory::shrink(&mut self.blocks)?;
         memory::shrink(&mut self.runs)?;
@@ -299,25 +296,25 @@ impl Columns {
         memory::shrink(&mut self.own_dampings)
     }
 
-    /// Links beside the columns.
+    /// The links outside of columns.
     pub fn strays(&self) -> &Strays {
         &self.strays
     }
 
-    /// Makes room for `count` more links beside the columns.
+    /// Reserves memory for `count` more strays.
     pub fn reserve_strays(&mut self, count: usize) -> Result<()> {
         self.strays.reserve(count)
     }
 
-    /// Puts a link of `node` beside the columns, where there is room for it.
+    /// Adds a link of `node` as a stray, within the reserved memory.
     pub fn insert_stray(&mut self, node: usize, link: &Link) {
         self.strays.insert(node, link);
-        self.reads_also(link.neighbour as isize..link.neighbour as isize + 1);
+        self.extend_reads(link.neighbor as isize..link.neighbor as isize + 1);
     }
 
     /// Bytes in use, and bytes held from the allocator.
     pub fn bytes(&self) -> (usize, usize) {
-        let of_lists = [
+        let lists = [
             bytes_of(&self.blocks),
             bytes_of(&self.runs),
             bytes_of(&self.own_runs),
@@ -330,64 +327,65 @@ impl Columns {
             bytes_of(&self.own_dampings),
         ];
         let add = |(used, held), (more, more_held)| (used + more, held + more_held);
-        of_lists.into_iter().fold(self.strays.bytes(), add)
+        lists.into_iter().fold(self.strays.bytes(), add)
     }
 
-    /// Shows the links of `node`.
-    pub fn visit(&self, node: usize, materials: &[SpringMaterial], see: &mut dyn FnMut(Link)) {
-        self.visit_columns(node, materials, see);
-        self.strays.visit(node, see);
+    /// Calls `f` for each link of `node`.
+    pub fn visit(&self, node: usize, table: &[SpringParameters], f: &mut dyn FnMut(Link)) {
+        self.visit_columns(node, table, f);
+        self.strays.visit(node, f);
     }
 
-    /// Shows the links of `node` that are in columns.
-    pub(super) fn visit_columns(&self, node: usize, materials: &[SpringMaterial], see: &mut dyn FnMut(Link)) {
+    /// Calls `f` for each link of `node` in a column.
+    pub(super) fn visit_columns(&self, node: usize, table: &[SpringParameters], f: &mut dyn FnMut(Link)) {
         let lane = (node - self.first) % LANES;
-        self.columns_of(node, &mut |_, material, own, neighbour| {
-            let material = match material {
-                Some(material) => materials[material],
+        self.visit_columns_of(node, &mut |_, entry, own, neighbor| {
+            let entry = match entry {
+                Some(entry) => table[entry],
                 None => self.own_parameters(own, lane),
             };
-            see(Link {
-                neighbour: neighbour as u32,
-                stiffness: material.stiffness,
-                rest_length: material.rest_length,
-                damping: material.damping,
+            f(Link {
+                neighbor: neighbor as u32,
+                stiffness: entry.stiffness,
+                rest_length: entry.rest_length,
+                damping: entry.damping,
             });
         });
     }
 
-    /// How many of some links of a node share their parameters with others: they would have to leave their columns to have others.
-    pub fn shared(&self, links: &[(u32, Link)]) -> usize {
-        let chunks = links.chunks(AT_ONCE);
+    /// Counts the given links of a node that share their parameters. New parameters would move them out of their
+    /// columns.
+    pub fn count_shared(&self, links: &[(u32, Link)]) -> usize {
+        let chunks = links.chunks(LINKS_PER_SEARCH);
         chunks
             .map(|links| {
-                self.find_all(links)
+                self.find_links(links)
                     .iter()
-                    .filter(|place| **place == Some(None))
+                    .filter(|slot| **slot == Some(None))
                     .count()
             })
             .sum()
     }
 
-    /// Makes room for springs in columns to have any of these stiffnesses.
-    pub fn room_for_stiffnesses(&mut self, mut stiffnesses: impl Iterator<Item = f32>) -> Result<()> {
+    /// Reserves memory for per-spring stiffnesses if any of these differs from the uniform one.
+    pub fn reserve_stiffnesses(&mut self, mut stiffnesses: impl Iterator<Item = f32>) -> Result<()> {
         let uniform = self.own_stiffness;
         if !uniform.is_nan() && stiffnesses.any(|stiffness| stiffness != uniform) {
-            self.own_stiffnesses = memory::filled(Line([uniform; LANES]), self.own_rest_lengths.len())?;
+            self.own_stiffnesses = memory::filled(F32x16([uniform; LANES]), self.own_rest_lengths.len())?;
             self.own_stiffness = f32::NAN;
         }
         Ok(())
     }
 
-    /// Gives links of a node, in the order of their neighbours, other parameters, for which there is room; those that
-    /// share their parameters go beside the columns: how many.
+    /// Sets the parameters of a node's links, sorted by neighbor, within the reserved memory. Links with shared
+    /// parameters become strays. Returns the number of these.
     pub fn set(&mut self, links: &[(u32, Link)]) -> usize {
-        let mut left = 0;
-        for links in links.chunks(AT_ONCE) {
-            let places = self.find_all(links);
-            for (&(node, link), place) in links.iter().zip(places) {
+        let mut moved = 0;
+        for links in links.chunks(LINKS_PER_SEARCH) {
+            let slots = self.find_links(links);
+            for (&(node, link), slot) in links.iter().zip(slots) {
                 let node = node as usize;
-                match place {
+                match slot {
                     Some(Some(own)) => {
                         let lane = (node - self.first) % LANES;
                         self.own_rest_lengths[own].0[lane] = link.rest_length;
@@ -399,9 +397,9 @@ impl Columns {
                         }
                     }
                     Some(None) => {
-                        self.remove(node, link.neighbour as usize);
+                        self.remove(node, link.neighbor as usize);
                         self.insert_stray(node, &link);
-                        left += 1;
+                        moved += 1;
                     }
                     None => {
                         self.strays.set(node, &link);
@@ -409,84 +407,84 @@ impl Columns {
                 }
             }
         }
-        left
+        moved
     }
 
-    /// Where in columns links of a node are, a few in the order of their neighbours: their places among those with parameters of their
-    /// own, `Some(None)`: they share theirs; `None`: in no column.
-    fn find_all(&self, links: &[(u32, Link)]) -> [Option<Option<usize>>; AT_ONCE] {
-        let mut places = [None; AT_ONCE];
+    /// Finds up to sixteen links of a node, sorted by neighbor. Each result is the link's index among per-spring
+    /// parameters, `Some(None)` for shared parameters, or `None` if the link is in no column.
+    fn find_links(&self, links: &[(u32, Link)]) -> [Option<Option<usize>>; LINKS_PER_SEARCH] {
+        let mut slots = [None; LINKS_PER_SEARCH];
         if let Some((node, _)) = links.first() {
-            self.columns_of(*node as usize, &mut |_, material, own, other| {
-                if let Ok(index) = links.binary_search_by_key(&other, |(_, link)| link.neighbour as usize) {
-                    places[index] = Some(material.is_none().then_some(own));
+            self.visit_columns_of(*node as usize, &mut |_, entry, own, other| {
+                if let Ok(index) = links.binary_search_by_key(&other, |(_, link)| link.neighbor as usize) {
+                    slots[index] = Some(entry.is_none().then_some(own));
                 }
             });
         }
-        places
+        slots
     }
 
-    /// Takes out the link from `node` to `neighbour`; whether there was one.
-    pub fn remove(&mut self, node: usize, neighbour: usize) -> bool {
-        let mut place = None;
-        self.columns_of(node, &mut |found, _, _, other| {
-            if other == neighbour {
-                place = Some(found);
+    /// Removes the link from `node` to `neighbor`. Returns true if there was one.
+    pub fn remove(&mut self, node: usize, neighbor: usize) -> bool {
+        let mut location = None;
+        self.visit_columns_of(node, &mut |candidate, _, _, other| {
+            if other == neighbor {
+                location = Some(candidate);
             }
         });
-        let lanes = match place {
-            Some(LinkPlace::Run(run)) => &mut self.runs[run].lanes,
-            Some(LinkPlace::OwnRun(run)) => &mut self.own_runs[run].lanes,
-            Some(LinkPlace::Near(near)) => &mut self.near[near].lanes,
-            Some(LinkPlace::Far(far)) => &mut self.far[far].lanes,
-            None => return self.strays.remove(node, neighbour),
+        let lanes = match location {
+            Some(LinkLocation::Run(run)) => &mut self.runs[run].lanes,
+            Some(LinkLocation::OwnRun(run)) => &mut self.own_runs[run].lanes,
+            Some(LinkLocation::Near(near)) => &mut self.near[near].lanes,
+            Some(LinkLocation::Far(far)) => &mut self.far[far].lanes,
+            None => return self.strays.remove(node, neighbor),
         };
         *lanes &= !(1 << ((node - self.first) % LANES));
         true
     }
 
-    /// Shows the columns in which `node` has a link: place, place in the table of materials, place among those with parameters
-    /// of their own, and the neighbour.
-    fn columns_of(&self, node: usize, see: &mut dyn FnMut(LinkPlace, Option<usize>, usize, usize)) {
-        let place = node - self.first;
-        let (block, lane) = (place / LANES, place % LANES);
+    /// Calls `f` for each column in which `node` has a link. The arguments are its location, its index in the parameter
+    /// table, its index among per-spring parameters, and the neighbor.
+    fn visit_columns_of(&self, node: usize, f: &mut dyn FnMut(LinkLocation, Option<usize>, usize, usize)) {
+        let local_node = node - self.first;
+        let (block, lane) = (local_node / LANES, local_node % LANES);
         let (start, end) = self.ends(block);
         let mut own = start.own as usize;
-        let mut see = |found, lanes: u16, material: Option<usize>, neighbour| {
+        let mut f = |location, lanes: u16, entry: Option<usize>, neighbor| {
             if lanes >> lane & 1 == 1 {
-                see(found, material, own, neighbour);
+                f(location, entry, own, neighbor);
             }
-            own += usize::from(material.is_none());
+            own += usize::from(entry.is_none());
         };
-        // In a lane that is not set this may be no node.
+        // In an unused lane this may be no valid node.
         let at = |offset: i32| node.wrapping_add_signed(offset as isize);
         for index in start.runs as usize..end.runs as usize {
             let run = &self.runs[index];
-            see(
-                LinkPlace::Run(index),
+            f(
+                LinkLocation::Run(index),
                 run.lanes,
-                Some(usize::from(run.material)),
+                Some(usize::from(run.entry)),
                 at(run.offset),
             );
         }
         for index in start.own_runs as usize..end.own_runs as usize {
             let run = &self.own_runs[index];
-            see(LinkPlace::OwnRun(index), run.lanes, None, at(run.offset));
+            f(LinkLocation::OwnRun(index), run.lanes, None, at(run.offset));
         }
         for index in start.near as usize..end.near as usize {
             let gather = self.near[index];
-            let neighbour = self.window + usize::from(self.near_indices[index].0[lane]);
-            see(LinkPlace::Near(index), gather.lanes, gather.material(), neighbour);
+            let neighbor = self.window + usize::from(self.near_indices[index].0[lane]);
+            f(LinkLocation::Near(index), gather.lanes, gather.entry(), neighbor);
         }
         for index in start.far as usize..end.far as usize {
             let gather = self.far[index];
-            let neighbour = self.far_indices[index].0[lane] as usize;
-            see(LinkPlace::Far(index), gather.lanes, gather.material(), neighbour);
+            let neighbor = self.far_indices[index].0[lane] as usize;
+            f(LinkLocation::Far(index), gather.lanes, gather.entry(), neighbor);
         }
     }
 
-    fn own_parameters(&self, own: usize, lane: usize) -> SpringMaterial {
-        SpringMaterial {
+    fn own_parameters(&self, own: usize, lane: usize) -> SpringParameters {
+        SpringParameters {
             stiffness: self
                 .own_stiffnesses
                 .get(own)
@@ -496,7 +494,7 @@ impl Columns {
         }
     }
 
-    /// Where the columns of a block start and end.
+    /// The start and end of a block's columns.
     #[inline(always)]
     pub(super) fn ends(&self, block: usize) -> (ColumnEnds, ColumnEnds) {
         let start = if block == 0 {

@@ -1,260 +1,274 @@
-//! The spring forces on the nodes of a tile, and other sums over springs, as many nodes at a time as the processor has lanes.
+//! Spring forces on the nodes of a tile, and other sums over springs, for as many nodes at a time as there are SIMD
+//! lanes.
 //!
-//! The force of a spring is `(k - k L0 / L) d` for the way d of length L to its other end: a quarter fewer operations than
-//! `k (L - L0) / L d`, and what it rounds is less than what positions are rounded by. Both ends compute it in the same way,
-//! with opposite signs: no momentum is lost to rounding but where forces are added up.
+//! The force of a spring is `(k - k L0 / L) d`, where d is the vector of length L to its other end. This takes a
+//! quarter fewer operations than `k (L - L0) / L d`, and its rounding error is below that of the positions. Both ends
+//! compute the same value with opposite signs, so momentum is lost only to the rounding of sums.
 
 use std::marker::PhantomData;
 
 use glam::Vec3;
 
+use super::accumulators::{
+    Accumulator, Change, Force, HalfEnergy, LinkColumn, LinkVectors, NodeVectors, SpringLanes, difference,
+};
 use super::columns::Columns;
-use super::layout::{ColumnEnds, GatherColumn, RunColumn, SpringMaterial};
-use super::quantities::{Change, Force, HalfEnergy, LinkColumn, NodePlaces, Quantity, SpringLanes, Ways, difference};
+use super::layout::{ColumnEnds, GatherColumn, RunColumn, SpringParameters};
 use crate::order::LANES;
 use crate::simd::{ChosenKernel, Index, Lanes, WithLanes, prefetch};
-use crate::soa::{Places, TileForces, Vectors, View};
-use crate::springs::{Course, Link, Motion, Tangent};
+use crate::soa::{BasePointers, TileForces, Vectors, View};
+use crate::springs::{DirectionInput, ForceInput, Link, Tangent};
 
 impl Columns {
     /// Writes the forces on the nodes of the tile, N.
-    pub fn forces(&self, kernel: ChosenKernel, materials: &[SpringMaterial], motion: &Motion, forces: &mut TileForces) {
-        let &Motion {
+    pub fn forces(
+        &self,
+        kernel: ChosenKernel,
+        table: &[SpringParameters],
+        input: &ForceInput,
+        forces: &mut TileForces,
+    ) {
+        let &ForceInput {
             positions,
             velocities,
-            soon,
-        } = motion;
+            prefetched,
+        } = input;
         let velocities = velocities.filter(|_| self.damped).map(Vectors::view);
-        let tile = self.tile(materials, positions, velocities, soon, Tangent::NONE);
+        let tile = self.tile(table, positions, velocities, prefetched, Tangent::NONE);
         match velocities {
-            None => tile.add_up::<Force<false>>(kernel, forces),
-            Some(_) => tile.add_up::<Force<true>>(kernel, forces),
+            None => tile.accumulate::<Force<false>>(kernel, forces),
+            Some(_) => tile.accumulate::<Force<true>>(kernel, forces),
         }
     }
 
-    /// Writes how the forces on the nodes of the tile change, N, in the first order.
-    pub fn changes(
+    /// Writes the first-order changes of the forces on the nodes of the tile, N.
+    pub fn force_changes(
         &self,
         kernel: ChosenKernel,
-        materials: &[SpringMaterial],
-        course: &Course,
+        table: &[SpringParameters],
+        input: &DirectionInput,
         changes: &mut TileForces,
     ) {
-        let tangent = course.tangent;
-        let tile = self.tile(materials, course.positions, Some(course.ways), [&[]; 6], tangent);
+        let tangent = input.tangent;
+        let tile = self.tile(table, input.positions, Some(input.displacements), [&[]; 6], tangent);
         if self.damped && tangent.rate > 0.0 {
-            tile.add_up::<Change<true>>(kernel, changes);
+            tile.accumulate::<Change<true>>(kernel, changes);
         } else {
-            tile.add_up::<Change<false>>(kernel, changes);
+            tile.accumulate::<Change<false>>(kernel, changes);
         }
     }
 
     /// Half the energy of all links of the tile, J.
-    pub fn half_energy(&self, kernel: ChosenKernel, materials: &[SpringMaterial], positions: View) -> f64 {
+    pub fn half_energy(&self, kernel: ChosenKernel, table: &[SpringParameters], positions: View) -> f64 {
         let mut energies = TileForces::ZERO;
-        let tile = self.tile(materials, positions, None, [&[]; 6], Tangent::NONE);
-        tile.add_up::<HalfEnergy>(kernel, &mut energies);
+        let tile = self.tile(table, positions, None, [&[]; 6], Tangent::NONE);
+        tile.accumulate::<HalfEnergy>(kernel, &mut energies);
         let [of_nodes, ..] = energies.axes();
         of_nodes[..self.count].iter().copied().map(f64::from).sum()
     }
 
     fn tile<'a>(
         &'a self,
-        materials: &'a [SpringMaterial],
+        table: &'a [SpringParameters],
         positions: View<'a>,
-        seconds: Option<View<'a>>,
-        soon: [&'a [f32]; 6],
+        second_vectors: Option<View<'a>>,
+        prefetched: [&'a [f32]; 6],
         tangent: Tangent,
     ) -> KernelTile<'a> {
-        // What the kernel reads without a check was checked against this.
+        // The columns were validated against this range, so the kernel reads it without checks.
         assert!(positions.covers(&self.reads, self.node_count));
-        assert!(seconds.is_none_or(|seconds| seconds.covers(&self.reads, self.node_count)));
+        assert!(second_vectors.is_none_or(|second_vectors| second_vectors.covers(&self.reads, self.node_count)));
         KernelTile {
             columns: self,
-            materials,
-            positions: positions.places(),
-            seconds: seconds.map(|seconds| seconds.places()),
-            soon: soon.map(|wanted| wanted.as_ptr()),
+            table,
+            positions: positions.base_pointers(),
+            second_vectors: second_vectors.map(|second_vectors| second_vectors.base_pointers()),
+            prefetched: prefetched.map(|address| address.as_ptr()),
             tangent,
-            careful: Careful {
+            fallback: CoincidentFallback {
                 columns: self,
-                materials,
+                table,
                 positions,
-                seconds,
+                second_vectors,
                 tangent,
             },
         }
     }
 }
 
-/// Runs that are worked on together: each step of one waits for the step before, and the processor can look only so far
-/// ahead for other work.
+/// The number of runs that are interleaved. Each sum is a dependency chain, and out-of-order execution sees only a
+/// limited distance ahead.
 const GROUP: usize = 4;
 
-/// The sums of a tile's nodes, for a kernel to add up.
+/// The sums over a tile's links, as work for a kernel.
 struct TileLinks<'a, Q> {
     tile: KernelTile<'a>,
     sums: &'a mut TileForces,
-    quantity: PhantomData<Q>,
+    accumulator: PhantomData<Q>,
 }
 
-/// What the kernel reads.
+/// The data that the kernel reads.
 struct KernelTile<'a> {
     columns: &'a Columns,
-    materials: &'a [SpringMaterial],
-    /// What the columns read is there.
-    positions: Places,
-    seconds: Option<Places>,
-    /// What is wanted next, block by block.
-    soon: [*const f32; 6],
+    table: &'a [SpringParameters],
+    /// Covers the range that the columns read.
+    positions: BasePointers,
+    second_vectors: Option<BasePointers>,
+    /// Data to prefetch, block by block.
+    prefetched: [*const f32; 6],
     tangent: Tangent,
-    careful: Careful<'a>,
+    fallback: CoincidentFallback<'a>,
 }
 
 impl KernelTile<'_> {
-    fn add_up<Q: Quantity>(self, kernel: ChosenKernel, sums: &mut TileForces) {
+    fn accumulate<Q: Accumulator>(self, kernel: ChosenKernel, sums: &mut TileForces) {
         kernel.run_with_lanes(TileLinks::<Q> {
             tile: self,
             sums,
-            quantity: PhantomData,
+            accumulator: PhantomData,
         });
     }
 }
 
-impl<Q: Quantity> WithLanes for TileLinks<'_, Q> {
+impl<Q: Accumulator> WithLanes for TileLinks<'_, Q> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
         let Self { tile, sums: forces, .. } = self;
-        let careful = &tile.careful;
+        let fallback = &tile.fallback;
         let columns = tile.columns;
-        let parts = LANES / L::COUNT;
-        // Loop by loop, so that each has few addresses to keep. A grid needs no more than the first.
-        let runs_alone = columns.own_rest_lengths.is_empty() && columns.near.is_empty() && columns.far.is_empty();
+        let chunks = LANES / L::COUNT;
+        // Two loops, so that each needs few addresses. A regular grid needs only the first.
+        let only_runs = columns.own_rest_lengths.is_empty() && columns.near.is_empty() && columns.far.is_empty();
         let mut axes = forces.axes_mut().map(|axis| axis.as_mut_ptr());
         // SAFETY: the same contract; a tile has no more blocks than forces have room for.
         unsafe {
             let mut start = ColumnEnds::default();
             for (block, &end) in columns.blocks.iter().enumerate() {
-                for wanted in tile.soon {
-                    prefetch(wanted.wrapping_add(block * LANES));
+                for address in tile.prefetched {
+                    prefetch(address.wrapping_add(block * LANES));
                 }
-                for part in 0..parts {
-                    let place = block * LANES + part * L::COUNT;
-                    let sums = tile.runs::<L, Q>(start, end, place);
-                    sums.store(axes, place);
-                    if runs_alone && sums.any_nan() {
-                        axes = careful.nodes::<Q>(place, L::COUNT, forces);
+                for chunk in 0..chunks {
+                    let index = block * LANES + chunk * L::COUNT;
+                    let sums = tile.sum_runs::<L, Q>(start, end, index);
+                    sums.store(axes, index);
+                    if only_runs && sums.any_nan() {
+                        axes = fallback.nodes::<Q>(index, L::COUNT, forces);
                     }
                 }
                 start = end;
             }
-            if !runs_alone {
+            if !only_runs {
                 start = ColumnEnds::default();
                 for (block, &end) in columns.blocks.iter().enumerate() {
-                    for part in 0..parts {
-                        let place = block * LANES + part * L::COUNT;
-                        let sums = tile.others::<L, Q>(start, end, place, ForceLanes::load(axes, place));
-                        sums.store(axes, place);
+                    for chunk in 0..chunks {
+                        let index = block * LANES + chunk * L::COUNT;
+                        let sums = tile.add_remaining_columns::<L, Q>(start, end, index, ForceLanes::load(axes, index));
+                        sums.store(axes, index);
                         if sums.any_nan() {
-                            axes = careful.nodes::<Q>(place, L::COUNT, forces);
+                            axes = fallback.nodes::<Q>(index, L::COUNT, forces);
                         }
                     }
                     start = end;
                 }
             }
             for batch in 0..columns.strays.batch_count() {
-                tile.strays::<L, Q>(batch, forces);
+                tile.add_strays::<L, Q>(batch, forces);
             }
         }
     }
 }
 
-/// Columns of gathers, each with its indices, which count from the window.
+/// Gather columns with their indices, relative to the window.
 struct Gathers<'a, I> {
     headers: &'a [GatherColumn],
     indices: *const [I; LANES],
     window: usize,
 }
 
-/// The forces on some nodes side by side; NaN where a spring's ends coincide.
+/// The forces on consecutive nodes; NaN if the ends of a spring coincide.
 #[derive(Clone, Copy)]
 struct ForceLanes<L>([L; 3]);
 
 impl KernelTile<'_> {
-    /// The runs of the nodes of a block, or of a part of it, as wide as `L`, whose springs share their parameters.
+    /// The sum over the runs with shared parameters, for the nodes of a block or a part of it as wide as `L`.
     #[inline(always)]
-    unsafe fn runs<L: Lanes, Q: Quantity>(&self, start: ColumnEnds, end: ColumnEnds, place: usize) -> ForceLanes<L> {
+    unsafe fn sum_runs<L: Lanes, Q: Accumulator>(
+        &self,
+        start: ColumnEnds,
+        end: ColumnEnds,
+        index: usize,
+    ) -> ForceLanes<L> {
         let columns = self.columns;
-        let (node, lane) = (columns.first + place, place % LANES);
-        // SAFETY: blocks end within the margins; columns were checked to lead to nodes of the body where their lanes are
-        // set, and within the margins elsewhere.
+        let (node, lane) = (columns.first + index, index % LANES);
+        // SAFETY: blocks end within the margins; columns were validated: used lanes refer to nodes of the body, unused
+        // ones stay within the margins.
         unsafe {
-            let here = self.at::<L, Q>(node as isize);
+            let here = self.load_nodes::<L, Q>(node as isize);
             let mut sums = ForceLanes([L::splat(0.0); 3]);
             let runs = columns.runs.get_unchecked(start.runs as usize..end.runs as usize);
             let (groups, rest) = runs.as_chunks::<GROUP>();
             for group in groups {
-                // Written out: a closure may be compiled on its own, without the kernel's instructions.
-                let mut links = [self.run::<L, Q>(&group[0], node, lane); GROUP];
+                // Not a closure: it could be compiled as its own function, without the kernel's instruction set.
+                let mut links = [self.load_run::<L, Q>(&group[0], node, lane); GROUP];
                 for (links, run) in links.iter_mut().zip(group).skip(1) {
-                    *links = self.run::<L, Q>(run, node, lane);
+                    *links = self.load_run::<L, Q>(run, node, lane);
                 }
                 sums.add::<GROUP, Q>(here, links, &self.tangent);
             }
             for run in rest {
-                sums.add::<1, Q>(here, [self.run::<L, Q>(run, node, lane)], &self.tangent);
+                sums.add::<1, Q>(here, [self.load_run::<L, Q>(run, node, lane)], &self.tangent);
             }
             sums
         }
     }
 
-    /// A run from the nodes from `node` on.
+    /// Loads a run for the nodes starting at `node`.
     #[inline(always)]
-    unsafe fn run<L: Lanes, Q: Quantity>(&self, run: &RunColumn, node: usize, lane: usize) -> LinkColumn<L> {
-        let material = if Q::DAMPED || Q::RESTING {
-            self.materials[usize::from(run.material)]
+    unsafe fn load_run<L: Lanes, Q: Accumulator>(&self, run: &RunColumn, node: usize, lane: usize) -> LinkColumn<L> {
+        let entry = if Q::USES_DAMPING || Q::USES_REST_LENGTH {
+            self.table[usize::from(run.entry)]
         } else {
-            SpringMaterial::default()
+            SpringParameters::default()
         };
-        // SAFETY: as in `runs`.
+        // SAFETY: as in `sum_runs`.
         unsafe {
             LinkColumn {
                 spring: SpringLanes {
                     stiffness: L::splat(run.stiffness),
                     half_tension: L::splat(run.half_tension),
-                    rest_length: L::splat(material.rest_length),
-                    damping: L::splat(material.damping),
+                    rest_length: L::splat(entry.rest_length),
+                    damping: L::splat(entry.damping),
                 },
-                there: self.at::<L, Q>(node as isize + run.offset as isize),
+                there: self.load_nodes::<L, Q>(node as isize + run.offset as isize),
                 lanes: u32::from(run.lanes) >> lane,
             }
         }
     }
 
-    /// All other columns of the same nodes, added to `sums`.
+    /// Adds all other columns of the same nodes to `sums`.
     #[inline(always)]
-    unsafe fn others<L: Lanes, Q: Quantity>(
+    unsafe fn add_remaining_columns<L: Lanes, Q: Accumulator>(
         &self,
         start: ColumnEnds,
         end: ColumnEnds,
-        place: usize,
+        index: usize,
         mut sums: ForceLanes<L>,
     ) -> ForceLanes<L> {
         let columns = self.columns;
-        let (node, lane) = (columns.first + place, place % LANES);
+        let (node, lane) = (columns.first + index, index % LANES);
         let mut own = start.own as usize;
-        // SAFETY: as in `runs`; gathers were checked to lead to nodes of the body.
+        // SAFETY: as in `sum_runs`; gathers were validated to refer to nodes of the body.
         unsafe {
-            let here = self.at::<L, Q>(node as isize);
+            let here = self.load_nodes::<L, Q>(node as isize);
             for run in columns
                 .own_runs
                 .get_unchecked(start.own_runs as usize..end.own_runs as usize)
             {
                 let links = LinkColumn {
-                    spring: self.spring::<L, Q>(None, &mut own, lane),
-                    there: self.at::<L, Q>(node as isize + run.offset as isize),
+                    spring: self.load_parameters::<L, Q>(None, &mut own, lane),
+                    there: self.load_nodes::<L, Q>(node as isize + run.offset as isize),
                     lanes: u32::from(run.lanes) >> lane,
                 };
                 sums.add::<1, Q>(here, [links], &self.tangent);
@@ -285,10 +299,10 @@ impl KernelTile<'_> {
 
     /// Adds gathers to `sums`.
     #[inline(always)]
-    unsafe fn add_gathers<L: Lanes, Q: Quantity, I: Index>(
+    unsafe fn add_gathers<L: Lanes, Q: Accumulator, I: Index>(
         &self,
         gathers: Gathers<I>,
-        here: NodePlaces<L>,
+        here: NodeVectors<L>,
         own: &mut usize,
         lane: usize,
         sums: &mut ForceLanes<L>,
@@ -297,13 +311,13 @@ impl KernelTile<'_> {
         if count == 0 {
             return;
         }
-        // SAFETY: as in `others`.
+        // SAFETY: as in `add_remaining_columns`.
         unsafe {
-            // The neighbours of a column are fetched before what the one before it adds up to: that is a long chain of operations,
-            // each of which waits for the last, and the processor looks no more than a column or two ahead for other work.
-            let mut links = self.gather_column::<L, Q, I>(&gathers, 0, own, lane);
+            // The neighbors of the next column are loaded before the current one is added. The sum is a long dependency
+            // chain, and out-of-order execution sees only a column or two ahead.
+            let mut links = self.load_gather::<L, Q, I>(&gathers, 0, own, lane);
             for column in 1..count {
-                let next = self.gather_column::<L, Q, I>(&gathers, column, own, lane);
+                let next = self.load_gather::<L, Q, I>(&gathers, column, own, lane);
                 sums.add::<1, Q>(here, [links], &self.tangent);
                 links = next;
             }
@@ -311,39 +325,39 @@ impl KernelTile<'_> {
         }
     }
 
-    /// One of some gathers.
+    /// Loads one gather column.
     #[inline(always)]
-    unsafe fn gather_column<L: Lanes, Q: Quantity, I: Index>(
+    unsafe fn load_gather<L: Lanes, Q: Accumulator, I: Index>(
         &self,
         gathers: &Gathers<I>,
         column: usize,
         own: &mut usize,
         lane: usize,
     ) -> LinkColumn<L> {
-        // SAFETY: as in `others`.
+        // SAFETY: as in `add_remaining_columns`.
         unsafe {
             let header = gathers.headers.get_unchecked(column);
             let indices = gathers.indices.add(column).cast::<I>().add(lane);
             LinkColumn {
-                spring: self.spring::<L, Q>(header.material(), own, lane),
-                there: self.gathered::<L, Q, I>(indices, gathers.window),
+                spring: self.load_parameters::<L, Q>(header.entry(), own, lane),
+                there: self.gather_nodes::<L, Q, I>(indices, gathers.window),
                 lanes: u32::from(header.lanes) >> lane,
             }
         }
     }
 
-    /// Sixteen strays.
+    /// Adds a batch of sixteen strays to the forces.
     #[inline(always)]
-    unsafe fn strays<L: Lanes, Q: Quantity>(&self, batch: usize, forces: &mut TileForces) {
+    unsafe fn add_strays<L: Lanes, Q: Accumulator>(&self, batch: usize, forces: &mut TileForces) {
         let batch = self.columns.strays.batch(batch);
-        let mut found = [[0.0_f32; LANES]; 3];
+        let mut batch_sums = [[0.0_f32; LANES]; 3];
         let mut coincide = false;
-        for part in 0..LANES / L::COUNT {
-            let lane = part * L::COUNT;
-            // SAFETY: strays were checked to lead to nodes of the body.
+        for chunk in 0..LANES / L::COUNT {
+            let lane = chunk * L::COUNT;
+            // SAFETY: strays were validated to refer to nodes of the body.
             unsafe {
-                let here = self.gathered::<L, Q, u32>(batch.nodes.as_ptr().add(lane), 0);
-                let there = self.gathered::<L, Q, u32>(batch.neighbours.as_ptr().add(lane), 0);
+                let here = self.gather_nodes::<L, Q, u32>(batch.nodes.as_ptr().add(lane), 0);
+                let there = self.gather_nodes::<L, Q, u32>(batch.neighbors.as_ptr().add(lane), 0);
                 let stiffness = L::load(batch.stiffnesses.0.as_ptr().add(lane));
                 let rest_length = L::load(batch.rest_lengths.0.as_ptr().add(lane));
                 let spring = SpringLanes {
@@ -360,32 +374,33 @@ impl KernelTile<'_> {
                 };
                 sums.add::<1, Q>(here, [links], &self.tangent);
                 coincide |= sums.any_nan();
-                for (sum, found) in sums.0.into_iter().zip(&mut found) {
-                    sum.store(found.as_mut_ptr().add(lane));
+                for (sum, batch_sums) in sums.0.into_iter().zip(&mut batch_sums) {
+                    sum.store(batch_sums.as_mut_ptr().add(lane));
                 }
             }
         }
-        for (lane, &place) in batch.places[..batch.count].iter().enumerate() {
-            let mut force = Vec3::from(found.map(|axis| axis[lane]));
+        for (lane, &index) in batch.local_nodes[..batch.count].iter().enumerate() {
+            let mut force = Vec3::from(batch_sums.map(|axis| axis[lane]));
             if coincide {
                 let link = Link {
-                    neighbour: batch.neighbours[lane],
+                    neighbor: batch.neighbors[lane],
                     stiffness: batch.stiffnesses.0[lane],
                     rest_length: batch.rest_lengths.0[lane],
                     damping: batch.dampings.0[lane],
                 };
-                force = self.careful.link::<Q>(batch.nodes[lane] as usize, &link);
+                force = self.fallback.link::<Q>(batch.nodes[lane] as usize, &link);
             }
-            let place = usize::from(place);
-            forces.set(place, forces.get(place) + force);
+            let index = usize::from(index);
+            forces.set(index, forces.get(index) + force);
         }
     }
 
-    /// Sixteen nodes, or as many as `L` has lanes, from `node` on.
+    /// Loads as many consecutive nodes as `L` has lanes, starting at `node`.
     #[inline(always)]
-    unsafe fn at<L: Lanes, Q: Quantity>(&self, node: isize) -> NodePlaces<L> {
-        // Written out here and below: a closure may be compiled on its own, without the kernel's instructions.
-        // SAFETY: where a lane is set there is a node, and within the margins elsewhere.
+    unsafe fn load_nodes<L: Lanes, Q: Accumulator>(&self, node: isize) -> NodeVectors<L> {
+        // Not a closure, here and below: it could be compiled as its own function, without the kernel's instruction
+        // set.
+        // SAFETY: used lanes refer to nodes; unused ones stay within the margins.
         unsafe {
             let [x, y, z] = self.positions.axes;
             let position = [
@@ -393,8 +408,8 @@ impl KernelTile<'_> {
                 L::load(y.wrapping_offset(node)),
                 L::load(z.wrapping_offset(node)),
             ];
-            match self.seconds {
-                Some(Places { axes: [x, y, z], .. }) if Q::SECOND => NodePlaces {
+            match self.second_vectors {
+                Some(BasePointers { axes: [x, y, z], .. }) if Q::USES_SECOND => NodeVectors {
                     position,
                     second: [
                         L::load(x.wrapping_offset(node)),
@@ -402,44 +417,48 @@ impl KernelTile<'_> {
                         L::load(z.wrapping_offset(node)),
                     ],
                 },
-                _ => NodePlaces::still(position),
+                _ => NodeVectors::without_second(position),
             }
         }
     }
 
-    /// The nodes with these numbers, counted from the window.
+    /// Gathers the nodes with these indices, relative to the window.
     #[inline(always)]
-    unsafe fn gathered<L: Lanes, Q: Quantity, I: Index>(&self, indices: *const I, window: usize) -> NodePlaces<L> {
-        // SAFETY: the numbers were checked to be those of nodes.
+    unsafe fn gather_nodes<L: Lanes, Q: Accumulator, I: Index>(
+        &self,
+        indices: *const I,
+        window: usize,
+    ) -> NodeVectors<L> {
+        // SAFETY: the indices were validated.
         unsafe {
             let position = gather(self.positions, window, indices);
-            match self.seconds {
-                Some(seconds) if Q::SECOND => NodePlaces {
+            match self.second_vectors {
+                Some(second_vectors) if Q::USES_SECOND => NodeVectors {
                     position,
-                    second: gather(seconds, window, indices),
+                    second: gather(second_vectors, window, indices),
                 },
-                _ => NodePlaces::still(position),
+                _ => NodeVectors::without_second(position),
             }
         }
     }
 
-    /// The parameters of a column; `own` counts those that bring their own.
+    /// Loads the parameters of a column. `own` counts the columns with per-spring parameters.
     #[inline(always)]
-    unsafe fn spring<L: Lanes, Q: Quantity>(
+    unsafe fn load_parameters<L: Lanes, Q: Accumulator>(
         &self,
-        material: Option<usize>,
+        entry: Option<usize>,
         own: &mut usize,
         lane: usize,
     ) -> SpringLanes<L> {
-        // SAFETY: every column that brings its own parameters has a place in their lists.
+        // SAFETY: every column with per-spring parameters has an entry in their lists.
         unsafe {
-            if let Some(material) = material {
-                let material = &self.materials[material];
+            if let Some(entry) = entry {
+                let entry = &self.table[entry];
                 return SpringLanes {
-                    stiffness: L::splat(material.stiffness),
-                    half_tension: L::splat(material.half_tension()),
-                    rest_length: L::splat(material.rest_length),
-                    damping: L::splat(material.damping),
+                    stiffness: L::splat(entry.stiffness),
+                    half_tension: L::splat(entry.half_tension()),
+                    rest_length: L::splat(entry.rest_length),
+                    damping: L::splat(entry.damping),
                 };
             }
             let columns = self.columns;
@@ -453,7 +472,7 @@ impl KernelTile<'_> {
                 stiffness,
                 half_tension: half_tension(stiffness, rest_length),
                 rest_length,
-                damping: if Q::DAMPED {
+                damping: if Q::USES_DAMPING {
                     L::load(columns.own_dampings.get_unchecked(*own).0.as_ptr().add(lane))
                 } else {
                     rest_length
@@ -466,19 +485,19 @@ impl KernelTile<'_> {
 }
 
 impl<L: Lanes> ForceLanes<L> {
-    /// From and to three lists that have these lanes.
+    /// Loads from three arrays that contain these lanes.
     #[inline(always)]
-    unsafe fn load(axes: [*mut f32; 3], place: usize) -> Self {
+    unsafe fn load(axes: [*mut f32; 3], index: usize) -> Self {
         let [x, y, z] = axes;
         // SAFETY: the caller's promise.
-        Self(unsafe { [L::load(x.add(place)), L::load(y.add(place)), L::load(z.add(place))] })
+        Self(unsafe { [L::load(x.add(index)), L::load(y.add(index)), L::load(z.add(index))] })
     }
 
     #[inline(always)]
-    unsafe fn store(&self, axes: [*mut f32; 3], place: usize) {
+    unsafe fn store(&self, axes: [*mut f32; 3], index: usize) {
         for (sum, axis) in self.0.into_iter().zip(axes) {
             // SAFETY: the caller's promise.
-            unsafe { sum.store(axis.add(place)) };
+            unsafe { sum.store(axis.add(index)) };
         }
     }
 
@@ -489,26 +508,26 @@ impl<L: Lanes> ForceLanes<L> {
         unsafe { x.any_nan() || y.any_nan() || z.any_nan() }
     }
 
-    /// Adds what `N` columns of springs add up to from `here` on.
+    /// Adds the contributions of `N` columns of springs to the nodes `here`.
     #[inline(always)]
-    unsafe fn add<const N: usize, Q: Quantity>(
+    unsafe fn add<const N: usize, Q: Accumulator>(
         &mut self,
-        here: NodePlaces<L>,
+        here: NodeVectors<L>,
         links: [LinkColumn<L>; N],
         tangent: &Tangent,
     ) {
         // SAFETY: the same contract.
         unsafe {
-            // Written out, as in `runs`.
-            let [mut ways, mut differences] = [[here.position; N], [here.second; N]];
+            // Not a closure, as in `sum_runs`.
+            let [mut offsets, mut differences] = [[here.position; N], [here.second; N]];
             for (n, links) in links.iter().enumerate() {
-                ways[n] = difference(links.there.position, here.position);
+                offsets[n] = difference(links.there.position, here.position);
                 differences[n] = difference(links.there.second, here.second);
             }
             Q::add(
                 &mut self.0,
-                Ways {
-                    ways,
+                LinkVectors {
+                    offsets,
                     differences,
                     links,
                 },
@@ -518,13 +537,13 @@ impl<L: Lanes> ForceLanes<L> {
     }
 }
 
-/// The vectors of the nodes with these numbers, counted from the window.
+/// Gathers the vectors of the nodes with these indices, relative to the window.
 #[inline(always)]
-unsafe fn gather<L: Lanes, I: Index>(places: Places, window: usize, indices: *const I) -> [L; 3] {
-    // SAFETY: the numbers were checked to be those of nodes.
+unsafe fn gather<L: Lanes, I: Index>(places: BasePointers, window: usize, indices: *const I) -> [L; 3] {
+    // SAFETY: the indices were validated.
     unsafe {
         match places.records {
-            Some(records) => L::records(records.wrapping_add(window), indices),
+            Some(records) => L::gather_records(records.wrapping_add(window), indices),
             None => {
                 let [x, y, z] = places.axes;
                 [
@@ -540,41 +559,41 @@ unsafe fn gather<L: Lanes, I: Index>(places: Places, window: usize, indices: *co
 #[inline(always)]
 unsafe fn half_tension<L: Lanes>(stiffness: L, rest_length: L) -> L {
     // SAFETY: the same contract.
-    unsafe { stiffness.multiply(L::splat(0.5)).multiply(rest_length) }
+    unsafe { stiffness.mul(L::splat(0.5)).mul(rest_length) }
 }
 
-/// The same sums where nodes coincide, and a spring between them has no direction of its own.
-struct Careful<'a> {
+/// The fallback for coincident nodes, where a spring has no direction of its own.
+struct CoincidentFallback<'a> {
     columns: &'a Columns,
-    materials: &'a [SpringMaterial],
+    table: &'a [SpringParameters],
     positions: View<'a>,
-    seconds: Option<View<'a>>,
+    second_vectors: Option<View<'a>>,
     tangent: Tangent,
 }
 
-impl Careful<'_> {
-    /// The columns of `count` nodes from `place` on: where the sums are kept.
+impl CoincidentFallback<'_> {
+    /// Sums the columns of `count` nodes starting at `index`. Returns the arrays of the sums.
     #[cold]
     #[inline(never)]
-    fn nodes<Q: Quantity>(&self, place: usize, count: usize, sums: &mut TileForces) -> [*mut f32; 3] {
-        for place in place..(place + count).min(self.columns.count) {
-            let node = self.columns.first + place;
+    fn nodes<Q: Accumulator>(&self, index: usize, count: usize, sums: &mut TileForces) -> [*mut f32; 3] {
+        for index in index..(index + count).min(self.columns.count) {
+            let node = self.columns.first + index;
             let mut sum = Vec3::ZERO;
             self.columns
-                .visit_columns(node, self.materials, &mut |link| sum += self.link::<Q>(node, &link));
-            sums.set(place, sum);
+                .visit_columns(node, self.table, &mut |link| sum += self.link::<Q>(node, &link));
+            sums.set(index, sum);
         }
         sums.axes_mut().map(|axis| axis.as_mut_ptr())
     }
 
-    /// What one spring adds.
+    /// The contribution of one spring.
     #[cold]
-    fn link<Q: Quantity>(&self, node: usize, link: &Link) -> Vec3 {
-        let neighbour = link.neighbour as usize;
-        let way = self.positions.get(neighbour) - self.positions.get(node);
-        let difference = self
-            .seconds
-            .map_or(Vec3::ZERO, |seconds| seconds.get(neighbour) - seconds.get(node));
-        Q::of_link(node, link, way, difference, &self.tangent)
+    fn link<Q: Accumulator>(&self, node: usize, link: &Link) -> Vec3 {
+        let neighbor = link.neighbor as usize;
+        let offset = self.positions.get(neighbor) - self.positions.get(node);
+        let difference = self.second_vectors.map_or(Vec3::ZERO, |second_vectors| {
+            second_vectors.get(neighbor) - second_vectors.get(node)
+        });
+        Q::single_link(node, link, offset, difference, &self.tangent)
     }
 }

@@ -1,14 +1,14 @@
-//! The parts of a tile's columns.
+//! Data layout of a tile's columns.
 
 use crate::codec::saved;
 use crate::order::LANES;
 
-/// Of a column whose springs bring their own parameters.
-pub(super) const OWN: u16 = u16::MAX;
+/// Marks a column with per-spring parameters.
+pub(super) const OWN_PARAMETERS: u16 = u16::MAX;
 
-/// Parameters that many springs of a body share.
+/// Spring parameters: an entry of the body's table, or those of one spring.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct SpringMaterial {
+pub(crate) struct SpringParameters {
     /// N/m
     pub stiffness: f32,
     /// m
@@ -17,72 +17,72 @@ pub(crate) struct SpringMaterial {
     pub damping: f32,
 }
 
-saved! { SpringMaterial { stiffness, rest_length, damping } }
+saved! { SpringParameters { stiffness, rest_length, damping } }
 
-impl SpringMaterial {
-    /// Half the force with which a spring would be pressed to length 0, N.
+impl SpringParameters {
+    /// Half the force that compresses a spring to length 0, N.
     #[inline(always)]
     pub fn half_tension(&self) -> f32 {
         0.5 * self.stiffness * self.rest_length
     }
 }
 
-/// Sixteen numbers in a cache line of their own.
+/// Sixteen numbers in one cache line.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Line(pub [f32; LANES]);
+pub(crate) struct F32x16(pub [f32; LANES]);
 
-saved! { Line { 0 } }
+saved! { F32x16 { 0 } }
 
-impl Line {
+impl F32x16 {
     pub const ZERO: Self = Self([0.0; LANES]);
 }
 
-/// What the springs of a column are like.
+/// The parameters of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Parameters {
-    /// All like this entry of the body's table.
+pub(crate) enum ColumnParameters {
+    /// All springs have the parameters of this entry in the body's table.
     Shared(u16),
-    /// Each its own; 0 in lanes without a link.
+    /// Each spring has its own; 0 in unused lanes.
     Own {
-        stiffnesses: Line,
-        rest_lengths: Line,
-        dampings: Line,
+        stiffnesses: F32x16,
+        rest_lengths: F32x16,
+        dampings: F32x16,
     },
 }
 
-/// Where the other ends of a column's links are.
+/// The neighbors of a column's links.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Neighbours {
-    /// As far from each node as this.
+pub(crate) enum Neighbors {
+    /// Each node's neighbor has this index offset.
     Run(i32),
-    /// These; any node in lanes without a link.
+    /// These nodes; any node in unused lanes.
     Gather([u32; LANES]),
 }
 
-/// A column to be put in.
+/// A column to be added.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Column {
-    pub neighbours: Neighbours,
-    /// Bit i: whether the node in lane i has a link here.
+    pub neighbors: Neighbors,
+    /// Bit i is set if the node in lane i has a link here.
     pub lanes: u16,
-    pub parameters: Parameters,
+    pub parameters: ColumnParameters,
 }
 
-/// A column of neighbours that lie side by side, of springs that share their parameters.
+/// A column of consecutive neighbors with shared parameters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RunColumn {
     pub offset: i32,
     pub lanes: u16,
-    /// Its place in the table of materials: what follows is a copy from there.
-    pub material: u16,
+    /// The index in the parameter table. The stiffness and half tension are copies from there.
+    pub entry: u16,
     pub stiffness: f32,
     pub half_tension: f32,
 }
 
-saved! { RunColumn { offset, lanes, material, stiffness, half_tension } }
+saved! { RunColumn { offset, lanes, entry, stiffness, half_tension } }
 
-/// A column of neighbours that lie side by side, of springs that bring their own parameters.
+/// A column of consecutive neighbors with per-spring parameters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OwnRun {
     pub offset: i32,
@@ -91,25 +91,25 @@ pub(super) struct OwnRun {
 
 saved! { OwnRun { offset, lanes } }
 
-/// What there is to know of a gather beside its neighbours.
+/// The header of a gather; its neighbors are stored separately.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GatherColumn {
     pub lanes: u16,
-    /// Its place in the table of materials; [`OWN`].
-    pub material: u16,
+    /// The index in the parameter table, or [`OWN_PARAMETERS`].
+    pub entry: u16,
 }
 
-saved! { GatherColumn { lanes, material } }
+saved! { GatherColumn { lanes, entry } }
 
 impl GatherColumn {
-    /// Its place in the table of materials, where its springs share their parameters.
+    /// The index in the parameter table if the springs share their parameters.
     #[inline(always)]
-    pub fn material(self) -> Option<usize> {
-        (self.material != OWN).then_some(usize::from(self.material))
+    pub fn entry(self) -> Option<usize> {
+        (self.entry != OWN_PARAMETERS).then_some(usize::from(self.entry))
     }
 }
 
-/// Where the columns of sixteen nodes end in each list.
+/// The end of a block's columns in each list.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ColumnEnds {
     pub runs: u32,
@@ -121,23 +121,23 @@ pub(super) struct ColumnEnds {
 
 saved! { ColumnEnds { runs, own_runs, near, far, own } }
 
-/// Small indices of a column.
+/// 16-bit neighbor indices of a column, relative to the window.
 #[repr(C, align(32))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NearIndices(pub [u16; LANES]);
 
 saved! { NearIndices { 0 } }
 
-/// Indices of a column.
+/// 32-bit neighbor indices of a column.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FarIndices(pub [u32; LANES]);
 
 saved! { FarIndices { 0 } }
 
-/// A link's place.
+/// The column that contains a link.
 #[derive(Clone, Copy)]
-pub(super) enum LinkPlace {
+pub(super) enum LinkLocation {
     Run(usize),
     OwnRun(usize),
     Near(usize),

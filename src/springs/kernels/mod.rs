@@ -1,12 +1,12 @@
-//! Kernels of springs, compiled once for each kind of processor.
+//! SIMD kernels of springs, compiled once per SIMD level.
 #![allow(unsafe_code)]
 
+mod accumulators;
 mod columns;
 mod forces;
 mod layout;
-mod quantities;
-mod sound;
 mod strays;
+mod validate;
 
 pub(super) use columns::Columns;
-pub(super) use layout::{Column, Line, Neighbours, Parameters, SpringMaterial};
+pub(super) use layout::{Column, ColumnParameters, F32x16, Neighbors, SpringParameters};

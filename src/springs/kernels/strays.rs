@@ -1,41 +1,41 @@
-//! Links that fill no column, of any nodes of a tile, in the order of their nodes.
+//! Links outside of columns, of any nodes of a tile, sorted by node.
 
 use std::ops::Range;
 
-use super::layout::Line;
+use super::layout::F32x16;
 use crate::base::Result;
 use crate::codec::saved;
 use crate::order::LANES;
 use crate::springs::Link;
 
-/// Links beside the columns of a tile.
+/// The links of a tile that are in no column.
 #[derive(Debug)]
 pub(crate) struct Strays {
-    /// The tile's first node.
+    /// The first node of the tile.
     first: usize,
-    /// Nodes of the body.
+    /// The number of nodes in the body.
     node_count: usize,
     damped: bool,
-    /// The nodes, counted from the tile's first.
-    places: Vec<u16>,
-    neighbours: Vec<u32>,
+    /// The nodes, relative to the first node of the tile.
+    local_nodes: Vec<u16>,
+    neighbors: Vec<u32>,
     stiffnesses: Vec<f32>,
     rest_lengths: Vec<f32>,
     dampings: Vec<f32>,
 }
 
-saved! { Strays { first, node_count, damped, places, neighbours, stiffnesses, rest_lengths, dampings } }
+saved! { Strays { first, node_count, damped, local_nodes, neighbors, stiffnesses, rest_lengths, dampings } }
 
-/// Sixteen strays, or fewer at the end, as the kernel takes them.
+/// Up to sixteen strays as the kernel takes them.
 pub(super) struct Batch {
     pub count: usize,
-    /// The nodes, counted from the tile's first.
-    pub places: [u16; LANES],
+    /// The nodes, relative to the first node of the tile.
+    pub local_nodes: [u16; LANES],
     pub nodes: [u32; LANES],
-    pub neighbours: [u32; LANES],
-    pub stiffnesses: Line,
-    pub rest_lengths: Line,
-    pub dampings: Line,
+    pub neighbors: [u32; LANES],
+    pub stiffnesses: F32x16,
+    pub rest_lengths: F32x16,
+    pub dampings: F32x16,
 }
 
 impl Strays {
@@ -44,32 +44,32 @@ impl Strays {
             first,
             node_count,
             damped,
-            places: Vec::new(),
-            neighbours: Vec::new(),
+            local_nodes: Vec::new(),
+            neighbors: Vec::new(),
             stiffnesses: Vec::new(),
             rest_lengths: Vec::new(),
             dampings: Vec::new(),
         }
     }
 
-    /// The body has so many nodes now.
-    pub(super) fn reach(&mut self, node_count: usize) {
+    /// Raises the body's number of nodes.
+    pub(super) fn extend_node_count(&mut self, node_count: usize) {
         self.node_count = self.node_count.max(node_count);
     }
 
-    /// The body has no more nodes than so many now.
+    /// Lowers the body's number of nodes.
     pub(super) fn shrink(&mut self, node_count: usize) {
         self.node_count = self.node_count.min(node_count);
     }
 
     pub fn len(&self) -> usize {
-        self.places.len()
+        self.local_nodes.len()
     }
 
-    /// Makes room for `count` more.
+    /// Reserves memory for `count` more.
     pub fn reserve(&mut self, count: usize) -> Result<()> {
-        self.places.try_reserve(count)?;
-        self.neighbours.try_reserve(count)?;
+        self.local_nodes.try_reserve(count)?;
+        self.neighbors.try_reserve(count)?;
         self.stiffnesses.try_reserve(count)?;
         self.rest_lengths.try_reserve(count)?;
         if self.damped {
@@ -78,13 +78,13 @@ impl Strays {
         Ok(())
     }
 
-    /// Puts in a link of `node`, for which there is room.
+    /// Inserts a link of `node`, within the reserved memory.
     pub fn insert(&mut self, node: usize, link: &Link) {
-        assert!((link.neighbour as usize) < self.node_count && node < self.node_count);
-        let place = (node - self.first) as u16;
-        let index = self.places.partition_point(|&other| other <= place);
-        self.places.insert(index, place);
-        self.neighbours.insert(index, link.neighbour);
+        assert!((link.neighbor as usize) < self.node_count && node < self.node_count);
+        let local_node = (node - self.first) as u16;
+        let index = self.local_nodes.partition_point(|&other| other <= local_node);
+        self.local_nodes.insert(index, local_node);
+        self.neighbors.insert(index, link.neighbor);
         self.stiffnesses.insert(index, link.stiffness);
         self.rest_lengths.insert(index, link.rest_length);
         if self.damped {
@@ -92,9 +92,9 @@ impl Strays {
         }
     }
 
-    /// Gives the link from `node` other parameters, where it is here.
+    /// Sets the parameters of a link of `node`, if it is here.
     pub fn set(&mut self, node: usize, link: &Link) {
-        if let Some(index) = self.find(node, link.neighbour as usize) {
+        if let Some(index) = self.find(node, link.neighbor as usize) {
             self.stiffnesses[index] = link.stiffness;
             self.rest_lengths[index] = link.rest_length;
             if self.damped {
@@ -103,26 +103,26 @@ impl Strays {
         }
     }
 
-    /// Takes out the link from `node` to `neighbour`; whether there was one.
-    pub fn remove(&mut self, node: usize, neighbour: usize) -> bool {
-        let found = self.find(node, neighbour);
-        if let Some(index) = found {
-            self.places.remove(index);
-            self.neighbours.remove(index);
+    /// Removes the link from `node` to `neighbor`. Returns true if there was one.
+    pub fn remove(&mut self, node: usize, neighbor: usize) -> bool {
+        let slot = self.find(node, neighbor);
+        if let Some(index) = slot {
+            self.local_nodes.remove(index);
+            self.neighbors.remove(index);
             self.stiffnesses.remove(index);
             self.rest_lengths.remove(index);
             if self.damped {
                 self.dampings.remove(index);
             }
         }
-        found.is_some()
+        slot.is_some()
     }
 
-    /// Shows the links of `node`.
-    pub fn visit(&self, node: usize, see: &mut dyn FnMut(Link)) {
-        for index in self.of(node) {
-            see(Link {
-                neighbour: self.neighbours[index],
+    /// Calls `f` for each link of `node`.
+    pub fn visit(&self, node: usize, f: &mut dyn FnMut(Link)) {
+        for index in self.range_of(node) {
+            f(Link {
+                neighbor: self.neighbors[index],
                 stiffness: self.stiffnesses[index],
                 rest_length: self.rest_lengths[index],
                 damping: if self.damped { self.dampings[index] } else { 0.0 },
@@ -132,33 +132,35 @@ impl Strays {
 
     /// Bytes in use, and bytes held from the allocator.
     pub fn bytes(&self) -> (usize, usize) {
-        let used = size_of_val(&*self.places)
-            + size_of_val(&*self.neighbours)
+        let used = size_of_val(&*self.local_nodes)
+            + size_of_val(&*self.neighbors)
             + size_of_val(&*self.stiffnesses)
             + size_of_val(&*self.rest_lengths)
             + size_of_val(&*self.dampings);
         let floats = self.stiffnesses.capacity() + self.rest_lengths.capacity() + self.dampings.capacity();
-        let held = self.places.capacity() * size_of::<u16>()
-            + self.neighbours.capacity() * size_of::<u32>()
+        let held = self.local_nodes.capacity() * size_of::<u16>()
+            + self.neighbors.capacity() * size_of::<u32>()
             + floats * size_of::<f32>();
         (used, held)
     }
 
-    fn find(&self, node: usize, neighbour: usize) -> Option<usize> {
-        self.of(node)
-            .find(|&index| self.neighbours[index] as usize == neighbour)
+    fn find(&self, node: usize, neighbor: usize) -> Option<usize> {
+        self.range_of(node)
+            .find(|&index| self.neighbors[index] as usize == neighbor)
     }
 
-    /// The indices of a node's.
-    fn of(&self, node: usize) -> Range<usize> {
-        let place = node - self.first;
-        let start = self.places.partition_point(|&other| usize::from(other) < place);
-        let count = self.places[start..].partition_point(|&other| usize::from(other) == place);
+    /// The range of a node's links.
+    fn range_of(&self, node: usize) -> Range<usize> {
+        let local_node = node - self.first;
+        let start = self
+            .local_nodes
+            .partition_point(|&other| usize::from(other) < local_node);
+        let count = self.local_nodes[start..].partition_point(|&other| usize::from(other) == local_node);
         start..start + count
     }
 
-    /// Whether these are strays of `nodes` in a body of `node_count` that lead to nodes that are read.
-    pub(super) fn are_sound(
+    /// True if these are valid strays of `nodes` in a body of `node_count` nodes, with neighbors within the read range.
+    pub(super) fn are_valid(
         &self,
         nodes: Range<usize>,
         node_count: usize,
@@ -169,12 +171,15 @@ impl Strays {
         self.first == nodes.start
             && self.node_count <= node_count
             && self.damped == damped
-            && [self.neighbours.len(), self.stiffnesses.len(), self.rest_lengths.len()] == [count; 3]
+            && [self.neighbors.len(), self.stiffnesses.len(), self.rest_lengths.len()] == [count; 3]
             && self.dampings.len() == if damped { count } else { 0 }
-            && self.places.is_sorted()
-            && self.places.iter().all(|&place| usize::from(place) < nodes.len())
+            && self.local_nodes.is_sorted()
             && self
-                .neighbours
+                .local_nodes
+                .iter()
+                .all(|&local_node| usize::from(local_node) < nodes.len())
+            && self
+                .neighbors
                 .iter()
                 .all(|&node| (node as usize) < node_count && is_read(node as isize))
     }
@@ -183,28 +188,28 @@ impl Strays {
         self.len().div_ceil(LANES)
     }
 
-    /// Sixteen of them; lanes beyond the last repeat it.
+    /// A batch of sixteen. Lanes beyond the last stray repeat it.
     #[inline(always)]
     pub(super) fn batch(&self, batch: usize) -> Batch {
         let start = batch * LANES;
-        let places: [u16; LANES] = sixteen(&self.places[start..]);
+        let local_nodes: [u16; LANES] = sixteen(&self.local_nodes[start..]);
         Batch {
             count: (self.len() - start).min(LANES),
-            places,
-            nodes: places.map(|place| (self.first + usize::from(place)) as u32),
-            neighbours: sixteen(&self.neighbours[start..]),
-            stiffnesses: Line(sixteen(&self.stiffnesses[start..])),
-            rest_lengths: Line(sixteen(&self.rest_lengths[start..])),
+            local_nodes,
+            nodes: local_nodes.map(|local_node| (self.first + usize::from(local_node)) as u32),
+            neighbors: sixteen(&self.neighbors[start..]),
+            stiffnesses: F32x16(sixteen(&self.stiffnesses[start..])),
+            rest_lengths: F32x16(sixteen(&self.rest_lengths[start..])),
             dampings: if self.damped {
-                Line(sixteen(&self.dampings[start..]))
+                F32x16(sixteen(&self.dampings[start..]))
             } else {
-                Line::ZERO
+                F32x16::ZERO
             },
         }
     }
 }
 
-/// The first sixteen; where there are fewer, the last of them again.
+/// The first sixteen values. If there are fewer, the last one is repeated.
 #[inline(always)]
 fn sixteen<T: Copy>(values: &[T]) -> [T; LANES] {
     match values.first_chunk() {

@@ -1,38 +1,38 @@
-//! Making columns of a tile's links.
+//! Packs the links of a tile into columns.
 
 use std::ops::Range;
 
 use crate::base::{Result, memory};
 use crate::order::{BlockSplit, Costs, GATHER, LANES, Row, cheapest};
 use crate::springs::Link;
-use crate::springs::kernels::{Column, Columns, Line, Neighbours, Parameters, SpringMaterial};
+use crate::springs::kernels::{Column, ColumnParameters, Columns, F32x16, Neighbors, SpringParameters};
 
-/// Marks a link that is of no kind in the table of materials.
-pub(super) const NO_KIND: u16 = u16::MAX;
+/// Marks a link that has no class in the parameter table.
+pub(super) const NO_CLASS: u16 = u16::MAX;
 
-/// One end of a spring, to be put into a column.
+/// One end of a spring that is not in a column yet.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Loose {
+pub(super) struct UnpackedLink {
     pub node: u32,
-    pub neighbour: u32,
-    /// Its place in the table of materials; [`NO_KIND`].
-    pub kind: u16,
-    pub own: SpringMaterial,
+    pub neighbor: u32,
+    /// The index in the parameter table, or [`NO_CLASS`].
+    pub class: u16,
+    pub own: SpringParameters,
 }
 
-impl Loose {
+impl UnpackedLink {
     fn offset(&self) -> i64 {
-        i64::from(self.neighbour) - i64::from(self.node)
+        i64::from(self.neighbor) - i64::from(self.node)
     }
 }
 
-/// Packs the links of `nodes`, in the order of their nodes. The order of `links` is lost.
+/// Packs the links of `nodes`, sorted by node. The order of `links` is lost.
 pub(super) fn pack(
     nodes: Range<usize>,
     node_count: usize,
     damped: bool,
-    materials: &[SpringMaterial],
-    links: &mut [Loose],
+    table: &[SpringParameters],
+    links: &mut [UnpackedLink],
 ) -> Result<Columns> {
     let stiffness = links.first().map_or(0.0, |link| link.own.stiffness);
     let uniform = links.iter().all(|link| link.own.stiffness == stiffness);
@@ -49,16 +49,16 @@ pub(super) fn pack(
         let count = rest.partition_point(|link| (link.node as usize) < first + LANES);
         let (block, after) = rest.split_at_mut(count);
         let strays = packer.block(first, block)?;
-        columns.push_block(&packer.columns, materials)?;
+        columns.push_block(&packer.columns, table)?;
         columns.reserve_strays(strays)?;
-        for loose in &mut block[..strays] {
+        for unpacked in &mut block[..strays] {
             let link = Link {
-                neighbour: loose.neighbour,
-                stiffness: loose.own.stiffness,
-                rest_length: loose.own.rest_length,
-                damping: loose.own.damping,
+                neighbor: unpacked.neighbor,
+                stiffness: unpacked.own.stiffness,
+                rest_length: unpacked.own.rest_length,
+                damping: unpacked.own.damping,
             };
-            columns.insert_stray(loose.node as usize, &link);
+            columns.insert_stray(unpacked.node as usize, &link);
         }
         rest = after;
         first += LANES;
@@ -67,114 +67,117 @@ pub(super) fn pack(
     Ok(columns)
 }
 
-/// What packing a block needs, kept from block to block.
+/// Working memory for packing blocks.
 struct Packer {
     node_count: usize,
     columns: Vec<Column>,
     rows: Vec<Row>,
-    /// For each level, how many links lie there: where a node has its n-th link, n - 1 others lie below.
+    /// The number of links on each level. The n-th link of a node is on level n.
     levels: Vec<u32>,
 }
 
 impl Packer {
-    /// Puts the links of the sixteen nodes from `first` on into columns: how many are left, which are the first then.
-    fn block(&mut self, first: usize, links: &mut [Loose]) -> Result<usize> {
+    /// Packs the links of sixteen nodes starting at `first` into columns. Returns the number of links left over, which
+    /// are moved to the front.
+    fn block(&mut self, first: usize, links: &mut [UnpackedLink]) -> Result<usize> {
         self.columns.clear();
         self.columns.try_reserve(links.len() / GATHER + 1)?;
-        links.sort_unstable_by_key(|link| (link.kind, link.offset(), link.node));
-        self.see_rows(first, links)?;
-        let BlockSplit { run, mixed, .. } = cheapest(&self.rows, &mut self.levels)?;
-        let mut left = self.take_runs(first, links, run);
+        links.sort_unstable_by_key(|link| (link.class, link.offset(), link.node));
+        self.find_rows(first, links)?;
+        let BlockSplit { min_run, mixed, .. } = cheapest(&self.rows, &mut self.levels)?;
+        let mut remaining = self.take_runs(first, links, min_run);
         if !mixed {
-            left = self.take_gathers(first, &mut links[..left])?;
+            remaining = self.take_gathers(first, &mut links[..remaining])?;
         }
-        // What is too little of one kind may do together, each with its own parameters.
-        for link in &mut links[..left] {
-            link.kind = NO_KIND;
+        // Links that are too few in their class may fill a column together, with per-spring parameters.
+        for link in &mut links[..remaining] {
+            link.class = NO_CLASS;
         }
-        links[..left].sort_unstable_by_key(|link| (link.offset(), link.node));
-        self.take_gathers(first, &mut links[..left])
+        links[..remaining].sort_unstable_by_key(|link| (link.offset(), link.node));
+        self.take_gathers(first, &mut links[..remaining])
     }
 
-    /// Notes which links are of a kind and lead equally far.
-    fn see_rows(&mut self, first: usize, links: &[Loose]) -> Result<()> {
+    /// Groups links of the same class and index offset into rows.
+    fn find_rows(&mut self, first: usize, links: &[UnpackedLink]) -> Result<()> {
         self.rows.clear();
-        let same = |a: &Loose, b: &Loose| a.kind == b.kind && a.offset() == b.offset();
+        let same = |a: &UnpackedLink, b: &UnpackedLink| a.class == b.class && a.offset() == b.offset();
         for links in links.chunk_by(same) {
-            let kind = links[0].kind;
-            let costs = if kind == NO_KIND { Costs::OWN } else { Costs::SHARED };
+            let class = links[0].class;
+            let costs = if class == NO_CLASS { Costs::OWN } else { Costs::SHARED };
             let lanes = links
                 .iter()
                 .fold(0, |lanes, link| lanes | 1 << (link.node as usize - first));
-            memory::push(&mut self.rows, Row { kind, costs, lanes })?;
+            memory::push(&mut self.rows, Row { class, costs, lanes })?;
         }
         Ok(())
     }
 
-    /// Makes runs of links of a kind with the same offset, so many at least: how many are left, moved to the front.
-    fn take_runs(&mut self, first: usize, links: &mut [Loose], fewest: usize) -> usize {
-        let (mut left, mut start) = (0, 0);
+    /// Makes runs of at least `min_links` links of the same class and offset. Returns the number of links left over,
+    /// which are moved to the front.
+    fn take_runs(&mut self, first: usize, links: &mut [UnpackedLink], min_links: usize) -> usize {
+        let (mut remaining, mut start) = (0, 0);
         while start < links.len() {
             let head = links[start];
-            let same = |link: &&Loose| link.kind == head.kind && link.offset() == head.offset();
+            let same = |link: &&UnpackedLink| link.class == head.class && link.offset() == head.offset();
             let count = links[start..].iter().take_while(same).count();
             let run = start..start + count;
-            if count >= fewest
+            if count >= min_links
                 && let Ok(offset) = i32::try_from(head.offset())
             {
-                let mut column = Column::empty(Neighbours::Run(offset), head.kind);
+                let mut column = Column::empty(Neighbors::Run(offset), head.class);
                 for link in &links[run.clone()] {
-                    column.put(link, first);
+                    column.insert(link, first);
                 }
                 self.columns.push(column);
             } else {
-                links.copy_within(run.clone(), left);
-                left += count;
+                links.copy_within(run.clone(), remaining);
+                remaining += count;
             }
             start = run.end;
         }
-        left
+        remaining
     }
 
-    /// Makes gathers of links of a kind, as many as are well filled: how many are left, moved to the front.
-    fn take_gathers(&mut self, first: usize, links: &mut [Loose]) -> Result<usize> {
-        let (mut left, mut start) = (0, 0);
+    /// Makes gathers of links of the same class, as long as they are well filled. Returns the number of links left
+    /// over, which are moved to the front.
+    fn take_gathers(&mut self, first: usize, links: &mut [UnpackedLink]) -> Result<usize> {
+        let (mut remaining, mut start) = (0, 0);
         while start < links.len() {
-            let kind = links[start].kind;
-            let count = links[start..].iter().take_while(|link| link.kind == kind).count();
+            let class = links[start].class;
+            let count = links[start..].iter().take_while(|link| link.class == class).count();
             let group = start..start + count;
             self.count_levels(first, &links[group.clone()])?;
-            // A level is never fuller than the one below.
-            let worth = self
+            // A level never has more links than the level below.
+            let level_count = self
                 .levels
                 .iter()
                 .take_while(|&&links| links as usize >= GATHER)
                 .count();
             let base = self.columns.len();
-            self.columns.try_reserve(worth)?;
-            for _ in 0..worth {
-                // Lanes without a link lead to the block's first node.
-                let nowhere = Neighbours::Gather([first.min(self.node_count - 1) as u32; LANES]);
-                self.columns.push(Column::empty(nowhere, kind));
+            self.columns.try_reserve(level_count)?;
+            for _ in 0..level_count {
+                // Unused lanes refer to the first node of the block.
+                let nowhere = Neighbors::Gather([first.min(self.node_count - 1) as u32; LANES]);
+                self.columns.push(Column::empty(nowhere, class));
             }
             let mut heights = [0; LANES];
             for index in group.clone() {
                 let link = links[index];
                 let height = &mut heights[link.node as usize - first];
-                if *height < worth {
-                    self.columns[base + *height].put(&link, first);
+                if *height < level_count {
+                    self.columns[base + *height].insert(&link, first);
                 } else {
-                    links[left] = link;
-                    left += 1;
+                    links[remaining] = link;
+                    remaining += 1;
                 }
                 *height += 1;
             }
             start = group.end;
         }
-        Ok(left)
+        Ok(remaining)
     }
 
-    fn count_levels(&mut self, first: usize, links: &[Loose]) -> Result<()> {
+    fn count_levels(&mut self, first: usize, links: &[UnpackedLink]) -> Result<()> {
         let mut heights = [0; LANES];
         self.levels.clear();
         for link in links {
@@ -190,29 +193,29 @@ impl Packer {
 }
 
 impl Column {
-    fn empty(neighbours: Neighbours, kind: u16) -> Self {
+    fn empty(neighbors: Neighbors, class: u16) -> Self {
         Self {
-            neighbours,
+            neighbors,
             lanes: 0,
-            parameters: match kind {
-                NO_KIND => Parameters::Own {
-                    stiffnesses: Line::ZERO,
-                    rest_lengths: Line::ZERO,
-                    dampings: Line::ZERO,
+            parameters: match class {
+                NO_CLASS => ColumnParameters::Own {
+                    stiffnesses: F32x16::ZERO,
+                    rest_lengths: F32x16::ZERO,
+                    dampings: F32x16::ZERO,
                 },
-                kind => Parameters::Shared(kind),
+                class => ColumnParameters::Shared(class),
             },
         }
     }
 
-    /// Puts a link into the lane of its node.
-    fn put(&mut self, link: &Loose, first: usize) {
+    /// Inserts a link into the lane of its node.
+    fn insert(&mut self, link: &UnpackedLink, first: usize) {
         let lane = link.node as usize - first;
         self.lanes |= 1 << lane;
-        if let Neighbours::Gather(neighbours) = &mut self.neighbours {
-            neighbours[lane] = link.neighbour;
+        if let Neighbors::Gather(neighbors) = &mut self.neighbors {
+            neighbors[lane] = link.neighbor;
         }
-        if let Parameters::Own {
+        if let ColumnParameters::Own {
             stiffnesses,
             rest_lengths,
             dampings,

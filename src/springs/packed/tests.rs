@@ -8,11 +8,11 @@ use crate::def::{Rounding, Spring};
 use crate::random::Random;
 use crate::simd::Kernel;
 use crate::soa::{Records, TileForces, Vectors, WriteRecords, tile_count, tile_nodes};
-use crate::springs::{Course, Link, Motion, Rewiring, SpringChange, Springs, Tangent};
+use crate::springs::{DirectionInput, ForceInput, Link, Rewiring, SpringChange, Springs, Tangent};
 
 const KERNELS: [Kernel; 4] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512, Kernel::Neon];
 
-/// Springs between nodes, by their lower and their higher node.
+/// Springs by their lower and higher node.
 type TestPairs = BTreeMap<[u32; 2], Spring>;
 
 fn spring(nodes: [u32; 2], [stiffness, rest_length, damping]: [f32; 3]) -> Spring {
@@ -31,22 +31,22 @@ fn join(pairs: &mut TestPairs, a: usize, b: usize, parameters: [f32; 3]) {
     }
 }
 
-/// A band of neighbours at even distances, each spring as `of` says.
-fn band(count: usize, offsets: &[usize], mut of: impl FnMut(usize) -> [f32; 3]) -> TestPairs {
+/// A band of springs at constant index offsets, with the given parameters.
+fn band(count: usize, offsets: &[usize], mut parameters: impl FnMut(usize) -> [f32; 3]) -> TestPairs {
     let mut pairs = TestPairs::new();
-    for (kind, &offset) in offsets.iter().enumerate() {
+    for (class, &offset) in offsets.iter().enumerate() {
         for node in 0..count.saturating_sub(offset) {
-            join(&mut pairs, node, node + offset, of(kind));
+            join(&mut pairs, node, node + offset, parameters(class));
         }
     }
     pairs
 }
 
-/// All the ways in which springs lie: how many nodes, and what joins them.
+/// Test bodies for every column layout: name, number of nodes and springs.
 fn bodies(damped: bool) -> Vec<(&'static str, usize, TestPairs)> {
     let mut random = Random(7);
     let damping = if damped { 0.5 } else { 0.0 };
-    let shared = |kind: usize| [10.0 + kind as f32, 0.1 * (1 + kind) as f32, damping];
+    let shared = |class: usize| [10.0 + class as f32, 0.1 * (1 + class) as f32, damping];
     let mut bodies = vec![
         ("a pair", 2, band(2, &[1], shared)),
         ("runs", 1000, band(1000, &[1, 17, 31, 32, 33], shared)),
@@ -98,7 +98,7 @@ fn packed(kernel: Kernel, count: usize, pairs: &TestPairs) -> Option<Packed> {
     Some(packed.expect("memory"))
 }
 
-/// The same as records.
+/// The vectors as records.
 fn records(vectors: &Vectors) -> Records {
     let mut records = Records::zeros(vectors.len()).expect("memory");
     let kernel = Kernel::Portable.choose().expect("a kernel for every processor");
@@ -109,54 +109,58 @@ fn records(vectors: &Vectors) -> Records {
     records
 }
 
-/// Checks forces on nodes, to this part of the terms of their sums: the sum of them all.
-fn check(what: &str, found: &[Vec3], expected: &[(DVec3, f64)], part: f64) -> DVec3 {
-    for (node, (found, (expected, size))) in found.iter().zip(expected).enumerate() {
-        let error = (found.as_dvec3() - *expected).length();
-        assert!(error <= part * size, "{what}, node {node}: {found} for {expected}");
+/// Checks the forces on nodes, to this fraction of the terms of their sums. Returns their total.
+fn check(label: &str, actual: &[Vec3], expected: &[(DVec3, f64)], part: f64) -> DVec3 {
+    for (node, (actual, (expected, size))) in actual.iter().zip(expected).enumerate() {
+        let error = (actual.as_dvec3() - *expected).length();
+        assert!(error <= part * size, "{label}, node {node}: {actual} for {expected}");
     }
-    found.iter().map(|force| force.as_dvec3()).sum()
+    actual.iter().map(|force| force.as_dvec3()).sum()
 }
 
-fn forces_in(packed: &dyn Springs, motion: &Motion, count: usize) -> Vec<Vec3> {
+fn forces_in(packed: &dyn Springs, input: &ForceInput, count: usize) -> Vec<Vec3> {
     let mut all = Vec::new();
     for tile in 0..tile_count(count) {
         let mut forces = TileForces::ZERO;
-        packed.forces(tile, motion, &mut forces);
-        all.extend((0..tile_nodes(tile, count).len()).map(|place| forces.get(place)));
+        packed.forces(tile, input, &mut forces);
+        all.extend((0..tile_nodes(tile, count).len()).map(|index| forces.get(index)));
     }
     all
 }
 
-/// From positions as they are, without records: with those the last places of a sum may differ.
+/// Forces from positions without records; with records the last bits of a sum may differ.
 fn plain_forces(packed: &dyn Springs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<Vec3> {
-    forces_in(packed, &Motion::at(positions, velocities), positions.len())
+    forces_in(packed, &ForceInput::at(positions, velocities), positions.len())
 }
 
 fn forces(packed: &dyn Springs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<Vec3> {
-    let found = plain_forces(packed, positions, velocities);
+    let actual = plain_forces(packed, positions, velocities);
     let records = records(positions);
-    let motion = Motion {
+    let input = ForceInput {
         positions: positions.view().with_records(Some(&records)),
-        ..Motion::at(positions, velocities)
+        ..ForceInput::at(positions, velocities)
     };
-    assert_eq!(found, forces_in(packed, &motion, positions.len()), "from records");
-    found
+    assert_eq!(actual, forces_in(packed, &input, positions.len()), "from records");
+    actual
 }
 
-/// The same in `f64`, and how large the terms of each sum are.
+/// The forces in `f64`, and the magnitude of the terms of each sum.
 fn reference(pairs: &TestPairs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<(DVec3, f64)> {
     let mut forces = vec![(DVec3::ZERO, 0.0); positions.len()];
     for spring in pairs.values() {
         let [a, b] = spring.nodes.map(|node| node as usize);
-        let way = positions.get(b).as_dvec3() - positions.get(a).as_dvec3();
-        let direction = if way == DVec3::ZERO { DVec3::X } else { way.normalize() };
+        let offset = positions.get(b).as_dvec3() - positions.get(a).as_dvec3();
+        let direction = if offset == DVec3::ZERO {
+            DVec3::X
+        } else {
+            offset.normalize()
+        };
         let rate = velocities.map_or(0.0, |velocities| {
             direction.dot(velocities.get(b).as_dvec3() - velocities.get(a).as_dvec3())
         });
-        let tension = f64::from(spring.stiffness) * (way.length() - f64::from(spring.rest_length));
+        let tension = f64::from(spring.stiffness) * (offset.length() - f64::from(spring.rest_length));
         let damping = f64::from(spring.damping) * rate;
-        let size = f64::from(spring.stiffness) * (way.length() + f64::from(spring.rest_length)) + damping.abs();
+        let size = f64::from(spring.stiffness) * (offset.length() + f64::from(spring.rest_length)) + damping.abs();
         for (node, sign) in [(a, 1.0), (b, -1.0)] {
             forces[node].0 += direction * (sign * (tension + damping));
             forces[node].1 += size;
@@ -171,7 +175,7 @@ fn every_kernel_computes_the_forces() {
         for (name, count, pairs) in bodies(damped) {
             let mut random = Random(3);
             let mut positions = vectors(count, &mut random);
-            // Some nodes coincide, all the way or nearly.
+            // Some nodes coincide exactly, others almost.
             for node in (0..count.saturating_sub(60)).step_by(97) {
                 positions.set(node + 1, positions.get(node));
                 positions.set(node + 50, positions.get(node) + Vec3::splat(1e-22));
@@ -185,9 +189,9 @@ fn every_kernel_computes_the_forces() {
                 };
                 tried += 1;
                 assert_eq!(packed.damped(), damped && !pairs.is_empty());
-                let found = forces(&packed, &positions, velocities.as_ref().filter(|_| packed.damped()));
-                let sum = check(&format!("{name}, {kernel:?}"), &found, &expected, 1e-6);
-                // Each end sees the opposite of what the other sees: only the sums of each node are rounded.
+                let actual = forces(&packed, &positions, velocities.as_ref().filter(|_| packed.damped()));
+                let sum = check(&format!("{name}, {kernel:?}"), &actual, &expected, 1e-6);
+                // Both ends get opposite forces; only the sums of each node are rounded.
                 let total: f64 = expected.iter().map(|(_, size)| size).sum();
                 assert!(sum.length() <= 1e-7 * total.max(1e-30), "{name}, {kernel:?}: {sum}");
             }
@@ -196,11 +200,11 @@ fn every_kernel_computes_the_forces() {
     }
 }
 
-/// How the forces change in `f64`, with how large the terms are, and the energy.
+/// The force changes in `f64` with the magnitude of their terms, and the energy.
 fn reference_change(
     pairs: &TestPairs,
     positions: &Vectors,
-    ways: &Vectors,
+    displacements: &Vectors,
     tangent: Tangent,
 ) -> (Vec<(DVec3, f64)>, f64) {
     let mut changes = vec![(DVec3::ZERO, 0.0); positions.len()];
@@ -208,20 +212,20 @@ fn reference_change(
     for spring in pairs.values() {
         let [a, b] = spring.nodes.map(|node| node as usize);
         let [k, rest, damping] = [spring.stiffness, spring.rest_length, spring.damping].map(f64::from);
-        let way = positions.get(b).as_dvec3() - positions.get(a).as_dvec3();
-        let length = way.length();
-        let direction = if length == 0.0 { DVec3::X } else { way / length };
+        let offset = positions.get(b).as_dvec3() - positions.get(a).as_dvec3();
+        let length = offset.length();
+        let direction = if length == 0.0 { DVec3::X } else { offset / length };
         let floor = if length == 0.0 { 0.0 } else { f64::from(tangent.floor) };
         let slack = if rest == 0.0 { 1.0 } else { 1.0 - rest / length };
         let across = (k * slack).max(floor);
         let along = k + damping * f64::from(tangent.rate);
-        let difference = ways.get(b).as_dvec3() - ways.get(a).as_dvec3();
+        let difference = displacements.get(b).as_dvec3() - displacements.get(a).as_dvec3();
         let lengthening = direction * direction.dot(difference);
         let change = lengthening * along + (difference - lengthening) * across;
         energy += 0.5 * k * (length - rest).powi(2);
         for (node, sign) in [(a, 1.0), (b, -1.0)] {
             changes[node].0 += change * sign;
-            // What a rounded length does to the part across.
+            // The effect of a rounded length on the transverse part.
             changes[node].1 += difference.length() * (along + across.abs() + k * (slack - 1.0).abs().min(1e6));
         }
     }
@@ -243,20 +247,20 @@ fn every_kernel_computes_changes_and_energy() {
             for node in (0..count.saturating_sub(60)).step_by(97) {
                 positions.set(node + 1, positions.get(node));
             }
-            let ways = vectors(count, &mut random);
-            let [position_records, way_records] = [&positions, &ways].map(records);
-            let course = Course {
+            let displacements = vectors(count, &mut random);
+            let [position_records, way_records] = [&positions, &displacements].map(records);
+            let input = DirectionInput {
                 node_count: count,
                 positions: positions.view(),
-                ways: ways.view(),
+                displacements: displacements.view(),
                 tangent,
             };
-            let course_of_records = Course {
+            let input_with_records = DirectionInput {
                 positions: positions.view().with_records(Some(&position_records)),
-                ways: ways.view().with_records(Some(&way_records)),
-                ..course
+                displacements: displacements.view().with_records(Some(&way_records)),
+                ..input
             };
-            let (expected, energy) = reference_change(&pairs, &positions, &ways, tangent);
+            let (expected, energy) = reference_change(&pairs, &positions, &displacements, tangent);
             for kernel in KERNELS {
                 let Some(packed) = packed(kernel, count, &pairs) else {
                     continue;
@@ -264,18 +268,18 @@ fn every_kernel_computes_changes_and_energy() {
                 let (mut sum, mut found_energy) = (DVec3::ZERO, 0.0);
                 for tile in 0..tile_count(count) {
                     let mut changes = TileForces::ZERO;
-                    packed.changes(tile, &course, &mut changes);
-                    found_energy += packed.half_energy(tile_nodes(tile, count), course_of_records.positions);
-                    let mut of_records = TileForces::ZERO;
-                    packed.changes(tile, &course_of_records, &mut of_records);
-                    assert_eq!(changes.axes(), of_records.axes(), "{name}, {kernel:?}, from records");
-                    for (place, node) in tile_nodes(tile, count).enumerate() {
-                        let (found, (expected, size)) = (changes.get(place).as_dvec3(), expected[node]);
+                    packed.force_changes(tile, &input, &mut changes);
+                    found_energy += packed.half_energy(tile_nodes(tile, count), input_with_records.positions);
+                    let mut from_records = TileForces::ZERO;
+                    packed.force_changes(tile, &input_with_records, &mut from_records);
+                    assert_eq!(changes.axes(), from_records.axes(), "{name}, {kernel:?}, from records");
+                    for (index, node) in tile_nodes(tile, count).enumerate() {
+                        let (actual, (expected, size)) = (changes.get(index).as_dvec3(), expected[node]);
                         assert!(
-                            (found - expected).length() <= 2e-6 * size,
-                            "{name}, {kernel:?}, {floor}, node {node}: {found} for {expected}"
+                            (actual - expected).length() <= 2e-6 * size,
+                            "{name}, {kernel:?}, {floor}, node {node}: {actual} for {expected}"
                         );
-                        sum += found;
+                        sum += actual;
                     }
                 }
                 let total: f64 = expected.iter().map(|(_, size)| size).sum();
@@ -300,20 +304,20 @@ fn springs_come_back_as_they_were_given() {
     }
 }
 
-/// The springs, as both of their nodes see them.
+/// The springs, collected from the links of both nodes.
 fn links(packed: &dyn Springs, count: usize) -> TestPairs {
     let mut ends: BTreeMap<[u32; 2], Vec<Link>> = BTreeMap::new();
     for node in 0..count as u32 {
         packed.visit(node as usize, &mut |link| {
-            let pair = [node.min(link.neighbour), node.max(link.neighbour)];
+            let pair = [node.min(link.neighbor), node.max(link.neighbor)];
             ends.entry(pair).or_default().push(link);
         });
     }
     let joined = |(nodes, ends): ([u32; 2], Vec<Link>)| {
         assert_eq!(ends.len(), 2, "{nodes:?}");
-        let of = |link: &Link| [link.stiffness, link.rest_length, link.damping];
-        assert_eq!(of(&ends[0]), of(&ends[1]));
-        (nodes, spring(nodes, of(&ends[0])))
+        let parameters = |link: &Link| [link.stiffness, link.rest_length, link.damping];
+        assert_eq!(parameters(&ends[0]), parameters(&ends[1]));
+        (nodes, spring(nodes, parameters(&ends[0])))
     };
     ends.into_iter().map(joined).collect()
 }
@@ -322,14 +326,14 @@ fn links(packed: &dyn Springs, count: usize) -> TestPairs {
 fn any_change_of_springs_is_kept() {
     let mut random = Random(5);
     let count = 1200;
-    let mut pairs = band(count, &[1, 30, 31], |kind| [10.0, 0.1 + kind as f32, 0.0]);
+    let mut pairs = band(count, &[1, 30, 31], |class| [10.0, 0.1 + class as f32, 0.0]);
     let mut packed = packed(Kernel::Best, count, &pairs).expect("a kernel");
     let positions = vectors(count, &mut random);
     for round in 0..12 {
         for _ in 0..500 {
             let (a, b) = (random.below(count) as u32, random.below(count) as u32);
             let nodes = [a.min(b), a.max(b)];
-            // Springs of a kind that the body has many of, and others.
+            // Springs of a common class, and others.
             let stiffness = if random.below(2) == 0 { 10.0 } else { random.unit() };
             let spring = spring(nodes, [stiffness, 0.1, 0.0]);
             if a == b {
@@ -337,10 +341,10 @@ fn any_change_of_springs_is_kept() {
             }
             match pairs.entry(nodes) {
                 Entry::Occupied(_) => assert!(packed.add(&spring).is_err()),
-                Entry::Vacant(place) => {
+                Entry::Vacant(vacant) => {
                     assert!(packed.remove(a, b).is_err());
                     packed.add(&spring).expect("memory");
-                    place.insert(spring);
+                    vacant.insert(spring);
                 }
             }
         }
@@ -355,7 +359,7 @@ fn any_change_of_springs_is_kept() {
             pairs.remove(&[a, b]);
         }
         assert_eq!(packed.spring_count(), pairs.len());
-        assert!(packed.is_sound());
+        assert!(packed.is_valid());
         assert_eq!(links(&packed, count), pairs);
         let expected = reference(&pairs, &positions, None);
         check("changed", &forces(&packed, &positions, None), &expected, 1e-6);
@@ -370,7 +374,7 @@ fn rest_lengths_that_differ_by_rounding_are_one() {
     let spacing = 0.01;
     let springs: Vec<Spring> = (1..count)
         .map(|node| {
-            // As a caller gets them from positions.
+            // Rest lengths as a caller computes them from positions.
             let rest_length = node as f32 * spacing - (node - 1) as f32 * spacing;
             spring([node - 1, node], [1.0, rest_length, 0.0])
         })
@@ -381,7 +385,7 @@ fn rest_lengths_that_differ_by_rounding_are_one() {
     let reach = count as f32 * spacing;
     let given = Packed::new(kernel, count as usize, &springs, Rounding { reach: 0.0 }).expect("memory");
     let derived = Packed::new(kernel, count as usize, &springs, Rounding { reach }).expect("memory");
-    // No column brings rest lengths of its own.
+    // All columns share their rest lengths.
     let (one, many) = (derived.bytes().0, given.bytes().0);
     assert!(3 * one < 2 * many, "{one} bytes for {many}");
     for (node, spring) in springs.iter().enumerate() {
@@ -440,7 +444,7 @@ fn nodes_that_come_later_have_their_springs() {
                 packed.resize(count + MORE).expect("memory");
                 let mut rewiring = Rewiring::default();
                 for node in count..count + MORE {
-                    // To one that was there, and to one that came too.
+                    // One spring to an old node, one to a new node.
                     for other in [random.below(count), count + random.below(node + 1 - count)] {
                         let nodes = [other as u32, node as u32];
                         let stiffness = random.unit();
@@ -452,19 +456,19 @@ fn nodes_that_come_later_have_their_springs() {
                     }
                 }
                 packed.rewire(&rewiring).expect("memory");
-                assert!(packed.is_sound(), "{name}");
+                assert!(packed.is_valid(), "{name}");
                 assert_eq!(links(&packed, count + MORE), pairs, "{name}");
                 let positions = vectors(count + MORE, &mut random);
                 let velocities = packed.damped().then(|| vectors(count + MORE, &mut random));
                 let expected = reference(&pairs, &positions, velocities.as_ref());
-                let found = plain_forces(&packed, &positions, velocities.as_ref());
-                assert_eq!(found.len(), count + MORE);
-                check(name, &found, &expected, 2e-6);
-                // And as it was, without them.
+                let actual = plain_forces(&packed, &positions, velocities.as_ref());
+                assert_eq!(actual.len(), count + MORE);
+                check(name, &actual, &expected, 2e-6);
+                // The new springs and nodes are removed again.
                 rewiring.removed = std::mem::take(&mut rewiring.added);
                 packed.rewire(&rewiring).expect("memory");
                 packed.resize(count).expect("memory");
-                assert!(packed.is_sound(), "{name}, as it was");
+                assert!(packed.is_valid(), "{name}, as it was");
                 pairs.retain(|nodes, _| nodes.iter().all(|&node| (node as usize) < count));
                 assert_eq!(links(&packed, count), pairs, "{name}");
                 let positions = vectors(count, &mut random);

@@ -1,42 +1,42 @@
-//! The difference of two byte strings that are alike: what is copied from the old one, and what is new.
+//! The difference of two similar byte strings.
 //!
-//! It is a list of parts: where in the old string a part is copied from, how long that is, and how many new bytes come after it, 8 bytes
-//! each, then these bytes. Snapshots differ in numbers that stay where they are, or by something inserted or left out: so the same place is
-//! looked for from the beginning, and from the end.
+//! It is a list of parts. Each part has three numbers of 8 bytes: the offset of a copy in the old string, its length, and the number of new bytes
+//! that follow the copy. Then come these bytes. Snapshots differ by changed numbers and by insertions, so bytes are compared at the same
+//! offset from the start, and from the end.
 
-use super::put;
+use super::append;
 use crate::base::{Error, Result, ensure};
 
-/// A shorter copy is not worth its part.
-const WORTH_COPYING: usize = 48;
+/// The shortest copy that is worth a part.
+const SHORTEST_COPY: usize = 48;
 
-/// Adds to `out` what makes `new` of `old`.
+/// Appends to `out` the difference that turns `old` into `new`.
 pub(super) fn difference(old: &[u8], new: &[u8], out: &mut Vec<u8>) -> Result<()> {
     let mut copy = (0, 0);
     let (mut at, mut literal) = (0, 0);
     while at < new.len() {
-        // Where it was, counted from either end.
-        let places = [Some(at), (at + old.len()).checked_sub(new.len())];
-        let runs = places.into_iter().flatten().filter_map(|place| {
-            let run = common(old.get(place..)?, &new[at..]);
-            Some((run, place))
+        // The same offset, from the start and from the end.
+        let offsets = [Some(at), (at + old.len()).checked_sub(new.len())];
+        let runs = offsets.into_iter().flatten().filter_map(|offset| {
+            let run = common_prefix(old.get(offset..)?, &new[at..]);
+            Some((run, offset))
         });
-        let (run, place) = runs.max_by_key(|&(run, _)| run).unwrap_or((0, 0));
-        if run >= WORTH_COPYING {
-            put_part(out, copy, &new[literal..at])?;
-            copy = (place, run);
+        let (run, offset) = runs.max_by_key(|&(run, _)| run).unwrap_or((0, 0));
+        if run >= SHORTEST_COPY {
+            write_part(out, copy, &new[literal..at])?;
+            copy = (offset, run);
             at += run;
             literal = at;
         } else {
-            // What differs ends the run.
+            // A different byte ends the run.
             at = (at + run + 1).min(new.len());
         }
     }
-    put_part(out, copy, &new[literal..])
+    write_part(out, copy, &new[literal..])
 }
 
-/// Makes the new string of the old one.
-pub(super) fn applied(old: &[u8], difference: &[u8], size: usize) -> Result<Vec<u8>> {
+/// Applies a difference to the old string.
+pub(super) fn apply(old: &[u8], difference: &[u8], size: usize) -> Result<Vec<u8>> {
     let damaged = || Error::invalid("the recording is damaged: a difference is none");
     let mut made = Vec::new();
     let mut rest = difference;
@@ -61,18 +61,18 @@ pub(super) fn applied(old: &[u8], difference: &[u8], size: usize) -> Result<Vec<
     if made.len() == size { Ok(made) } else { Err(damaged()) }
 }
 
-fn put_part(out: &mut Vec<u8>, (from, length): (usize, usize), literal: &[u8]) -> Result<()> {
+fn write_part(out: &mut Vec<u8>, (from, length): (usize, usize), literal: &[u8]) -> Result<()> {
     if length + literal.len() == 0 {
         return Ok(());
     }
     for number in [from, length, literal.len()] {
-        put(out, &(number as u64).to_le_bytes())?;
+        append(out, &(number as u64).to_le_bytes())?;
     }
-    put(out, literal)
+    append(out, literal)
 }
 
-/// How many bytes both begin with.
-fn common(a: &[u8], b: &[u8]) -> usize {
+/// The length of the common_prefix prefix.
+fn common_prefix(a: &[u8], b: &[u8]) -> usize {
     const CHUNK: usize = 64;
     let chunks = a.chunks_exact(CHUNK).zip(b.chunks_exact(CHUNK));
     let whole = CHUNK * chunks.take_while(|(a, b)| a == b).count();
@@ -90,11 +90,11 @@ mod tests {
         (0..count).map(|_| random.below(256) as u8).collect()
     }
 
-    /// How long the difference is, which makes the one of the other.
+    /// The length of the difference, after a check that it turns `old` into `new`.
     fn size(old: &[u8], new: &[u8]) -> usize {
         let mut out = Vec::new();
         difference(old, new, &mut out).expect("memory");
-        assert_eq!(applied(old, &out, new.len()).as_deref(), Ok(new));
+        assert_eq!(apply(old, &out, new.len()).as_deref(), Ok(new));
         out.len()
     }
 
@@ -109,7 +109,7 @@ mod tests {
         changed[7000] ^= 1;
         changed[9999] ^= 1;
         assert!(size(&old, &changed) < 150);
-        // A number at the front tells how long something is that was inserted.
+        // An insertion, and a changed length before it.
         let mut longer = old.clone();
         longer[20] ^= 1;
         longer.splice(5000..5000, bytes(300, 2));
@@ -124,14 +124,14 @@ mod tests {
         let mut good = Vec::new();
         difference(&old, &bytes(700, 2), &mut good).expect("memory");
         for length in 0..40 {
-            assert!(applied(&old, &good[..length], 700).is_err(), "{length}");
+            assert!(apply(&old, &good[..length], 700).is_err(), "{length}");
         }
-        assert!(applied(&old, &good, 699).is_err() && applied(&old, &good, 701).is_err());
-        // Where nothing is copied from does not matter.
+        assert!(apply(&old, &good, 699).is_err() && apply(&old, &good, 701).is_err());
+        // The offset of an empty copy does not matter.
         for at in 8..24 {
             let mut bad = good.clone();
             bad[at] = bad[at].wrapping_add(200);
-            assert!(applied(&old, &bad, 700).is_err(), "byte {at}");
+            assert!(apply(&old, &bad, 700).is_err(), "byte {at}");
         }
     }
 }

@@ -1,16 +1,16 @@
-//! A recording is replayed, and what comes of each step compared.
+//! Replays a recording and compares the state after each step.
 
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
 use std::path::Path;
 
 use super::super::World;
-use super::difference::applied;
+use super::difference::apply;
 use super::{BEGIN, END, MAGIC, VERSION};
 use crate::base::{Error, Result, ensure, memory};
 use crate::codec::seal;
 
-/// What came of a replay.
+/// The result of a replay.
 ///
 /// ```
 #[doc = include_str!("../../doctest/cloth.txt")]
@@ -27,15 +27,15 @@ use crate::codec::seal;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReplayReport {
-    /// How many steps were replayed with the states that were recorded.
+    /// The number of steps whose states equal the recorded ones.
     pub steps: u64,
-    /// Where the replay was first other than the recording, and ended.
+    /// The first difference, which ends the replay.
     pub difference: Option<ReplayDifference>,
-    /// Whether the file ends within a step: the program or the disk did.
+    /// True if the file ends within a step, for example because the program crashed.
     pub is_cut_short: bool,
 }
 
-/// The first difference of a replay from its recording.
+/// The first difference between a replay and its recording.
 ///
 /// ```
 /// # use sinew::*;
@@ -52,30 +52,30 @@ pub struct ReplayReport {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReplayDifference {
-    /// Which step, counted from 1.
+    /// The number of the step, from 1.
     pub step: u64,
-    /// The state hash after it that was recorded, and that of the replay: the same where only one of the two was refused.
+    /// The recorded state hash after the step. It equals `replayed` if only one of the two steps was refused.
     pub recorded: u64,
-    /// That of the replay.
+    /// The state hash after the replayed step.
     pub replayed: u64,
 }
 
-/// How a step begins.
-struct Beginning {
+/// The frame at the begin of a step.
+struct StepBegin {
     /// s
     dt: f32,
-    /// The units of work that it may do.
+    /// The work budget.
     work: u32,
-    /// That of its snapshot, bytes.
+    /// The length of the snapshot, bytes.
     size: usize,
     difference: Vec<u8>,
 }
 
-/// The file, as far as it was read.
+/// Reads the frames of a file.
 struct FrameReader {
     file: BufReader<File>,
     name: String,
-    /// Bytes that are left.
+    /// The number of bytes left.
     left: u64,
 }
 
@@ -101,7 +101,7 @@ impl FrameReader {
         }
     }
 
-    /// The next bytes; `None`: the file ends before.
+    /// Reads the next bytes; `None` at the end of the file.
     fn fill(&mut self, bytes: &mut [u8]) -> Result<Option<()>> {
         match self.file.read_exact(bytes) {
             Ok(()) => {
@@ -118,7 +118,7 @@ impl FrameReader {
         Ok(self.fill(&mut bytes)?.map(|()| bytes))
     }
 
-    /// The kind of the next frame, which must be this one; `None`: the file ends.
+    /// Reads the kind of the next frame and checks it; `None` at the end of the file.
     fn frame(&mut self, kind: u8) -> Result<Option<()>> {
         match self.array()? {
             None => Ok(None),
@@ -130,8 +130,8 @@ impl FrameReader {
         }
     }
 
-    /// How the next step begins.
-    fn begin(&mut self) -> Result<Option<Beginning>> {
+    /// Reads the frame at the begin of a step.
+    fn begin(&mut self) -> Result<Option<StepBegin>> {
         let (Some(dt), Some(work), Some(size), Some(length)) =
             (self.array()?, self.array()?, self.array()?, self.array()?)
         else {
@@ -144,7 +144,7 @@ impl FrameReader {
         let too_long = |_| Error::invalid(format!("{} is damaged: a snapshot of {size} bytes", self.name));
         let mut bytes = memory::filled(0, usize::try_from(length).map_err(too_long)?)?;
         let size = usize::try_from(size).map_err(too_long)?;
-        Ok(self.fill(&mut bytes)?.map(|()| Beginning {
+        Ok(self.fill(&mut bytes)?.map(|()| StepBegin {
             dt: f32::from_le_bytes(dt),
             work: u32::from_le_bytes(work),
             size,
@@ -152,7 +152,7 @@ impl FrameReader {
         }))
     }
 
-    /// How a step ended: whether it was refused, and the hash.
+    /// Reads the frame at the end of a step: whether it was refused, and the state hash.
     fn end(&mut self) -> Result<Option<(bool, u64)>> {
         if self.frame(END)?.is_none() {
             return Ok(None);
@@ -165,40 +165,41 @@ impl FrameReader {
 }
 
 impl World {
-    /// Replays a recording with so many threads, as in [`WorldDefinition`](crate::WorldDefinition), and compares the state after each step
-    /// with what was recorded, until the first difference. A step whose end was not recorded is taken too.
+    /// Replays a recording and compares the state after each step with the recorded one, until the first difference. `thread_count` is as in
+    /// [`WorldDefinition`](crate::WorldDefinition). A last step without a recorded end is replayed too.
     ///
-    /// It is bitwise reproducible with the version of the library and the kernel that were recorded.
+    /// The replay is bitwise identical with the version of the library and the SIMD level of the recording.
     ///
     /// # Errors
-    /// [`Error::Io`]: the file cannot be read. [`Error::InvalidArgument`]: it is no recording or damaged, or there are too many threads.
-    /// [`Error::Unsupported`]: it is of another version of the library, or this processor does not offer its kernel. [`Error::OutOfMemory`].
+    /// [`Error::Io`]: the file cannot be read. [`Error::InvalidArgument`]: the file is not a recording or damaged, or `thread_count` is too large.
+    /// [`Error::Unsupported`]: the recording is of another version of the library, or this processor does not support its SIMD level.
+    /// [`Error::OutOfMemory`].
     pub fn replay(path: &Path, thread_count: u32) -> Result<ReplayReport> {
         let mut frames = FrameReader::open(path)?;
         let mut report = ReplayReport::default();
         let mut world: Option<World> = None;
         let mut before = Vec::new();
         while frames.frame(BEGIN)?.is_some() {
-            let Some(begun) = frames.begin()? else {
+            let Some(begin) = frames.begin()? else {
                 report.is_cut_short = true;
                 break;
             };
-            let mut bytes = applied(&before, &begun.difference, begun.size)?;
-            // Lists of a world that was loaded may have other room than those that were recorded. What is in the first snapshot is checked as it is.
+            let mut bytes = apply(&before, &begin.difference, begin.size)?;
+            // A loaded world can reserve other capacities than the recorded one, so the checksum is computed again. The first snapshot is checked as it is.
             if !before.is_empty() {
                 seal(&mut bytes);
             }
-            // Where nothing was called between two steps the world goes on.
-            let mut it = match world.take() {
-                Some(it) if bytes == before => it,
+            // Without calls between two steps the world continues.
+            let mut replayed_world = match world.take() {
+                Some(replayed_world) if bytes == before => replayed_world,
                 _ => World::load(&bytes, thread_count, None)?,
             };
-            let result = it.step_of(begun.dt, begun.work);
+            let result = replayed_world.step_of(begin.dt, begin.work);
             let Some((is_refused, recorded)) = frames.end()? else {
                 report.is_cut_short = true;
                 break;
             };
-            let replayed = it.state_hash();
+            let replayed = replayed_world.state_hash();
             if replayed != recorded || result.is_err() != is_refused {
                 report.difference = Some(ReplayDifference {
                     step: report.steps + 1,
@@ -208,8 +209,8 @@ impl World {
                 break;
             }
             report.steps += 1;
-            it.save_again(&mut before)?;
-            world = Some(it);
+            replayed_world.save_again(&mut before)?;
+            world = Some(replayed_world);
         }
         Ok(report)
     }
