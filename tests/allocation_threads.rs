@@ -1,4 +1,4 @@
-//! A step allocates nothing on any of its threads. Alone in its program: everything that is asked for is counted.
+//! A step allocates nothing on any of its threads. A separate program, because the allocator counts every call.
 #![allow(unsafe_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -11,27 +11,27 @@ use sinew::{
     WorldDefinition,
 };
 
-static ASKED: AtomicU64 = AtomicU64::new(0);
+static CALLS: AtomicU64 = AtomicU64::new(0);
 
-/// The system's allocator; it counts what all threads ask of it.
+/// The system allocator with a count of all threads' calls.
 struct Counting;
 
 // SAFETY: every call goes to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ASKED.fetch_add(1, Ordering::Relaxed);
+        CALLS.fetch_add(1, Ordering::Relaxed);
         // SAFETY: the same contract.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ASKED.fetch_add(1, Ordering::Relaxed);
+        CALLS.fetch_add(1, Ordering::Relaxed);
         // SAFETY: the same contract.
         unsafe { System.realloc(pointer, layout, size) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        ASKED.fetch_add(1, Ordering::Relaxed);
+        CALLS.fetch_add(1, Ordering::Relaxed);
         // SAFETY: the same contract.
         unsafe { System.dealloc(pointer, layout) }
     }
@@ -40,16 +40,16 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-fn asked(call: impl FnOnce()) -> u64 {
-    let before = ASKED.load(Ordering::Relaxed);
+fn allocator_calls(call: impl FnOnce()) -> u64 {
+    let before = CALLS.load(Ordering::Relaxed);
     call();
-    ASKED.load(Ordering::Relaxed) - before
+    CALLS.load(Ordering::Relaxed) - before
 }
 
 #[test]
 fn a_step_on_two_threads_allocates_nothing() {
     assert!(
-        asked(|| drop(std::thread::spawn(|| vec![1_u8; 100]).join())) >= 2,
+        allocator_calls(|| drop(std::thread::spawn(|| vec![1_u8; 100]).join())) >= 2,
         "it counts"
     );
     let definition = WorldDefinition {
@@ -68,18 +68,18 @@ fn a_step_on_two_threads_allocates_nothing() {
         world.body_mut(cloth).and_then(|body| body.pin(0)).expect("a node");
     }
     for step in 0..20 {
-        assert_eq!(asked(|| drop(world.step(0.01))), 0, "step {step}");
-        // Awake, and asleep.
+        assert_eq!(allocator_calls(|| drop(world.step(0.01))), 0, "step {step}");
+        // Threads are awake in some steps and asleep in others.
         std::thread::sleep(std::time::Duration::from_micros(100 * (step % 4)));
     }
-    let refused = asked(|| assert!(matches!(world.step(1e6), Err(Error::Unstable { .. }))));
+    let refused = allocator_calls(|| assert!(matches!(world.step(1e6), Err(Error::Unstable { .. }))));
     assert_eq!(refused, 0);
-    // Small ones are there sooner than a thread begins, large ones share their work.
+    // Small worlds are ready before their threads have started; large worlds distribute their work.
     fresh_worlds_allocate_nothing([2, 2, 2], 40);
     fresh_worlds_allocate_nothing([14, 8, 14], 1);
 }
 
-/// Worlds of all sorts, each stepped as soon as it is there: no thread of theirs is still about to begin.
+/// Steps worlds of all kinds immediately after creation, possibly while their threads are still starting.
 fn fresh_worlds_allocate_nothing(cells: [u32; 3], rounds: u32) {
     let block = Mesh::block([0.06, 0.04, 0.06], cells).expect("a block");
     let springs = BodyDefinition {
@@ -103,7 +103,7 @@ fn fresh_worlds_allocate_nothing(cells: [u32; 3], rounds: u32) {
         solver: Solver::Implicit,
         ..definition
     };
-    let meeting = |definition| BodyDefinition {
+    let colliding = |definition| BodyDefinition {
         contact: BodyContact {
             with_bodies: true,
             with_itself: true,
@@ -123,7 +123,7 @@ fn fresh_worlds_allocate_nothing(cells: [u32; 3], rounds: u32) {
         elements,
         implicit(springs),
         implicit(elements),
-        meeting(springs),
+        colliding(springs),
         sleeping(elements),
     ];
     for round in 0..rounds {
@@ -138,12 +138,12 @@ fn fresh_worlds_allocate_nothing(cells: [u32; 3], rounds: u32) {
             ball.pose.position = Vec3::Y * 0.032;
             let ball = world.create_tool(&ball).expect("a tool");
             for step in 0..4 {
-                let place = Vec3::Y * (0.031 - 1e-3 * step as f32);
-                world.set_pose(ball, place, None).expect("a pose");
-                let asked = asked(|| assert!(world.step(4e-3).is_ok()));
-                assert_eq!(asked, 0, "step {step} of body {kind}, round {round}");
-                // Queries keep what they take; a step gives nothing of it back.
-                world.nearest_point(place, 1.0).expect("a point");
+                let position = Vec3::Y * (0.031 - 1e-3 * step as f32);
+                world.set_pose(ball, position, None).expect("a pose");
+                let allocator_calls = allocator_calls(|| assert!(world.step(4e-3).is_ok()));
+                assert_eq!(allocator_calls, 0, "step {step} of body {kind}, round {round}");
+                // Queries keep their memory, and a step frees none of it.
+                world.nearest_point(position, 1.0).expect("a point");
             }
         }
     }

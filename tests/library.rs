@@ -1,4 +1,5 @@
-//! The library as Rust programs use it: one program for all tests that need neither an allocator nor a process of their own.
+//! Integration tests of the Rust API: one program for all tests that need neither an allocator nor a process of their
+//! own.
 
 mod support;
 

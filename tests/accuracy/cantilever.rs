@@ -1,4 +1,4 @@
-//! A beam that is clamped at one end and led by a shear force at the other.
+//! A beam clamped at one end, with a shear force at the other.
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
@@ -12,26 +12,26 @@ const YOUNG_MODULUS: f32 = 5000.0;
 const SIDE: f64 = 0.02;
 const LENGTH: f64 = 0.16;
 
-/// Of tetrahedra, so many cubes thick that are cut in five, eight times as long along z.
+/// A beam of cubes cut into five tetrahedra each, `thick` cubes thick and eight times as long along z.
 pub struct Cantilever {
     mesh: Mesh,
     nu: f32,
     is_held: Vec<bool>,
-    /// The part of the load on each node of the end.
+    /// The fraction of the load on each node of the end.
     end: Vec<(usize, f64)>,
     /// N
     load: f64,
-    /// What beam theory says, m.
+    /// Deflection by beam theory (m).
     expected: f64,
 }
 
 impl Cantilever {
-    /// Its end gives way by 0.1 % of its length, so that the theory of small strains holds.
+    /// Its end deflects by 0.1 % of its length, so that small-strain theory holds.
     pub fn new(thick: u32, nu: f32) -> Self {
         let size = [SIDE, SIDE, LENGTH].map(|length| length as f32);
         let mesh = Mesh::block(size, [thick, thick, 8 * thick]).expect("a block");
         let half = mesh.positions[0].abs();
-        let at = |place: f32, rim: f32| if place.abs() == rim { 0.5 } else { 1.0 };
+        let at = |position: f32, rim: f32| if position.abs() == rim { 0.5 } else { 1.0 };
         let share = |p: Vec3| at(p.x, half.x) * at(p.y, half.y) / f64::from(thick * thick);
         let end = (0..).zip(&mesh.positions).filter(|(_, p)| p.z == half.z);
         let (modulus, ratio) = (f64::from(YOUNG_MODULUS), f64::from(nu));
@@ -50,13 +50,13 @@ impl Cantilever {
         }
     }
 
-    /// How far its end has come, over what beam theory says.
+    /// Returns the deflection of its end relative to beam theory.
     fn deflection(&self, at: &[DVec3]) -> f64 {
         let down = |&(node, share): &(usize, f64)| share * (f64::from(self.mesh.positions[node].y) - at[node].y);
         self.end.iter().map(down).sum::<f64>() / self.expected
     }
 
-    /// As the library has it.
+    /// Returns the deflection computed by the library.
     pub fn found(&self) -> f64 {
         let mut world = World::new(FREE).expect("a world");
         let id = world.create_body(&BodyDefinition {
@@ -87,7 +87,7 @@ impl Cantilever {
         self.deflection(&positions.iter().map(|p| p.as_dvec3()).collect::<Vec<_>>())
     }
 
-    /// The same mesh in `f64`.
+    /// Returns the deflection of the same mesh in `f64`.
     pub fn exact(&self) -> f64 {
         let solid = Solid::new(&self.mesh, YOUNG_MODULUS, self.nu);
         let mut at = solid.rest.clone();
@@ -103,7 +103,8 @@ impl Cantilever {
     }
 }
 
-/// What three meshes, each twice as fine as the last, refine to, and with which order (Richardson).
+/// Returns the limit of three meshes, each twice as fine as the last, and the order of convergence (Richardson
+/// extrapolation).
 pub fn refined([coarse, middle, fine]: [f64; 3]) -> (f64, f64) {
     let order = ((middle - coarse) / (fine - middle)).log2();
     (fine + (fine - middle) / (order.exp2() - 1.0), order)

@@ -1,4 +1,5 @@
-//! A symmetric matrix kept from the first entry of each row to its diagonal, and its Cholesky factor, which needs no more room than that.
+//! A symmetric matrix stored from the first entry of each row to its diagonal, and its Cholesky factor, which fits in
+//! the same storage.
 
 /// Rows of the lower triangle.
 #[derive(Clone)]
@@ -8,7 +9,7 @@ pub struct Envelope {
 }
 
 impl Envelope {
-    /// Of rows that begin at these columns.
+    /// Creates rows that begin at these columns.
     pub fn new(firsts: Vec<usize>) -> Self {
         let rows = firsts.iter().enumerate();
         Self {
@@ -17,14 +18,14 @@ impl Envelope {
         }
     }
 
-    /// Adds to an entry of the lower triangle; what is above it is left alone.
+    /// Adds to an entry of the lower triangle; entries above it are ignored.
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
         if column <= row {
             self.rows[row][column - self.firsts[row]] += value;
         }
     }
 
-    /// Makes an unknown 0, whatever its row says.
+    /// Fixes an unknown at 0, whatever its row contains.
     pub fn hold(&mut self, unknown: usize) {
         self.rows[unknown].fill(0.0);
         for row in unknown..self.rows.len() {
@@ -35,7 +36,7 @@ impl Envelope {
         *self.rows[unknown].last_mut().expect("a diagonal") = 1.0;
     }
 
-    /// The same with diagonals larger by this part.
+    /// Returns the matrix with diagonals enlarged by this fraction.
     pub fn lifted(&self, part: f64) -> Self {
         let mut lifted = self.clone();
         for row in &mut lifted.rows {
@@ -44,7 +45,7 @@ impl Envelope {
         lifted
     }
 
-    /// Its factor; `None` where it is not positive definite.
+    /// Returns its factor, or `None` if it is not positive definite.
     pub fn factor(mut self) -> Option<Factor> {
         for i in 0..self.rows.len() {
             let (before, rest) = self.rows.split_at_mut(i);
@@ -91,7 +92,7 @@ impl Factor {
     }
 }
 
-/// In eight sums, which the processor adds up side by side.
+/// Sums up in eight lanes, which the processor adds in parallel.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (chunks_a, chunks_b) = (a.chunks_exact(8), b.chunks_exact(8));

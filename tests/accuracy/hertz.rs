@@ -1,4 +1,5 @@
-//! A sphere pressed into a layer that is bonded below (Hertz), with the correction for its thickness of Dimitriadis et al. 2002.
+//! A sphere pressed into a layer that is bonded below (Hertz), with the thickness correction of Dimitriadis et al.
+//! 2002.
 
 use std::cell::RefCell;
 
@@ -14,12 +15,12 @@ const YOUNG_MODULUS: f32 = 5000.0;
 const DENSITY: f64 = 1000.0;
 /// m
 pub const RADIUS: f64 = 0.05;
-/// Of the radius: how deep the sphere goes at most.
+/// The maximum depth of the sphere, relative to its radius.
 pub const DEEPEST: f64 = 0.01;
-/// Nodes are damped by this rate, 1/s: about as fast as the layer swings.
+/// Damping rate of nodes (1/s), about the frequency of the layer.
 const DAMPING: f64 = 200.0;
 
-/// A layer four radii of the deepest contact thick and twelve wide, fine under the sphere and coarse away from it.
+/// A layer four radii of the largest contact thick and twelve wide, fine under the sphere and coarse away from it.
 pub struct Layer {
     pub mesh: Mesh,
     pub solid: Solid,
@@ -27,29 +28,29 @@ pub struct Layer {
     thickness: f64,
 }
 
-/// From 0 to `end` in steps of `cell` up to `even`, then each `growth` times as long as the last.
+/// From 0 to `end` in steps of `cell` up to `even`, then each step `growth` times as long as the last.
 fn graded(cell: f64, even: f64, end: f64, growth: f64) -> Vec<f64> {
-    let mut places = vec![0.0];
+    let mut coordinates = vec![0.0];
     let (mut place, mut step) = (0.0, cell);
     while place < end - 0.5 * step {
         if place > even - 0.5 * cell {
             step *= growth;
         }
         place += step;
-        places.push(place);
+        coordinates.push(place);
     }
-    // The last one is where it should be.
-    let last = places[places.len() - 1];
-    for place in &mut places {
+    // The last one is placed exactly.
+    let last = coordinates[coordinates.len() - 1];
+    for place in &mut coordinates {
         if *place > even {
             *place = even + (*place - even) * (end - even) / (last - even);
         }
     }
-    places
+    coordinates
 }
 
 impl Layer {
-    /// With so many cells in the radius of the deepest contact.
+    /// Creates a layer with this many cells in the radius of the largest contact.
     pub fn new(cells: u32, nu: f32) -> Self {
         let radius = RADIUS * DEEPEST.sqrt();
         let cell = radius / f64::from(cells);
@@ -62,7 +63,7 @@ impl Layer {
             .map(|x| -x)
             .chain(aside[1..].iter().copied())
             .collect();
-        // Down varies first, so that the matrix in f64 is narrow.
+        // The vertical index varies first, so that the matrix in `f64` is narrow.
         let counts = [down.len(), across.len(), across.len()].map(|count| count as u32 - 1);
         let mut mesh = Mesh::block([1.0; 3], counts).expect("a block");
         for position in &mut mesh.positions {
@@ -78,11 +79,11 @@ impl Layer {
         }
     }
 
-    /// What theory has for the force at a depth, N, and the part of it that is Hertz's.
+    /// Returns the theoretical force at a depth (N), and the part of it that is Hertz's.
     pub fn theory(&self, depth: f64) -> (f64, f64) {
         let (e, nu) = (f64::from(YOUNG_MODULUS), f64::from(self.nu));
         let hertz = 4.0 / 3.0 * e / (1.0 - nu * nu) * RADIUS.sqrt() * depth.powf(1.5);
-        // Equations 10 to 12 there, of a layer that is bonded.
+        // Equations 10 to 12 there, for a bonded layer.
         let pi = std::f64::consts::PI;
         let chi = (RADIUS * depth).sqrt() / self.thickness;
         let a = -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu) / (1.0 - nu);
@@ -98,7 +99,7 @@ impl Layer {
         self.mesh.positions.iter().map(|p| p.y == bottom).collect()
     }
 
-    /// The forces on the sphere at depths, one after another, N.
+    /// Returns the forces on the sphere at consecutive depths (N).
     pub fn found(&self, solver: Solver, depths: &[f64]) -> Vec<f64> {
         let dampings: Vec<f32> = (self.solid.node_volumes().iter())
             .map(|volume| (DAMPING * DENSITY * volume) as f32)
@@ -146,7 +147,8 @@ impl Layer {
         forces
     }
 
-    /// The force at a depth, of the same mesh in `f64`: no triangle of the surface comes into the sphere (augmented Lagrangian).
+    /// Returns the force at a depth for the same mesh in `f64`: no triangle of the surface enters the sphere (augmented
+    /// Lagrangian).
     pub fn exact(&self, depth: f64) -> f64 {
         let centre = DVec3::Y * (RADIUS - depth);
         let near = |triangle: &&[u32; 3]| {
@@ -166,12 +168,12 @@ impl Layer {
         let cell = self.solid.rest[1].y.abs();
         let stiffness = 300.0 * f64::from(YOUNG_MODULUS) * cell;
         let pushes = RefCell::new(vec![0.0; faces.len()]);
-        // The push of each face, its direction, and how it is shared by the corners.
+        // The contact force of each face, its direction, and the weights of its corners.
         let touch = |at: &[DVec3], face: usize| {
             let (shares, place) = nearest(centre, faces[face].map(|node| at[node]));
-            let way = place - centre;
-            let push = pushes.borrow()[face] - stiffness * (way.length() - RADIUS);
-            (push.max(0.0), way.normalize(), shares)
+            let offset = place - centre;
+            let push = pushes.borrow()[face] - stiffness * (offset.length() - RADIUS);
+            (push.max(0.0), offset.normalize(), shares)
         };
         let load = |at: &[DVec3], forces: &mut [DVec3], mut matrix: Option<&mut Envelope>| {
             let mut energy = 0.0;
@@ -213,9 +215,9 @@ impl Layer {
     }
 }
 
-/// The point of a triangle that is nearest, and what part of it is each corner's (Ericson 2005, section 5.1.5).
+/// Returns the barycentric weights and position of the nearest point of a triangle (Ericson 2005, section 5.1.5).
 fn nearest(point: DVec3, [a, b, c]: [DVec3; 3]) -> ([f64; 3], DVec3) {
-    let of_edge =
+    let nearest_on_edge =
         |from: DVec3, to: DVec3| ((point - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
     let normal = (b - a).cross(c - a);
     let size = normal.length_squared();
@@ -228,7 +230,7 @@ fn nearest(point: DVec3, [a, b, c]: [DVec3; 3]) -> ([f64; 3], DVec3) {
     if inside.iter().all(|&share| share >= 0.0) {
         return (inside, place(inside));
     }
-    let [ab, bc, ca] = [of_edge(a, b), of_edge(b, c), of_edge(c, a)];
+    let [ab, bc, ca] = [nearest_on_edge(a, b), nearest_on_edge(b, c), nearest_on_edge(c, a)];
     [[1.0 - ab, ab, 0.0], [0.0, 1.0 - bc, bc], [ca, 0.0, 1.0 - ca]]
         .map(|shares| (shares, place(shares)))
         .into_iter()

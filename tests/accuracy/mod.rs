@@ -1,4 +1,4 @@
-//! Scenes of elasticity whose answers are known, each beside the same mesh in `f64`.
+//! Elastic scenes with known solutions, each with the same mesh in `f64`.
 
 #![allow(dead_code, reason = "the tests and the bench take a part of it each")]
 

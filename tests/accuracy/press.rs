@@ -1,4 +1,4 @@
-//! A block that is pressed between two plates: bonded to them, or free to slide.
+//! A block compressed between two plates: bonded to them, or free to slide.
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -12,22 +12,22 @@ use crate::support::bodies::FREE;
 pub const YOUNG_MODULUS: f32 = 5000.0;
 /// m
 pub const SIDE: f32 = 0.02;
-/// Parts in which a block is pressed.
+/// Steps in which a block is compressed.
 const PARTS: u32 = 10;
 
-/// A cube, so many cells thick that are cut in five.
+/// A cube, `thick` cells thick; each cell is cut into five tetrahedra.
 pub struct Block {
     pub mesh: Mesh,
     pub solid: Solid,
     nu: f32,
-    /// Of the height.
+    /// Relative to the height.
     by: f64,
 }
 
-/// A block as it was pressed.
+/// The result of a compression.
 pub struct Pressed {
     pub at: Vec<DVec3>,
-    /// Of the upper plate on the block, downward, N.
+    /// The force of the upper plate on the block, downward (N).
     pub force: f64,
 }
 
@@ -58,25 +58,25 @@ impl Block {
         world.create_body(&definition).expect("a body")
     }
 
-    /// Nodes at the plates.
+    /// Returns which nodes are at the plates.
     fn held(&self) -> Vec<bool> {
         let rim = self.mesh.positions[0].y.abs();
         self.mesh.positions.iter().map(|p| p.y.abs() == rim).collect()
     }
 
-    /// The upper ones of those.
+    /// True if the node is at the upper plate.
     fn is_upper(&self, node: usize) -> bool {
         self.mesh.positions[node].y == self.mesh.positions[0].y.abs()
     }
 
-    /// How the nodes at a time are led, `part` of the way: all together as if nothing hindered them.
-    fn lead(&self, at: &[DVec3], part: u32) -> Vec<DVec3> {
+    /// Returns the positions of the nodes after `part` of the compression, as if all deformed uniformly.
+    fn prescribed_positions(&self, at: &[DVec3], part: u32) -> Vec<DVec3> {
         let factor = |part: u32| 1.0 - self.by * f64::from(part) / f64::from(PARTS);
         let ratio = factor(part) / factor(part - 1);
         at.iter().map(|p| DVec3::new(p.x, p.y * ratio, p.z)).collect()
     }
 
-    /// Bonded to its plates, as the library has it.
+    /// Compresses the block bonded to its plates, with the library.
     pub fn bonded(&self) -> Pressed {
         let mut world = World::new(FREE).expect("a world");
         let id = self.body(&mut world, Solver::Verlet);
@@ -84,9 +84,13 @@ impl Block {
         let held = || (0..is_held.len()).filter(|&node| is_held[node]);
         let mut at = self.solid.rest.clone();
         for part in 1..=PARTS {
-            let led: Vec<Vec3> = self.lead(&at, part).iter().map(|p| p.as_vec3()).collect();
+            let led: Vec<Vec3> = self
+                .prescribed_positions(&at, part)
+                .iter()
+                .map(|p| p.as_vec3())
+                .collect();
             let body = world.body_mut(id).expect("the body");
-            body.set_positions(&led).expect("places");
+            body.set_positions(&led).expect("positions");
             for node in held() {
                 body.pin(node as u32).expect("a node");
             }
@@ -105,12 +109,12 @@ impl Block {
         Pressed { at, force }
     }
 
-    /// Bonded to its plates, in `f64`.
+    /// Compresses the block bonded to its plates, in `f64`.
     pub fn exact(&self) -> Pressed {
         let is_held = self.held();
         let mut at = self.solid.rest.clone();
         for part in 1..=PARTS {
-            at = self.lead(&at, part);
+            at = self.prescribed_positions(&at, part);
             self.solid.settle(&mut at, &is_held, &|_, _, _| 0.0);
         }
         let mut forces = vec![DVec3::ZERO; at.len()];
@@ -120,7 +124,7 @@ impl Block {
         Pressed { at, force }
     }
 
-    /// Between plates that it slides on: two tools.
+    /// Compresses the block between plates that it slides on: two tools.
     pub fn sliding(&self) -> Pressed {
         let mut world = World::new(FREE).expect("a world");
         let id = self.body(&mut world, Solver::Implicit);
@@ -150,7 +154,7 @@ impl Block {
         }
     }
 
-    /// What an even press does that lets the sides go: how much longer the sides become, and the force, N.
+    /// Returns the elongation of the sides under uniform compression with free sides, and the force (N).
     pub fn even(&self) -> (f64, f64) {
         let (e, nu) = (f64::from(YOUNG_MODULUS), f64::from(self.nu));
         let whole = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
@@ -179,7 +183,7 @@ impl Block {
 }
 
 impl Pressed {
-    /// What the volume has become of what it was, and how far the volumes about nodes are from `expected`, RMS.
+    /// Returns the volume relative to rest, and the RMS deviation of the nodal volumes from `expected`.
     pub fn volume(&self, block: &Block, expected: f64) -> (f64, f64) {
         let (rings, whole) = block.solid.volumes(&self.at);
         let squares: f64 = rings.iter().map(|ring| (ring - expected).powi(2)).sum();

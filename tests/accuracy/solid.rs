@@ -1,14 +1,14 @@
-//! Finite elements of tetrahedra in `f64`, by the energy that `Model::Tetrahedra` states: what the library is compared with.
+//! Tetrahedral finite elements in `f64`, by the energy that `Model::Tetrahedra` states: the reference for the library.
 
 use glam::{DMat3, DVec3};
 use sinew::mesh::Mesh;
 
 use super::envelope::Envelope;
 
-/// From this Poisson's ratio on volume is kept by the tetrahedra about a node together.
+/// From this Poisson's ratio on, the tetrahedra around a node share one volume constraint (average nodal pressure).
 const RINGS_FROM: f64 = 0.4;
 
-/// Where a correction is no longer than this part of the body, it is solved.
+/// The solution is converged if a correction is no longer than this fraction of the body.
 const SOLVED: f64 = 1e-12;
 
 pub struct Solid {
@@ -17,21 +17,22 @@ pub struct Solid {
     lambda: f64,
     mu: f64,
     kappa: f64,
-    /// Of each node, a quarter of the tetrahedra about it, m³; `None`: each tetrahedron keeps its own volume.
+    /// A quarter of the volume of the tetrahedra around each node (m³); `None` if each tetrahedron keeps its own
+    /// volume.
     rings: Option<Vec<f64>>,
-    /// The lowest node that each node meets in the matrix.
+    /// The lowest node that each node is coupled to in the matrix.
     firsts: Vec<usize>,
 }
 
 struct Element {
     corners: [usize; 4],
-    /// Of the function that is 1 at a corner, 1/m.
+    /// Gradients of the shape functions of the corners (1/m).
     gradients: [DVec3; 4],
     inverse: DMat3,
     volume: f64,
 }
 
-/// A tetrahedron as it is deformed: F, its cofactors and S.
+/// A deformed tetrahedron: F, its cofactors and S.
 struct Deformed {
     gradient: DMat3,
     cofactors: DMat3,
@@ -55,8 +56,8 @@ fn cofactors(f: &DMat3) -> DMat3 {
     )
 }
 
-/// What acts on a solid beside its own stress: given where nodes are, adds its forces, and its stiffness where that is asked for, and
-/// answers its energy.
+/// A load on a solid beside its own stress: for given positions it adds its forces, and its stiffness if requested, and
+/// returns its energy.
 pub type Load<'a> = &'a dyn Fn(&[DVec3], &mut [DVec3], Option<&mut Envelope>) -> f64;
 
 impl Solid {
@@ -90,7 +91,7 @@ impl Solid {
         }
         let rings = (nu >= RINGS_FROM).then(|| {
             let mut volumes = vec![0.0; rest.len()];
-            // Through a ring a node meets the neighbours of its neighbours.
+            // Nodal pressures couple a node to the neighbors of its neighbors.
             let near = firsts.clone();
             for element in &elements {
                 for &corner in &element.corners {
@@ -113,7 +114,7 @@ impl Solid {
         }
     }
 
-    /// What belongs to each node at rest, m³.
+    /// Returns the volume of each node at rest (m³).
     pub fn node_volumes(&self) -> Vec<f64> {
         let mut volumes = vec![0.0; self.rest.len()];
         for element in &self.elements {
@@ -136,13 +137,13 @@ impl Solid {
         }
     }
 
-    /// J of each tetrahedron.
+    /// Returns J of each tetrahedron.
     pub fn growths(&self, at: &[DVec3]) -> Vec<f64> {
         let growth = |element| self.deformed(element, at).gradient.determinant();
         self.elements.iter().map(growth).collect()
     }
 
-    /// What the volume about each node has become of what it was, and that of all.
+    /// Returns the volume ratio of each node, and that of the whole body.
     pub fn volumes(&self, at: &[DVec3]) -> (Vec<f64>, f64) {
         let mut sums = vec![[0.0; 2]; self.rest.len()];
         let mut whole = [0.0; 2];
@@ -158,7 +159,7 @@ impl Solid {
         (sums.iter().map(ratio).collect(), ratio(&whole))
     }
 
-    /// The pressure of each tetrahedron, and the energy of volume.
+    /// Returns the pressure of each tetrahedron, and the volumetric energy.
     fn pressures(&self, at: &[DVec3]) -> (Vec<f64>, f64) {
         let growths: Vec<f64> = self.growths(at).iter().map(|j| j - 1.0).collect();
         let Some(volumes) = &self.rings else {
@@ -184,7 +185,7 @@ impl Solid {
         (self.elements.iter().map(mean).collect(), energy)
     }
 
-    /// Adds the forces of the stress, and answers its energy.
+    /// Adds the forces of the stress, and returns its energy.
     pub fn forces(&self, at: &[DVec3], forces: &mut [DVec3]) -> f64 {
         let (pressures, mut energy) = self.pressures(at);
         for (element, pressure) in self.elements.iter().zip(pressures) {
@@ -200,7 +201,7 @@ impl Solid {
         energy
     }
 
-    /// By how much forces lessen with places.
+    /// Returns the negative derivative of the forces by the positions.
     fn stiffness(&self, at: &[DVec3]) -> Envelope {
         let firsts = self.firsts.iter().flat_map(|first| [3 * first; 3]);
         let mut matrix = Envelope::new(firsts.collect());
@@ -240,7 +241,7 @@ impl Solid {
         matrix
     }
 
-    /// The part of the pressures' own change: of each node the square of how the volume about it grows.
+    /// Adds the change of the pressures: for each node the outer product of its volume gradient.
     fn add_rings(&self, at: &[DVec3], matrix: &mut Envelope) {
         let Some(volumes) = &self.rings else { return };
         let mut slopes = vec![std::collections::BTreeMap::new(); self.rest.len()];
@@ -267,25 +268,25 @@ impl Solid {
         }
     }
 
-    /// Moves nodes that are not held to where they are at rest, by Newton's method.
+    /// Moves free nodes to equilibrium by Newton's method.
     pub fn settle(&self, at: &mut Vec<DVec3>, is_held: &[bool], load: Load) {
         self.settle_to(SOLVED, at, is_held, load);
     }
 
-    /// The same until a correction is no longer than this part of the body.
-    pub fn settle_to(&self, part_of_it: f64, at: &mut Vec<DVec3>, is_held: &[bool], load: Load) {
+    /// Moves free nodes until a correction is no longer than this fraction of the body.
+    pub fn settle_to(&self, tolerance: f64, at: &mut Vec<DVec3>, is_held: &[bool], load: Load) {
         let farthest = self.rest.iter().map(|p| p.length()).fold(0.0, f64::max);
         for _ in 0..60 {
             let mut forces = vec![DVec3::ZERO; at.len()];
             let energy = self.forces(at, &mut forces) + load(at, &mut forces, None);
             let mut matrix = self.stiffness(at);
             load(at, &mut vec![DVec3::ZERO; at.len()], Some(&mut matrix));
-            let mut way: Vec<f64> = forces.iter().flat_map(|force| force.to_array()).collect();
+            let mut correction: Vec<f64> = forces.iter().flat_map(|force| force.to_array()).collect();
             for node in (0..at.len()).filter(|&node| is_held[node]) {
                 (3 * node..3 * node + 3).for_each(|unknown| matrix.hold(unknown));
-                way[3 * node..3 * node + 3].fill(0.0);
+                correction[3 * node..3 * node + 3].fill(0.0);
             }
-            // Where the energy bends down nodes are held back.
+            // Where the energy is concave the diagonal is enlarged.
             let mut lift = 0.0;
             let factor = loop {
                 match matrix.lifted(lift).factor() {
@@ -293,17 +294,17 @@ impl Solid {
                     None => lift = f64::max(1e-3, 4.0 * lift),
                 }
             };
-            let down: Vec<f64> = way.clone();
-            factor.solve(&mut way);
-            let slope: f64 = way.iter().zip(&down).map(|(a, b)| a * b).sum();
-            let longest = way.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-            // Back where the energy does not fall as it should.
+            let down: Vec<f64> = correction.clone();
+            factor.solve(&mut correction);
+            let slope: f64 = correction.iter().zip(&down).map(|(a, b)| a * b).sum();
+            let longest = correction.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            // Step back where the energy does not decrease enough.
             let mut part = 1.0;
             loop {
                 let then: Vec<DVec3> = at
                     .iter()
-                    .zip(way.chunks(3))
-                    .map(|(place, way)| *place + DVec3::from_slice(way) * part)
+                    .zip(correction.chunks(3))
+                    .map(|(position, correction)| *position + DVec3::from_slice(correction) * part)
                     .collect();
                 let mut forces = vec![DVec3::ZERO; at.len()];
                 let gained = energy - self.forces(&then, &mut forces) - load(&then, &mut forces, None);
@@ -313,7 +314,7 @@ impl Solid {
                 }
                 part *= 0.5;
             }
-            if longest < part_of_it * farthest && lift == 0.0 {
+            if longest < tolerance * farthest && lift == 0.0 {
                 return;
             }
         }

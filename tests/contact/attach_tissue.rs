@@ -1,4 +1,4 @@
-//! Tissue attached to tissue: what holds, what is handed on and when it ends.
+//! Attachments between bodies: forces, momentum, force limits, and when they end.
 
 use crate::support::hanging::*;
 use crate::support::tissue::*;
@@ -8,16 +8,16 @@ use sinew::{Anchor, BodyContact, BodyDefinition, BodyId, Error, Solver, SurfaceP
 
 #[test]
 fn a_block_hangs_from_another() {
-    a_block_hangs_from_another_of(|case| case % 5 == 2);
+    check_a_block_hangs_from_another(|case| case % 5 == 2);
 }
 
 #[test]
 #[ignore = "long"]
 fn a_block_hangs_from_another_in_the_other_cases() {
-    a_block_hangs_from_another_of(|case| case % 5 != 2);
+    check_a_block_hangs_from_another(|case| case % 5 != 2);
 }
 
-fn a_block_hangs_from_another_of(is_tried: fn(usize) -> bool) {
+fn check_a_block_hangs_from_another(is_selected: fn(usize) -> bool) {
     let [verlet, implicit] = [Solver::Verlet, Solver::Implicit];
     let mut cases = vec![
         ([0.01, 1.0], [implicit; 2], 1.0 / 60.0, 1),
@@ -30,28 +30,28 @@ fn a_block_hangs_from_another_of(is_tried: fn(usize) -> bool) {
             cases.extend([1, 4, 25].map(|count| (masses, [verlet; 2], dt, count)));
         }
     }
-    for (_, (masses, solvers, dt, count)) in (0..).zip(cases).filter(|case| is_tried(case.0)) {
+    for (_, (masses, solvers, dt, count)) in (0..).zip(cases).filter(|case| is_selected(case.0)) {
         let [above, below] = [0, 1].map(|index| Block {
             mass: masses[index],
             solver: solvers[index],
             ..Block::CALM
         });
         let mut hanging = Hanging::new(above, below, count, DOWN);
-        let mut most = 0.0_f32;
+        let mut largest = 0.0_f32;
         for _ in 0..(0.7 / dt) as u32 {
             hanging.world.step(dt).expect("a step");
-            most = most.max(hanging.drift());
+            largest = largest.max(hanging.drift());
         }
         let case = format!("{masses:?} kg, {solvers:?}, {dt} s, {count}");
         let weight = 9.81 * f64::from(masses[1]);
-        let off = (hanging.force() + DVec3::Y * -weight).length() / weight;
-        assert!(off < 1e-3, "{case}: the force is off by {off:e}");
+        let error = (hanging.force() + DVec3::Y * -weight).length() / weight;
+        assert!(error < 1e-3, "{case}: the force is off by {error:e}");
         assert!(hanging.drift() < 1e-4 * SIZE, "{case}: drift of {}", hanging.drift());
-        assert!(most < 1e-3 * SIZE, "{case}: drift of {most} on the way");
+        assert!(largest < 1e-3 * SIZE, "{case}: largest drift {largest}");
         let pins = pin_forces(&hanging.world, hanging.above, &hanging.pinned).y;
         let both = weight + 9.81 * f64::from(masses[0]);
         assert!(
-            // What an equation does not know of is damped too.
+            // Damping also acts on forces that the implicit equation does not contain.
             (pins - both).abs() < 5e-3 * both,
             "{case}: pins hold {pins} N of {both}"
         );
@@ -59,7 +59,7 @@ fn a_block_hangs_from_another_of(is_tried: fn(usize) -> bool) {
 }
 
 #[test]
-fn what_swings_gains_no_energy() {
+fn swinging_blocks_gain_no_energy() {
     for solvers in [
         [Solver::Verlet; 2],
         [Solver::Implicit; 2],
@@ -77,22 +77,22 @@ fn what_swings_gains_no_energy() {
         };
         let first = energy(&hanging);
         let thrown = 0.5 * 0.1 * 0.2;
-        let (mut most, mut aside) = (f64::NEG_INFINITY, 0.0_f32);
+        let (mut largest, mut widest) = (f64::NEG_INFINITY, 0.0_f32);
         for _ in 0..500 {
             hanging.world.step(1e-3).expect("a step");
-            most = most.max(energy(&hanging) - first);
-            let places = body(&hanging.world, hanging.below).positions();
-            aside = places.iter().map(|place| place.x.abs()).fold(aside, f32::max);
+            largest = largest.max(energy(&hanging) - first);
+            let positions = body(&hanging.world, hanging.below).positions();
+            widest = positions.iter().map(|position| position.x.abs()).fold(widest, f32::max);
         }
-        assert!(most < 0.03 * thrown, "{solvers:?}: {most} J gained of {thrown}");
+        assert!(largest < 0.03 * thrown, "{solvers:?}: {largest} J gained of {thrown}");
         assert!(hanging.drift() < 1e-4 * SIZE, "{solvers:?}: {}", hanging.drift());
-        // It did move.
-        assert!(aside > 0.7 * SIZE, "{solvers:?}: {aside}");
+        // The block did move.
+        assert!(widest > 0.7 * SIZE, "{solvers:?}: {widest}");
     }
 }
 
 #[test]
-fn momentum_is_kept() {
+fn momentum_is_conserved() {
     for solvers in [
         [Solver::Verlet; 2],
         [Solver::Implicit; 2],
@@ -117,22 +117,22 @@ fn momentum_is_kept() {
             let thrown = hanging.world.body_mut(below).expect("a body");
             let velocities = vec![Vec3::new(0.3, -0.2, 0.1); count];
             thrown.set_velocities(&velocities).expect("velocities");
-            let parts = |world: &World| {
+            let momenta = |world: &World| {
                 [(above, masses[0]), (below, masses[1])]
                     .map(|(id, mass)| momentum(body(world, id), mass / count as f32))
             };
-            let sum = |world: &World| parts(world)[0] + parts(world)[1];
+            let sum = |world: &World| momenta(world)[0] + momenta(world)[1];
             let first = sum(&hanging.world);
-            let (mut off, mut handed) = (0.0_f64, 0.0);
+            let (mut error, mut transferred) = (0.0_f64, 0.0);
             for _ in 0..(0.1 / dt) as u32 {
                 hanging.world.step(dt).expect("a step");
-                off = off.max((sum(&hanging.world) - first).length());
-                handed += hanging.force().length() * f64::from(dt);
+                error = error.max((sum(&hanging.world) - first).length());
+                transferred += hanging.force().length() * f64::from(dt);
             }
-            let [upper, _] = parts(&hanging.world);
+            let [upper, _] = momenta(&hanging.world);
             assert!(
-                off < 1e-6 * handed,
-                "{solvers:?}, {dt}: off by {off} of {handed} handed on"
+                error < 1e-6 * transferred,
+                "{solvers:?}, {dt}: momentum error {error} of {transferred} transferred"
             );
             assert!(hanging.drift() < 1e-6, "{solvers:?}, {dt}: {} m", hanging.drift());
             assert!(
@@ -144,7 +144,7 @@ fn momentum_is_kept() {
 }
 
 #[test]
-fn points_come_together_and_hold() {
+fn attached_points_are_pulled_together_and_hold() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let mut world = world(DOWN);
         let above = Block {
@@ -157,13 +157,14 @@ fn points_come_together_and_hold() {
             ..above
         };
         let [upper, lower] = [above, below].map(|block| block.put(&mut world));
-        let top = nodes_at(&above.mesh(), |place| place.y > HEIGHT - 1e-4);
+        let top = nodes_at(&above.mesh(), |position| position.y > HEIGHT - 1e-4);
         pin_all(&mut world, upper, &top);
-        // Points within triangles of the upper block's bottom, under three corners of it, and nodes of the lower one's top.
+        // Points in triangles of the upper block's bottom, under three of its corners, and nodes of the lower block's
+        // top.
         let surface = body(&world, upper).surface().to_vec();
         let rest = above.mesh().positions;
         let weights = [0.2, 0.3, 0.5];
-        let spot = |triangle: u32| -> Vec3 {
+        let surface_point = |triangle: u32| -> Vec3 {
             let corners = surface[triangle as usize].map(|node| rest[node as usize]);
             (0..3).map(|corner| corners[corner] * weights[corner]).sum()
         };
@@ -173,23 +174,23 @@ fn points_come_together_and_hold() {
                 .all(|&node| rest[node as usize].y < 1e-4)
         };
         let triangles: Vec<u32> = (0..surface.len() as u32).filter(is_below).collect();
-        let lowest = nodes_at(&below.mesh(), |place| place.y > -0.002 - 1e-4);
+        let lowest = nodes_at(&below.mesh(), |position| position.y > -0.002 - 1e-4);
         let mut pairs = Vec::new();
         for target in [
             Vec3::new(1.0, 0.0, 1.0),
             Vec3::new(-1.0, 0.0, 1.0),
             Vec3::new(0.0, 0.0, -1.0),
         ] {
-            let far = |place: Vec3| (place - target * SIZE / 2.0).length();
+            let distance_to = |position: Vec3| (position - target * SIZE / 2.0).length();
             let triangle = *triangles
                 .iter()
-                .min_by(|&&a, &&b| far(spot(a)).total_cmp(&far(spot(b))))
+                .min_by(|&&a, &&b| distance_to(surface_point(a)).total_cmp(&distance_to(surface_point(b))))
                 .expect("a triangle");
             let positions = below.mesh().positions;
-            let near = |node: u32| positions[node as usize].distance(spot(triangle));
+            let distance_to_node = |node: u32| positions[node as usize].distance(surface_point(triangle));
             let node = *lowest
                 .iter()
-                .min_by(|&&a, &&b| near(a).total_cmp(&near(b)))
+                .min_by(|&&a, &&b| distance_to_node(a).total_cmp(&distance_to_node(b)))
                 .expect("a node");
             pairs.push((node, triangle));
         }
@@ -201,7 +202,7 @@ fn points_come_together_and_hold() {
         let ids = world
             .attach_to_body(lower, &anchors(&nodes), upper, &points, 0.0)
             .expect("attachments");
-        let apart = |world: &World| {
+        let largest_gap = |world: &World| {
             let [above, below] = [upper, lower].map(|id| body(world, id).positions());
             let gap = |&(node, triangle): &(u32, u32)| {
                 let corners = surface[triangle as usize].map(|corner| above[corner as usize]);
@@ -210,12 +211,12 @@ fn points_come_together_and_hold() {
             };
             pairs.iter().map(gap).fold(0.0, f32::max)
         };
-        let first = apart(&world);
+        let first = largest_gap(&world);
         assert!(first > 0.05 * SIZE, "{first}");
         let mut last = first;
         for step in 0..800 {
             world.step(1e-3).expect("a step");
-            let gap = apart(&world);
+            let gap = largest_gap(&world);
             assert!(
                 gap < 1.01 * last + 1e-6,
                 "{solver:?}, step {step}: {gap} m apart after {last}"
@@ -242,18 +243,18 @@ fn a_suture_closes_a_cut() {
         mesh.triangles
             .extend(right.triangles.iter().map(|triangle| triangle.map(|node| node + count)));
         let suture = put_cloth(&mut world, &mesh, solver);
-        let edge = |x: f32| nodes_at(&mesh, |place| (place.x - x).abs() < 1e-4);
-        let [one, other] = [edge(0.02), edge(0.023)];
-        assert_eq!([one.len(), other.len()], [5; 2]);
+        let edge = |x: f32| nodes_at(&mesh, |position| (position.x - x).abs() < 1e-4);
+        let [left_edge, other] = [edge(0.02), edge(0.023)];
+        assert_eq!([left_edge.len(), other.len()], [5; 2]);
         let ids = world
-            .attach_to_body(suture, &anchors(&one), suture, &anchors(&other), 0.0)
+            .attach_to_body(suture, &anchors(&left_edge), suture, &anchors(&other), 0.0)
             .expect("sutures");
         for _ in 0..400 {
             world.step(1e-3).expect("a step");
         }
-        let places = body(&world, suture).positions();
-        for (&a, &b) in one.iter().zip(&other) {
-            let gap = places[a as usize].distance(places[b as usize]);
+        let positions = body(&world, suture).positions();
+        for (&a, &b) in left_edge.iter().zip(&other) {
+            let gap = positions[a as usize].distance(positions[b as usize]);
             assert!(gap < 1e-5, "{solver:?}: {gap} m apart");
         }
         let node_mass = 0.05 / mesh.positions.len() as f32;
@@ -280,17 +281,17 @@ fn put_cloth(world: &mut World, mesh: &Mesh, solver: Solver) -> BodyId {
 }
 
 #[test]
-fn pins_and_tools_take_what_hangs_on_them() {
-    pins_and_tools_take_what_hangs_on_them_of(&[[Solver::Verlet; 2], [Solver::Implicit, Solver::Verlet]]);
+fn pins_and_tools_carry_attached_weight() {
+    check_pins_and_tools_carry_attached_weight(&[[Solver::Verlet; 2], [Solver::Implicit, Solver::Verlet]]);
 }
 
 #[test]
 #[ignore = "long"]
-fn pins_and_tools_take_what_hangs_on_them_with_other_solvers() {
-    pins_and_tools_take_what_hangs_on_them_of(&[[Solver::Implicit; 2]]);
+fn pins_and_tools_carry_attached_weight_with_other_solvers() {
+    check_pins_and_tools_carry_attached_weight(&[[Solver::Implicit; 2]]);
 }
 
-fn pins_and_tools_take_what_hangs_on_them_of(pairs: &[[Solver; 2]]) {
+fn check_pins_and_tools_carry_attached_weight(pairs: &[[Solver; 2]]) {
     for &solvers in pairs {
         let shortest = if solvers == [Solver::Verlet; 2] { 0.5e-3 } else { 2e-3 };
         for dt in [shortest, 5e-3] {
@@ -329,17 +330,17 @@ fn pins_and_tools_take_what_hangs_on_them_of(pairs: &[[Solver; 2]]) {
 }
 
 #[test]
-fn it_slips_beyond_its_limit_alone() {
-    it_slips_beyond_its_limit_alone_of(&[[Solver::Verlet; 2], [Solver::Implicit, Solver::Verlet]]);
+fn attachments_break_only_beyond_their_force_limit() {
+    check_attachments_break_only_beyond_their_force_limit(&[[Solver::Verlet; 2], [Solver::Implicit, Solver::Verlet]]);
 }
 
 #[test]
 #[ignore = "long"]
-fn it_slips_beyond_its_limit_alone_with_other_solvers() {
-    it_slips_beyond_its_limit_alone_of(&[[Solver::Implicit; 2], [Solver::Newton; 2]]);
+fn attachments_break_only_beyond_their_force_limit_with_other_solvers() {
+    check_attachments_break_only_beyond_their_force_limit(&[[Solver::Implicit; 2], [Solver::Newton; 2]]);
 }
 
-fn it_slips_beyond_its_limit_alone_of(pairs: &[[Solver; 2]]) {
+fn check_attachments_break_only_beyond_their_force_limit(pairs: &[[Solver; 2]]) {
     let weight = 0.981_f32;
     for &solvers in pairs {
         let [above, below] = solvers.map(|solver| Block { solver, ..Block::CALM });
@@ -350,30 +351,30 @@ fn it_slips_beyond_its_limit_alone_of(pairs: &[[Solver; 2]]) {
         let Hanging { above, below, .. } = hanging;
         let [up, down] = hanging.pairs[0];
         let mut held = hanging.ids[0];
-        // What it carries is handed to one that is a little too weak, or not.
+        // Its load is handed to an attachment that is just strong enough, then to one that is just too weak.
         for (limit, slips) in [(1.02 * weight, false), (0.98 * weight, true)] {
             let world = &mut hanging.world;
             let next = world.attach_to_body(below, &[Anchor::Node(down)], above, &[Anchor::Node(up)], limit);
             let next = next.expect("an attachment")[0];
             world.release(held).expect("released");
             held = next;
-            let mut lost = None;
+            let mut break_step = None;
             for step in 0..100 {
                 world.step(2e-3).expect("a step");
                 if !world.slipped().is_empty() {
                     assert_eq!(world.slipped(), [held], "{solvers:?}");
-                    lost = lost.or(Some(step));
+                    break_step = break_step.or(Some(step));
                 }
             }
-            assert_eq!(lost.is_some(), slips, "{solvers:?}, {limit} N");
+            assert_eq!(break_step.is_some(), slips, "{solvers:?}, {limit} N");
             assert_eq!(world.attachment_force(held).is_err(), slips, "{solvers:?}");
         }
-        assert!(hanging.drift() > 0.01, "{solvers:?}: it has not fallen");
+        assert!(hanging.drift() > 0.01, "{solvers:?}: the block has not fallen");
     }
 }
 
 #[test]
-fn it_ends_with_either_body() {
+fn attachments_end_with_either_body() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         for is_first in [true, false] {
             let block = Block { solver, ..Block::CALM };
@@ -382,32 +383,36 @@ fn it_ends_with_either_body() {
                 hanging.world.step(1e-3).expect("a step");
             }
             let Hanging { above, below, ids, .. } = hanging;
-            let [gone, left] = if is_first { [above, below] } else { [below, above] };
-            hanging.world.destroy_body(gone).expect("destroyed");
+            let [destroyed, remaining] = if is_first { [above, below] } else { [below, above] };
+            hanging.world.destroy_body(destroyed).expect("destroyed");
             for id in ids {
                 assert!(matches!(hanging.world.release(id), Err(Error::StaleId(_))));
                 assert!(matches!(hanging.world.attachment_force(id), Err(Error::StaleId(_))));
             }
-            // A body in the same place in the world is not attached.
+            // A new body in the slot of the destroyed body is not attached.
             let other = block.put(&mut hanging.world);
             for _ in 0..50 {
                 hanging.world.step(1e-3).expect("a step");
             }
             let fallen = |id: BodyId| centre(body(&hanging.world, id)).y;
             let free = -0.5 * 9.81 * 0.05_f64.powi(2);
-            // It is damped.
+            // Damping slows its fall.
             assert!(fallen(other) < 0.5 * free, "{solver:?}: {} m", fallen(other));
-            assert!(all_finite(body(&hanging.world, left)));
+            assert!(all_finite(body(&hanging.world, remaining)));
             if is_first {
                 let from = f64::from(-HEIGHT / 2.0);
-                assert!(fallen(left) < from + 0.5 * free, "{solver:?}: {}", fallen(left));
+                assert!(
+                    fallen(remaining) < from + 0.5 * free,
+                    "{solver:?}: {}",
+                    fallen(remaining)
+                );
             }
         }
     }
 }
 
 #[test]
-fn what_is_attached_does_not_touch_there() {
+fn attached_nodes_have_no_contact() {
     let contact = BodyContact {
         thickness: 0.5e-3,
         with_bodies: true,
@@ -432,14 +437,14 @@ fn what_is_attached_does_not_touch_there() {
             assert!(hanging.drift() < 1e-4 * SIZE, "{}", hanging.drift());
             assert!(force < 1e-4, "{force} N");
         } else {
-            // Without it what touches is parted as surfaces without thickness are.
+            // Without attachments, contact of thickness 0 separates touching surfaces.
             assert!(hanging.drift() > 1e-3 * SIZE, "{}", hanging.drift());
         }
     }
 }
 
-/// The point of the lowest triangles of a block that is straight above or below a place.
-fn point_at(surface: &[[u32; 3]], positions: &[Vec3], place: Vec3) -> SurfacePoint {
+/// Returns the point of the lowest triangles of a block that lies straight above or below `position`.
+fn point_at(surface: &[[u32; 3]], positions: &[Vec3], target: Vec3) -> SurfacePoint {
     let lowest = positions
         .iter()
         .map(|position| position.y)
@@ -448,14 +453,14 @@ fn point_at(surface: &[[u32; 3]], positions: &[Vec3], place: Vec3) -> SurfacePoi
         let [a, b, c] = corners.map(|node| positions[node as usize]);
         let is_low = a.y.max(b.y).max(c.y) < lowest + 1e-4;
         let area = |p: Vec3, q: Vec3, r: Vec3| (q - p).cross(r - p).y;
-        let weights = [area(place, b, c), area(a, place, c), area(a, b, place)].map(|part| part / area(a, b, c));
+        let weights = [area(target, b, c), area(a, target, c), area(a, b, target)].map(|part| part / area(a, b, c));
         (is_low && weights.iter().all(|&weight| weight >= 0.0)).then_some(SurfacePoint { triangle, weights })
     });
     candidates.last().expect("a triangle")
 }
 
 #[test]
-fn what_is_attached_crosses_nothing_there() {
+fn attached_nodes_do_not_cross_surfaces() {
     let contact = BodyContact {
         thickness: 0.1e-3,
         with_bodies: true,
@@ -474,10 +479,10 @@ fn what_is_attached_crosses_nothing_there() {
         });
         let [upper, lower] = [above, below].map(|block| block.put(&mut world));
         let [rest, nodes] = [above, below].map(|block| block.mesh().positions);
-        let top = nodes_at(&above.mesh(), |place| place.y > HEIGHT - 1e-4);
+        let top = nodes_at(&above.mesh(), |position| position.y > HEIGHT - 1e-4);
         pin_all(&mut world, upper, &top);
-        let inner = nodes_at(&below.mesh(), |place| {
-            place.y > -1e-3 && place.x.abs().max(place.z.abs()) < 0.015
+        let inner = nodes_at(&below.mesh(), |position| {
+            position.y > -1e-3 && position.x.abs().max(position.z.abs()) < 0.015
         });
         assert_eq!(inner.len(), 9);
         let surface = body(&world, upper).surface().to_vec();
@@ -485,8 +490,8 @@ fn what_is_attached_crosses_nothing_there() {
             .iter()
             .map(|&node| point_at(&surface, &rest, nodes[node as usize]));
         let points: Vec<Anchor> = points.map(Anchor::Point).collect();
-        let made = world.attach_to_body(lower, &anchors(&inner), upper, &points, 0.0);
-        let ids = made.expect("attachments");
+        let attached = world.attach_to_body(lower, &anchors(&inner), upper, &points, 0.0);
+        let ids = attached.expect("attachments");
         for step in 0..200 {
             let report = world.step(1e-3).expect("a step");
             assert_eq!(report.crossings, 0, "{solvers:?}, step {step}");
@@ -497,7 +502,7 @@ fn what_is_attached_crosses_nothing_there() {
 }
 
 #[test]
-fn a_tool_carries_what_hangs_on_what_it_holds() {
+fn a_tool_carries_a_body_attached_to_the_body_it_holds() {
     let mut hanging = Hanging::new(Block::CALM, Block::CALM, 4, Vec3::ZERO);
     let Hanging { above, below, .. } = hanging;
     for &node in &hanging.pinned {
@@ -512,15 +517,15 @@ fn a_tool_carries_what_hangs_on_what_it_holds() {
     let held = hanging.world.attach_nodes(above, &hanging.pinned, tool, 0.0);
     held.expect("attachments");
     for step in 1..=500 {
-        let way = 0.1 * (step.min(200) as f32 / 200.0);
+        let displacement = 0.1 * (step.min(200) as f32 / 200.0);
         hanging
             .world
-            .set_pose(tool, Vec3::new(way, 1.0, 0.0), Some(Quat::IDENTITY))
+            .set_pose(tool, Vec3::new(displacement, 1.0, 0.0), Some(Quat::IDENTITY))
             .expect("a pose");
         hanging.world.step(1e-3).expect("a step");
     }
-    let places = body(&hanging.world, below).positions();
-    let middle = places.iter().map(|place| place.as_dvec3()).sum::<DVec3>() / places.len() as f64;
+    let positions = body(&hanging.world, below).positions();
+    let middle = positions.iter().map(|position| position.as_dvec3()).sum::<DVec3>() / positions.len() as f64;
     assert!((middle.x - 0.1).abs() < 0.01, "{middle}");
     assert!(hanging.drift() < 1e-4 * SIZE, "{}", hanging.drift());
 }

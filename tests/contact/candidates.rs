@@ -1,4 +1,4 @@
-//! What is near a tool is remembered from substep to substep; results must not tell how.
+//! Broad-phase candidates are reused across substeps. Results do not depend on when they are rebuilt.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ fn bits(world: &World, id: sinew::BodyId) -> Vec<[u32; 3]> {
 }
 
 #[test]
-fn a_far_tool_changes_no_bit() {
+fn a_far_tool_leaves_results_bitwise_identical() {
     for far in [None, Some(Shape::Sphere { radius: 0.1 }), Some(Shape::Plane)] {
         let run = |far: Option<Shape>| {
             let mut world = world(DOWN);
@@ -34,8 +34,9 @@ fn a_far_tool_changes_no_bit() {
     }
 }
 
-/// A cloth on a plane with a ball that wanders over it, and tools far away that force the list to be made more often.
-fn wander(more: u32) -> Vec<Vec<[u32; 3]>> {
+/// Runs a cloth on a plane with a ball that wanders over it. `more` distant tools force additional rebuilds of the
+/// candidate list.
+fn wander(extra: u32) -> Vec<Vec<[u32; 3]>> {
     let mut world = world_of(DOWN, 8);
     let cloth = Tissue::VISCOUS.put(&mut world, &moved(square(0.2, 12), Vec3::Y * 0.003));
     tool(&mut world, Shape::Plane, 0.3, Vec3::ZERO, Quat::IDENTITY);
@@ -46,51 +47,51 @@ fn wander(more: u32) -> Vec<Vec<[u32; 3]>> {
         Vec3::Y * 0.05,
         Quat::IDENTITY,
     );
-    let far: Vec<_> = (0..more)
-        .map(|place| sphere(&mut world, 0.01, Vec3::new(30.0 + place as f32, 40.0, 0.0)))
+    let far: Vec<_> = (0..extra)
+        .map(|position| sphere(&mut world, 0.01, Vec3::new(30.0 + position as f32, 40.0, 0.0)))
         .collect();
     let mut random = Random::new(8);
-    let mut seen = Vec::new();
+    let mut states = Vec::new();
     for step in 0..150 {
-        // In and out of the cloth and the plane, created inside at times.
-        let place = Vec3::new(
+        // The ball moves in and out of the cloth and the plane, and sometimes starts inside.
+        let position = Vec3::new(
             random.between(-0.1, 0.1),
             random.between(0.0, 0.04),
             random.between(-0.1, 0.1),
         );
-        world.set_pose(ball, place, None).expect("a pose");
+        world.set_pose(ball, position, None).expect("a pose");
         for &tool in &far {
-            // Leaves its zone every step: the list is made anew every time.
-            let place = world.pose(tool).expect("a tool").position;
+            // The tool leaves its zone every step, so the candidate list is rebuilt every step.
+            let position = world.pose(tool).expect("a tool").position;
             world
-                .set_pose(tool, place + Vec3::X * if step % 2 == 0 { 1.0 } else { -1.0 }, None)
+                .set_pose(tool, position + Vec3::X * if step % 2 == 0 { 1.0 } else { -1.0 }, None)
                 .expect("a pose");
         }
         world.step(0.01).expect("a step");
-        seen.push(bits(&world, cloth));
+        states.push(bits(&world, cloth));
     }
-    seen
+    states
 }
 
 #[test]
-fn when_the_list_is_made_changes_no_bit() {
+fn rebuilding_the_candidate_list_leaves_results_bitwise_identical() {
     let (few, many) = (wander(0), wander(1));
     let first = few.iter().zip(&many).position(|(few, many)| few != many);
     assert_eq!(first, None, "the first step that differs");
 }
 
 #[test]
-fn a_tool_inside_a_body_is_found_however_far_it_pushes() {
-    // Deep inside: what is pushed out of one tool may come into another that it was far from.
-    let run = |more: bool| {
+fn a_tool_inside_a_body_is_detected_however_far_it_pushes() {
+    // Deep inside: nodes that are pushed out of one tool can enter another tool that was far away.
+    let run = |extra: bool| {
         let mut world = world_of(Vec3::ZERO, 40);
         let mesh = sinew::mesh::Mesh::block([0.1, 0.1, 0.1], [6, 6, 6]).expect("a block");
         let block = Tissue::VISCOUS.put(&mut world, &mesh);
-        for (place, radius) in [(Vec3::ZERO, 0.045), (Vec3::new(0.066, 0.01, 0.0), 0.012)] {
-            sphere(&mut world, radius, place);
+        for (position, radius) in [(Vec3::ZERO, 0.045), (Vec3::new(0.066, 0.01, 0.0), 0.012)] {
+            sphere(&mut world, radius, position);
         }
-        let far = more.then(|| sphere(&mut world, 0.01, Vec3::X * 40.0));
-        let mut seen = Vec::new();
+        let far = extra.then(|| sphere(&mut world, 0.01, Vec3::X * 40.0));
+        let mut states = Vec::new();
         for step in 0..60 {
             if let Some(far) = far {
                 world
@@ -98,30 +99,33 @@ fn a_tool_inside_a_body_is_found_however_far_it_pushes() {
                     .expect("a pose");
             }
             world.step(0.01).expect("a step");
-            seen.push(bits(&world, block));
+            states.push(bits(&world, block));
         }
-        seen
+        states
     };
-    let (alone, more) = (run(false), run(true));
-    let first = alone.iter().zip(&more).position(|(alone, more)| alone != more);
+    let (without_extra, extra) = (run(false), run(true));
+    let first = without_extra
+        .iter()
+        .zip(&extra)
+        .position(|(without_extra, extra)| without_extra != extra);
     assert_eq!(first, None, "the first step that differs");
 }
 
 #[test]
-fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps() {
-    a_step_to_a_tolerance_is_the_step_of_so_many_substeps_of(0..15);
+fn a_step_with_a_tolerance_equals_a_step_with_its_number_of_substeps() {
+    check_a_step_with_a_tolerance_equals_a_step_with_its_number_of_substeps(0..15);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps_in_other_shots() {
-    a_step_to_a_tolerance_is_the_step_of_so_many_substeps_of(15..60);
+fn a_step_with_a_tolerance_equals_a_step_with_its_number_of_substeps_in_other_shots() {
+    check_a_step_with_a_tolerance_equals_a_step_with_its_number_of_substeps(15..60);
 }
 
-fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps_of(shots: Range<u32>) {
-    // Bullets fly past and against a needle: the coarse steps see them beyond it, the last must see them before it.
+fn check_a_step_with_a_tolerance_equals_a_step_with_its_number_of_substeps(shots: Range<u32>) {
+    // Bullets fly past and against a needle. Coarse steps end beyond the needle; the accepted step must detect it.
     let mut random = Random::new(6);
-    let mut met = 0;
+    let mut hits = 0;
     for shot in 0..shots.end {
         let start = Vec3::new(
             random.between(-0.05, 0.05),
@@ -168,7 +172,7 @@ fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps_of(shots: Range<u32>) {
             assert!(matches!(report, Err(Error::Unstable { .. })));
             continue;
         };
-        met += u32::from(force != Vec3::ZERO);
+        hits += u32::from(force != Vec3::ZERO);
         let (_, exactly, same) = run(report.substeps, 0.0);
         assert_eq!(
             moved, exactly,
@@ -176,11 +180,11 @@ fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps_of(shots: Range<u32>) {
             report.substeps
         );
     }
-    assert!(met > shots.len() as u32 / 12, "only {met} shots met the needle");
+    assert!(hits > shots.len() as u32 / 12, "only {hits} shots hit the needle");
 }
 
 #[test]
-fn a_step_that_could_not_be_taken_leaves_no_trace() {
+fn a_refused_step_leaves_no_trace() {
     // The same motion with and without a refused step before each step.
     let run = |refused: bool| {
         let mut world = World::new(WorldDefinition {
@@ -197,25 +201,25 @@ fn a_step_that_could_not_be_taken_leaves_no_trace() {
             Vec3::Y * -0.02,
             Quat::IDENTITY,
         );
-        let mut seen = Vec::new();
+        let mut states = Vec::new();
         for step in 0..60 {
-            let place = Vec3::new(0.002 * step as f32, -0.02 + 0.0005 * step as f32, 0.0);
-            world.set_pose(ball, place, None).expect("a pose");
+            let position = Vec3::new(0.002 * step as f32, -0.02 + 0.0005 * step as f32, 0.0);
+            world.set_pose(ball, position, None).expect("a pose");
             if refused {
                 let before = world.state_hash();
                 assert!(matches!(world.step(10.0), Err(Error::Unstable { .. })));
                 assert_eq!(world.state_hash(), before);
             }
             world.step(0.005).expect("a step");
-            assert_eq!(world.pose(ball).expect("a tool").position, place);
-            seen.push(world.state_hash());
+            assert_eq!(world.pose(ball).expect("a tool").position, position);
+            states.push(world.state_hash());
         }
-        seen
+        states
     };
     assert!(run(false) == run(true));
 }
 
-/// A cloth in the plane y = 0 whose rim is held.
+/// Creates a cloth in the plane y = 0 whose border is pinned.
 fn drum(world: &mut World, solver: Solver) -> sinew::BodyId {
     let calm = Tissue {
         mass: 0.02,
@@ -231,7 +235,7 @@ fn drum(world: &mut World, solver: Solver) -> sinew::BodyId {
 const SOLVERS: [Solver; 2] = [Solver::Verlet, Solver::Implicit];
 
 #[test]
-fn another_tool_in_the_place_of_one_is_felt() {
+fn a_tool_in_a_reused_slot_is_detected() {
     let cube = |world: &mut World, detection: Detection, half: f32| {
         let (positions, triangles) = cuboid(Vec3::splat(-half), Vec3::splat(half));
         let shape = Shape::Mesh {
@@ -252,7 +256,8 @@ fn another_tool_in_the_place_of_one_is_felt() {
     };
     for detection in [Detection::Exact, Detection::DistanceField, Detection::ImageSpace] {
         for solver in SOLVERS {
-            // A cube that reaches into the cloth, in the place of one that does not, or in a place of its own.
+            // The large cube reaches into the cloth. It reuses the slot of a destroyed small cube, or gets its own
+            // slot.
             let run = |exchanged: bool| {
                 let mut world = world(Vec3::ZERO);
                 let cloth = drum(&mut world, solver);
@@ -265,27 +270,31 @@ fn another_tool_in_the_place_of_one_is_felt() {
                     world.destroy_tool(small).expect("a tool");
                 }
                 let large = cube(&mut world, detection, 0.05);
-                let mut most = Vec3::ZERO;
+                let mut largest = Vec3::ZERO;
                 for _ in 0..30 {
                     world.step(1e-3).expect("a step");
-                    most = most.max(world.wrench(large).expect("a tool").0);
+                    largest = largest.max(world.wrench(large).expect("a tool").0);
                 }
-                (most, bits(&world, cloth))
+                (largest, bits(&world, cloth))
             };
-            let (exchanged, alone) = (run(true), run(false));
-            assert!(alone.0.y > 1e-3, "{detection:?}, {solver:?}: {} N", alone.0);
+            let (exchanged, without_extra) = (run(true), run(false));
             assert!(
-                exchanged == alone,
+                without_extra.0.y > 1e-3,
+                "{detection:?}, {solver:?}: {} N",
+                without_extra.0
+            );
+            assert!(
+                exchanged == without_extra,
                 "{detection:?}, {solver:?}: {} N for {} N",
                 exchanged.0,
-                alone.0
+                without_extra.0
             );
         }
     }
 }
 
 #[test]
-fn a_tool_that_meets_nothing_changes_no_bit() {
+fn a_tool_that_collides_with_nothing_leaves_results_bitwise_identical() {
     let (positions, triangles) = cuboid(Vec3::splat(-0.01), Vec3::splat(0.01));
     let mesh = Shape::Mesh {
         positions: &positions,
@@ -303,21 +312,21 @@ fn a_tool_that_meets_nothing_changes_no_bit() {
                     definition.pose.position = Vec3::Y * 0.03;
                     world.create_tool(&definition).expect("a tool")
                 });
-                let mut seen = Vec::new();
+                let mut states = Vec::new();
                 for step in 0..10 {
                     if let Some(ball) = ball {
-                        let place = Vec3::new(0.03, 0.013 - 5e-4 * step as f32, 0.01);
-                        world.set_pose(ball, place, None).expect("a pose");
+                        let position = Vec3::new(0.03, 0.013 - 5e-4 * step as f32, 0.01);
+                        world.set_pose(ball, position, None).expect("a pose");
                     }
                     if let Some(ghost) = ghost {
-                        let place = Vec3::Y * (0.03 - 0.006 * step as f32);
-                        world.set_pose(ghost, place, None).expect("a pose");
+                        let position = Vec3::Y * (0.03 - 0.006 * step as f32);
+                        world.set_pose(ghost, position, None).expect("a pose");
                     }
                     let report = world.step(1.0 / 60.0).expect("a step");
                     let force = ball.map(|ball| world.wrench(ball).expect("a tool").0);
-                    seen.push((report.substeps, force, bits(&world, cloth)));
+                    states.push((report.substeps, force, bits(&world, cloth)));
                 }
-                seen
+                states
             };
             let without = run(None);
             for shape in [Shape::Sphere { radius: 0.01 }, Shape::Plane, mesh] {

@@ -1,4 +1,5 @@
-//! What a tool or a body is asked of contact while it runs: the same as if it had been asked for at first, from then on.
+//! Contact settings of tools and bodies that change between steps. From the next step on, they act as if set at
+//! creation.
 
 use crate::support::tissue::*;
 use glam::Vec3;
@@ -6,7 +7,7 @@ use sinew::{BodyId, CollisionFilter, Error, Shape, Solver, ToolDefinition, ToolI
 
 const NOTHING: CollisionFilter = CollisionFilter { category: 1, mask: 0 };
 
-/// A cloth that is held at its rim, and a ball above it that goes sideways.
+/// Creates a cloth that is pinned at its border, and a tool.
 fn scene(solver: Solver, definition: &ToolDefinition) -> (World, BodyId, ToolId) {
     let calm = Tissue {
         mass: 0.02,
@@ -21,12 +22,12 @@ fn scene(solver: Solver, definition: &ToolDefinition) -> (World, BodyId, ToolId)
     (world, cloth, tool)
 }
 
-/// Presses the ball onto the cloth and along it, `steps` steps from `begun` on.
-fn press(world: &mut World, tool: ToolId, begun: u32, steps: u32) {
-    for step in begun..begun + steps {
-        let part = step as f32 * 1e-4;
-        let place = Vec3::new(part, 0.01 - part, 0.0);
-        world.set_pose(tool, place, None).expect("a pose");
+/// Presses the ball onto the cloth and along it, in `steps` steps from step `begun` on.
+fn press(world: &mut World, tool: ToolId, first_step: u32, steps: u32) {
+    for step in first_step..first_step + steps {
+        let distance = step as f32 * 1e-4;
+        let position = Vec3::new(distance, 0.01 - distance, 0.0);
+        world.set_pose(tool, position, None).expect("a pose");
         world.step(1e-3).expect("a step");
     }
 }
@@ -42,14 +43,14 @@ fn ball() -> ToolDefinition<'static> {
 }
 
 #[test]
-fn what_is_asked_before_a_step_counts_as_from_the_first() {
+fn settings_changed_before_the_first_step_act_as_if_set_at_creation() {
     for solver in [Solver::Verlet, Solver::Implicit] {
-        let asked = ToolDefinition {
+        let configured = ToolDefinition {
             friction: 0.7,
             force_limit: 0.02,
             ..ball()
         };
-        let (mut first, _, tool) = scene(solver, &asked);
+        let (mut first, _, tool) = scene(solver, &configured);
         press(&mut first, tool, 0, 40);
         let (mut plain, _, tool) = scene(solver, &ball());
         press(&mut plain, tool, 0, 40);
@@ -78,11 +79,11 @@ fn what_is_asked_before_a_step_counts_as_from_the_first() {
 }
 
 #[test]
-fn what_meets_nothing_any_more_lets_go_and_comes_back() {
+fn contact_ends_when_filtered_out_and_returns_afterwards() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         for of_tool in [true, false] {
             let (mut world, cloth, tool) = scene(solver, &ball());
-            let ask = |world: &mut World, filter: CollisionFilter| {
+            let set_filter = |world: &mut World, filter: CollisionFilter| {
                 if of_tool {
                     world.set_collision_filter(tool, filter).expect("a filter");
                 } else {
@@ -98,15 +99,15 @@ fn what_meets_nothing_any_more_lets_go_and_comes_back() {
             };
             press(&mut world, tool, 0, 30);
             assert!(pressed(&world) > 1e-3);
-            ask(&mut world, NOTHING);
+            set_filter(&mut world, NOTHING);
             press(&mut world, tool, 30, 1);
             assert_eq!((pressed(&world), changes(&world)), (0.0, vec![false]));
             press(&mut world, tool, 31, 9);
             assert_eq!((pressed(&world), changes(&world)), (0.0, vec![]));
-            ask(&mut world, CollisionFilter::ALL);
+            set_filter(&mut world, CollisionFilter::ALL);
             press(&mut world, tool, 40, 1);
             assert_eq!(changes(&world), [true], "{solver:?}, of the tool: {of_tool}");
-            // What lies within the ball by then is pushed out, and presses as if it had never been let go.
+            // Nodes inside the ball by then are pushed out, and the force matches that of uninterrupted contact.
             press(&mut world, tool, 41, 60);
             let (mut other, cloth_there, tool_there) = scene(solver, &ball());
             press(&mut other, tool_there, 0, 101);
@@ -116,32 +117,32 @@ fn what_meets_nothing_any_more_lets_go_and_comes_back() {
                 "{solver:?}, of the tool: {of_tool}: {} instead of {force} N",
                 pressed(&world)
             );
-            let [deepest, there] = [(&world, cloth), (&other, cloth_there)].map(|(world, cloth)| {
+            let [deepest, other_deepest] = [(&world, cloth), (&other, cloth_there)].map(|(world, cloth)| {
                 let heights = body(world, cloth).positions().iter().map(|p| p.y);
                 heights.fold(f32::INFINITY, f32::min)
             });
             assert!(
-                (deepest - there).abs() < 5e-4,
-                "{solver:?}: {deepest} instead of {there}"
+                (deepest - other_deepest).abs() < 5e-4,
+                "{solver:?}: {deepest} instead of {other_deepest}"
             );
         }
     }
 }
 
 #[test]
-fn what_is_no_coefficient_or_limit_is_refused_and_changes_nothing() {
+fn invalid_coefficients_and_limits_are_refused_and_change_nothing() {
     let (mut world, _, tool) = scene(Solver::Verlet, &ball());
     let before = world.state_hash();
     for wrong in [-1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let refused = world.set_friction(tool, wrong);
         assert!(
-            matches!(&refused, Err(Error::InvalidArgument(words)) if words.contains("friction") && words.contains(&wrong.to_string())),
+            matches!(&refused, Err(Error::InvalidArgument(message)) if message.contains("friction") && message.contains(&wrong.to_string())),
             "{refused:?}"
         );
         if wrong != f32::INFINITY {
             let refused = world.set_force_limit(tool, wrong);
             assert!(
-                matches!(&refused, Err(Error::InvalidArgument(words)) if words.contains("force_limit")),
+                matches!(&refused, Err(Error::InvalidArgument(message)) if message.contains("force_limit")),
                 "{refused:?}"
             );
         }

@@ -1,4 +1,4 @@
-//! Thin sheets that meet themselves as they crumple.
+//! Self-contact of thin sheets that crumple.
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
@@ -7,39 +7,40 @@ use sinew::{BodyContact, BodyDefinition, Shape, Solver, ToolDefinition, Values, 
 use crate::support::bodies::Random;
 use crate::support::crossings::crossings;
 
-/// Of a cell, m.
+/// The size of a cell (m).
 const CELL: f32 = 0.01;
 const CELLS: u32 = 8;
 
-/// A sheet in slight folds falls upright onto the ground, faster at its top: a thickness of 0 still keeps its layers apart.
+/// A slightly folded sheet falls upright onto the ground, its top faster. A thickness of 0 still keeps its layers
+/// apart.
 #[test]
-fn a_sheet_without_thickness_does_not_pass_itself() {
-    nothing_passes(Solver::Verlet, 0.0, &[0.5], 15);
+fn a_sheet_without_thickness_does_not_pass_through_itself() {
+    assert_no_crossings(Solver::Verlet, 0.0, &[0.5], 15);
 }
 
-/// What is flat as a step begins is not after a fraction of it.
+/// The sheet is flat when a step begins, and folded after a fraction of the step.
 #[test]
-fn a_sheet_that_crumples_within_a_step_does_not_pass_itself() {
-    nothing_passes(Solver::Verlet, 1e-3, &[8.0], 4);
-    nothing_passes(Solver::Implicit, 1e-3, &[8.0], 4);
-}
-
-#[test]
-#[ignore = "long"]
-fn a_sheet_without_thickness_does_not_pass_itself_with_implicit() {
-    nothing_passes(Solver::Implicit, 0.0, &[0.1, 0.5], 15);
+fn a_sheet_that_crumples_within_a_step_does_not_pass_through_itself() {
+    assert_no_crossings(Solver::Verlet, 1e-3, &[8.0], 4);
+    assert_no_crossings(Solver::Implicit, 1e-3, &[8.0], 4);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_sheet_that_crumples_within_a_step_does_not_pass_itself_at_other_speeds() {
+fn a_sheet_without_thickness_does_not_pass_through_itself_with_implicit() {
+    assert_no_crossings(Solver::Implicit, 0.0, &[0.1, 0.5], 15);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_sheet_that_crumples_within_a_step_does_not_pass_through_itself_at_other_speeds() {
     for (thickness, speed) in [(5e-4, 4.0), (2e-3, 15.0), (2e-3, 30.0)] {
-        nothing_passes(Solver::Verlet, thickness, &[speed], 4);
-        nothing_passes(Solver::Implicit, thickness, &[speed], 4);
+        assert_no_crossings(Solver::Verlet, thickness, &[speed], 4);
+        assert_no_crossings(Solver::Implicit, thickness, &[speed], 4);
     }
 }
 
-fn nothing_passes(solver: Solver, thickness: f32, speeds: &[f32], frames: u32) {
+fn assert_no_crossings(solver: Solver, thickness: f32, speeds: &[f32], frames: u32) {
     for &speed in speeds {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let ground = ToolDefinition {
@@ -50,8 +51,8 @@ fn nothing_passes(solver: Solver, thickness: f32, speeds: &[f32], frames: u32) {
         let size = CELL * CELLS as f32;
         let mut mesh = Mesh::cloth([size; 2], [CELLS; 2]).expect("a cloth");
         let middle = 0.5 * size + 0.02;
-        for place in &mut mesh.positions {
-            *place = Vec3::new(place.z, place.x + middle, 0.004 * (60.0 * place.x).sin());
+        for position in &mut mesh.positions {
+            *position = Vec3::new(position.z, position.x + middle, 0.004 * (60.0 * position.x).sin());
         }
         let mass = 5e-5;
         let body = world
@@ -73,9 +74,9 @@ fn nothing_passes(solver: Solver, thickness: f32, speeds: &[f32], frames: u32) {
         let velocities: Vec<Vec3> = mesh
             .positions
             .iter()
-            .map(|place| {
-                let aside = 0.1 * random.signed();
-                Vec3::new(-10.0 * place.x, -1.0 - 5.0 * (place.y - middle), aside) * speed
+            .map(|position| {
+                let sideways = 0.1 * random.signed();
+                Vec3::new(-10.0 * position.x, -1.0 - 5.0 * (position.y - middle), sideways) * speed
             })
             .collect();
         let body_mut = world.body_mut(body).expect("the sheet");
@@ -83,22 +84,22 @@ fn nothing_passes(solver: Solver, thickness: f32, speeds: &[f32], frames: u32) {
         let (mut is_folded, near) = (false, f64::from(0.3 * CELL + 3.0 * thickness));
         for frame in 0..frames {
             let report = world.step(1.0 / 60.0).expect("a step");
-            let what = format!("{solver:?}, {speed} m/s, frame {frame}");
-            let places: Vec<DVec3> = world
+            let case = format!("{solver:?}, {speed} m/s, frame {frame}");
+            let positions: Vec<DVec3> = world
                 .body(body)
                 .expect("the sheet")
                 .positions()
                 .iter()
-                .map(|place| place.as_dvec3())
+                .map(|position| position.as_dvec3())
                 .collect();
-            assert_eq!(crossings(&places, &mesh.triangles, &mesh.triangles), 0, "{what}");
-            assert_eq!(report.crossings, 0, "{what}");
-            // Corners that were two cells apart or more have come together.
-            is_folded |= (0..places.len()).any(|a| {
-                let apart = |b: usize| mesh.positions[a].distance(mesh.positions[b]) > 2.0 * CELL;
-                (0..a).any(|b| places[a].distance(places[b]) < near && apart(b))
+            assert_eq!(crossings(&positions, &mesh.triangles, &mesh.triangles), 0, "{case}");
+            assert_eq!(report.crossings, 0, "{case}");
+            // Nodes that were more than two cells apart have come together.
+            is_folded |= (0..positions.len()).any(|a| {
+                let were_apart = |b: usize| mesh.positions[a].distance(mesh.positions[b]) > 2.0 * CELL;
+                (0..a).any(|b| positions[a].distance(positions[b]) < near && were_apart(b))
             });
         }
-        assert!(is_folded, "{solver:?}, {speed} m/s: nothing met");
+        assert!(is_folded, "{solver:?}, {speed} m/s: no parts came into contact");
     }
 }

@@ -7,21 +7,22 @@ use sinew::{BodyContact, BodyDefinition, Material, Model, Shape, ToolDefinition,
 use crate::support::bodies::Random;
 use crate::support::crossings::crossings;
 
-/// Six blocks, each askew, fall onto each other nearly as fast as sound goes in them: their corners fold through themselves, and pass no other.
+/// Six blocks, each tilted, fall onto each other at nearly their speed of sound. Their corners fold through themselves,
+/// but blocks never pass through each other.
 #[test]
-fn what_is_crushed_passes_nothing() {
-    nothing_passes(1.5, 3);
+fn crushed_tissue_does_not_pass_through() {
+    assert_no_crossings(1.5, 3);
 }
 
 #[test]
 #[ignore = "long"]
-fn what_is_crushed_passes_nothing_in_the_other_cases() {
+fn crushed_tissue_does_not_pass_through_in_the_other_cases() {
     for (speed, seed) in [(0.7, 4), (1.0, 1), (1.5, 2), (1.5, 9), (1.5, 16), (2.0, 3), (2.0, 14)] {
-        nothing_passes(speed, seed);
+        assert_no_crossings(speed, seed);
     }
 }
 
-fn nothing_passes(speed: f32, seed: u64) {
+fn assert_no_crossings(speed: f32, seed: u64) {
     let mut random = Random::new(seed);
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let ground = ToolDefinition {
@@ -30,12 +31,12 @@ fn nothing_passes(speed: f32, seed: u64) {
     };
     world.create_tool(&ground).expect("the ground");
     let block = Mesh::block([0.06; 3], [3; 3]).expect("a block");
-    for place in 0..6 {
+    for level in 0..6 {
         let mut angle = || 3.0 * random.signed();
-        let turn = Quat::from_euler(EulerRot::XYZ, angle(), angle(), angle());
-        let mut aside = || 0.01 * random.signed();
-        let middle = Vec3::new(aside(), 0.12 + 0.13 * place as f32, aside());
-        let positions: Vec<Vec3> = block.positions.iter().map(|&at| middle + turn * at).collect();
+        let rotation = Quat::from_euler(EulerRot::XYZ, angle(), angle(), angle());
+        let mut sideways = || 0.01 * random.signed();
+        let middle = Vec3::new(sideways(), 0.12 + 0.13 * level as f32, sideways());
+        let positions: Vec<Vec3> = block.positions.iter().map(|&at| middle + rotation * at).collect();
         let definition = BodyDefinition {
             positions: &positions,
             material: Some(Material {
@@ -59,13 +60,13 @@ fn nothing_passes(speed: f32, seed: u64) {
         let body_mut = world.body_mut(body).expect("the block");
         body_mut.set_velocities(&velocities).expect("velocities");
     }
-    let mut most_pressed = 1.0_f64;
+    let mut least_volume = 1.0_f64;
     for frame in 0..20 {
         let report = world.step(1.0 / 60.0).expect("a step");
-        let (mut places, mut surfaces): (Vec<DVec3>, Vec<Vec<[u32; 3]>>) = Default::default();
+        let (mut nodes, mut surfaces): (Vec<DVec3>, Vec<Vec<[u32; 3]>>) = Default::default();
         for body in world.bodies() {
-            let first = places.len() as u32;
-            places.extend(body.positions().iter().map(|place| place.as_dvec3()));
+            let first = nodes.len() as u32;
+            nodes.extend(body.positions().iter().map(|node| node.as_dvec3()));
             surfaces.push(
                 body.surface()
                     .iter()
@@ -74,24 +75,26 @@ fn nothing_passes(speed: f32, seed: u64) {
             );
         }
         let volume = |surface: &[[u32; 3]]| {
-            let of = |&[a, b, c]: &[u32; 3]| places[a as usize].dot(places[b as usize].cross(places[c as usize]));
-            surface.iter().map(of).sum::<f64>() / 6.0
+            let signed_volume =
+                |&[a, b, c]: &[u32; 3]| nodes[a as usize].dot(nodes[b as usize].cross(nodes[c as usize]));
+            surface.iter().map(signed_volume).sum::<f64>() / 6.0
         };
-        let what = format!("{speed} m/s, {seed}, frame {frame}");
-        for (number, own) in surfaces.iter().enumerate() {
-            most_pressed = most_pressed.min(volume(own) / 0.06_f64.powi(3));
-            for (_, other) in surfaces.iter().enumerate().filter(|(other, _)| *other != number) {
-                assert_eq!(crossings(&places, own, other), 0, "{what}");
+        let case = format!("{speed} m/s, {seed}, frame {frame}");
+        for (index, own) in surfaces.iter().enumerate() {
+            least_volume = least_volume.min(volume(own) / 0.06_f64.powi(3));
+            for (_, other) in surfaces.iter().enumerate().filter(|(other, _)| *other != index) {
+                assert_eq!(crossings(&nodes, own, other), 0, "{case}");
             }
         }
-        assert_eq!(report.crossings, 0, "{what}");
+        assert_eq!(report.crossings, 0, "{case}");
     }
-    assert!(most_pressed < 0.9, "they were not crushed: {most_pressed}");
+    assert!(least_volume < 0.9, "they were not crushed: {least_volume}");
 }
 
-/// Two cubes of a few nodes, thrown at each other: what their contacts give in a substep bends faces by far more than keeps them apart.
+/// Two cubes of few nodes are thrown at each other. The contact impulses of one substep bend faces far more than the
+/// gap between them.
 #[test]
-fn cubes_without_a_thickness_pass_nothing() {
+fn cubes_without_a_thickness_do_not_pass_through() {
     let cube = Mesh::block([0.36; 3], [3; 3]).expect("a cube");
     for (young_modulus, speed) in [(2e4, 3.0), (2e4, 5.0), (2e4, 10.0), (5e4, 7.0), (5e4, 10.0), (2e3, 3.0)] {
         let mut world = World::new(WorldDefinition {
@@ -100,8 +103,8 @@ fn cubes_without_a_thickness_pass_nothing() {
         })
         .expect("a world");
         for side in [-1.0_f32, 1.0] {
-            let beside = side * Vec3::new(0.25, 0.01, 0.0065);
-            let positions: Vec<Vec3> = cube.positions.iter().map(|&at| at + beside).collect();
+            let offset = side * Vec3::new(0.25, 0.01, 0.0065);
+            let positions: Vec<Vec3> = cube.positions.iter().map(|&at| at + offset).collect();
             let definition = BodyDefinition {
                 positions: &positions,
                 material: Some(Material {
@@ -127,11 +130,11 @@ fn cubes_without_a_thickness_pass_nothing() {
         for frame in 0..60 {
             let report = world.step(1.0 / 60.0).expect("a step");
             assert_eq!(report.crossings, 0, "{young_modulus} Pa, {speed} m/s, frame {frame}");
-            let middles: Vec<f32> = world
+            let centers: Vec<f32> = world
                 .bodies()
                 .map(|body| body.positions().iter().map(|at| at.x).sum())
                 .collect();
-            closest = closest.min((middles[1] - middles[0]) / cube.positions.len() as f32);
+            closest = closest.min((centers[1] - centers[0]) / cube.positions.len() as f32);
         }
         assert!(closest < 0.36, "they did not meet: {closest}");
     }

@@ -1,4 +1,4 @@
-//! What contact is told and asked: ranges, what is refused, and what a step that a body could not take leaves to be read.
+//! Arguments of contact: valid ranges, refused values, and contact data after a body was rolled back.
 
 use crate::support::solid::cuboid;
 use crate::support::tissue::*;
@@ -8,21 +8,21 @@ use sinew::{
     ToolId, Values, World,
 };
 
-/// The furthest and the largest that tools and what keeps them off may be, m.
+/// The largest allowed coordinate, tool size and contact thickness (m).
 const FURTHEST: f32 = 1e9;
 
-/// What refuses, with the argument's name and its value; nothing has changed.
-fn assert_refused<T>(world: &mut World, ask: impl FnOnce(&mut World) -> Result<T>, says: &[&str]) {
+/// Checks that a call is refused with a message that contains `says`, and changes nothing.
+fn assert_refused<T>(world: &mut World, call: impl FnOnce(&mut World) -> Result<T>, expected: &[&str]) {
     let before = world.state_hash();
-    match ask(world).map(|_| ()) {
-        Err(Error::InvalidArgument(words)) => {
-            for part in says {
-                assert!(words.contains(part), "{words:?} says nothing of {part}");
+    match call(world).map(|_| ()) {
+        Err(Error::InvalidArgument(message)) => {
+            for part in expected {
+                assert!(message.contains(part), "{message:?} does not mention {part}");
             }
         }
-        other => panic!("{says:?}: {other:?}"),
+        other => panic!("{expected:?}: {other:?}"),
     }
-    assert_eq!(world.state_hash(), before, "{says:?}");
+    assert_eq!(world.state_hash(), before, "{expected:?}");
 }
 
 fn put(world: &mut World, shape: Shape, position: Vec3) -> Result<ToolId> {
@@ -46,22 +46,22 @@ fn cloth_of(world: &mut World, contact: BodyContact) -> Result<BodyId> {
 }
 
 #[test]
-fn nothing_is_further_or_larger_than_can_be_told_apart() {
+fn coordinates_and_sizes_beyond_the_limit_are_refused() {
     let mut world = world(Vec3::ZERO);
     cloth_of(&mut world, BodyContact::NOTHING).expect("a cloth");
     let ball = sphere(&mut world, 0.01, Vec3::Y);
     let beyond = FURTHEST.next_up();
     for far in [beyond, 1e20, f32::MAX, f32::INFINITY] {
         let value = far.to_string();
-        for place in [Vec3::X * far, Vec3::Y * -far, Vec3::new(0.0, 1.0, far)] {
+        for position in [Vec3::X * far, Vec3::Y * -far, Vec3::new(0.0, 1.0, far)] {
             assert_refused(
                 &mut world,
-                |world| put(world, Shape::Plane, place),
+                |world| put(world, Shape::Plane, position),
                 &["position", &value],
             );
             assert_refused(
                 &mut world,
-                |world| world.set_pose(ball, place, None),
+                |world| world.set_pose(ball, position, None),
                 &["position", &value],
             );
         }
@@ -89,7 +89,7 @@ fn nothing_is_further_or_larger_than_can_be_told_apart() {
             &["contact_thickness", &value],
         );
     }
-    // What lies on the border is there.
+    // Values at the limit are accepted.
     world.set_pose(ball, Vec3::splat(FURTHEST), None).expect("a pose");
     put(&mut world, Shape::Plane, Vec3::Y * -FURTHEST).expect("a plane");
     for detection in [Detection::Exact, Detection::ImageSpace] {
@@ -111,7 +111,7 @@ fn nothing_is_further_or_larger_than_can_be_told_apart() {
 }
 
 #[test]
-fn the_state_hash_knows_what_is_asked_of_contact() {
+fn the_state_hash_covers_contact_settings() {
     let hash = |contact: BodyContact| {
         let mut world = world(Vec3::ZERO);
         cloth_of(&mut world, contact).expect("a cloth");
@@ -154,13 +154,13 @@ fn the_state_hash_knows_what_is_asked_of_contact() {
 }
 
 #[test]
-fn a_body_that_is_put_back_touches_nothing_anew() {
+fn a_rolled_back_body_reports_no_new_contact() {
     let mut world = world_of(Vec3::ZERO, 1);
     let ball = sphere(&mut world, 0.01, Vec3::Y * 0.0105);
     let cloth = cloth_of(&mut world, BodyContact::NOTHING).expect("a cloth");
     pin_all(&mut world, cloth, &rim(5));
     world.set_pose(ball, Vec3::Y * 0.009, None).expect("a pose");
-    let told = |world: &World| {
+    let changes_and_count = |world: &World| {
         let changes: Vec<bool> = world.contact_changes().map(|change| change.has_begun).collect();
         (changes, world.contacts(ball).expect("a tool").count())
     };
@@ -173,28 +173,28 @@ fn a_body_that_is_put_back_touches_nothing_anew() {
         assert_eq!(report.bodies_restored, u32::from(breaks));
     };
     step(&mut world, false);
-    let (changes, count) = told(&world);
+    let (changes, count) = changes_and_count(&world);
     assert_eq!(changes, [true]);
     assert!(count > 0);
-    // It is as it was, and so is what it touches; contacts of a step that was not taken press nothing.
+    // The body and its contacts are as before. Contacts of a rolled-back step exert no force.
     for _ in 0..2 {
         step(&mut world, true);
-        assert_eq!(told(&world), (vec![], 0));
+        assert_eq!(changes_and_count(&world), (vec![], 0));
         assert_eq!(world.wrench(ball).expect("a tool").0, Vec3::ZERO);
     }
-    // It goes on as if nothing had been tried.
+    // Stepping continues as if the failed steps had never happened.
     world.set_pose(ball, Vec3::Y * 0.005, None).expect("a pose");
     step(&mut world, false);
-    let (changes, count) = told(&world);
+    let (changes, count) = changes_and_count(&world);
     assert_eq!(changes, []);
     assert!(count > 0);
     world.set_pose(ball, Vec3::Y, None).expect("a pose");
     step(&mut world, false);
-    assert_eq!(told(&world), (vec![false], 0));
+    assert_eq!(changes_and_count(&world), (vec![false], 0));
 }
 
 #[test]
-fn what_an_image_cannot_show_is_refused_by_its_name() {
+fn capsules_too_long_for_an_image_are_refused_by_name() {
     let mut world = world(Vec3::ZERO);
     for half_length in [1e3, 1e6, 0.9 * FURTHEST] {
         let definition = ToolDefinition {
@@ -205,8 +205,8 @@ fn what_an_image_cannot_show_is_refused_by_its_name() {
             })
         };
         let value = half_length.to_string();
-        let says = ["half_length", value.as_str(), "10000 times the radius"];
-        assert_refused(&mut world, |world| world.create_tool(&definition), &says);
+        let expected = ["half_length", value.as_str(), "10000 times the radius"];
+        assert_refused(&mut world, |world| world.create_tool(&definition), &expected);
     }
 }
 
@@ -228,17 +228,17 @@ fn mesh_tool(
 }
 
 #[test]
-fn what_is_too_coarse_for_a_mesh_is_refused() {
+fn a_resolution_too_coarse_for_a_mesh_is_refused() {
     let mut world = world(Vec3::ZERO);
     cloth_of(&mut world, BodyContact::NOTHING).expect("a cloth");
     let cube = cuboid(Vec3::splat(-0.02), Vec3::splat(0.02));
-    // Two at opposite corners, with nothing in the middle.
+    // Two cubes at opposite corners, with nothing in the middle.
     let mut pair = cuboid(Vec3::splat(-0.05), Vec3::splat(-0.03));
     let (more, others) = cuboid(Vec3::splat(0.03), Vec3::splat(0.05));
     pair.0.extend(more);
     pair.1
         .extend(others.iter().map(|triangle| triangle.map(|node| node + 8)));
-    for (solid, detection, resolution, says) in [
+    for (solid, detection, resolution, expected) in [
         (&cube, Detection::DistanceField, 0.045, "sample"),
         (&cube, Detection::DistanceField, 1.0, "sample"),
         (&cube, Detection::DistanceField, f32::MAX, "sample"),
@@ -247,9 +247,13 @@ fn what_is_too_coarse_for_a_mesh_is_refused() {
         (&cube, Detection::ImageSpace, 1e30, "ray"),
     ] {
         let value = format!("resolution is {resolution} m");
-        let says = [value.as_str(), says, "least extent is 0.", "a quarter"];
-        let way = (detection, resolution);
-        assert_refused(&mut world, |world| mesh_tool(world, solid, way, Vec3::Y), &says);
+        let expected = [value.as_str(), expected, "least extent is 0.", "a quarter"];
+        let detection_settings = (detection, resolution);
+        assert_refused(
+            &mut world,
+            |world| mesh_tool(world, solid, detection_settings, Vec3::Y),
+            &expected,
+        );
     }
     for (solid, detection, resolution) in [
         (&cube, Detection::DistanceField, 0.03),
@@ -262,31 +266,37 @@ fn what_is_too_coarse_for_a_mesh_is_refused() {
 }
 
 #[test]
-fn thin_tools_are_there_as_it_comes() {
+fn thin_tools_work_at_the_default_resolution() {
     for half in [Vec3::new(0.1, 0.00025, 0.005), Vec3::new(0.1, 0.0002, 0.0002)] {
         let mut world = world(Vec3::ZERO);
         let cloth = Tissue::CALM.put(&mut world, &square(0.1, 5));
         pin_all(&mut world, cloth, &rim(5));
-        let at = |depth: f32| Vec3::new(0.0013, half.y - depth, 0.0017);
-        let way = (Detection::DistanceField, 0.0);
-        let tool = mesh_tool(&mut world, &cuboid(-half, half), way, at(0.0)).expect("a tool");
+        let position_at = |depth: f32| Vec3::new(0.0013, half.y - depth, 0.0017);
+        let detection_settings = (Detection::DistanceField, 0.0);
+        let tool = mesh_tool(&mut world, &cuboid(-half, half), detection_settings, position_at(0.0)).expect("a tool");
         let mut push = 0.0;
         for step in 1..=10 {
-            world.set_pose(tool, at(2e-4 * step as f32), None).expect("a pose");
+            world
+                .set_pose(tool, position_at(2e-4 * step as f32), None)
+                .expect("a pose");
             world.step(1e-3).expect("a step");
             push += world.wrench(tool).expect("a tool").0.y;
         }
-        let lowest = body(&world, cloth).positions().iter().map(|place| place.y);
+        let lowest = body(&world, cloth).positions().iter().map(|position| position.y);
         let lowest = lowest.fold(0.0, f32::min);
         assert!(push > 0.0 && lowest < -1e-3, "{half}: {push} N, {lowest} m");
     }
-    // Cells as fine as that would be too many.
+    // A distance field with cells that fine would need too many samples.
     let mut world = world(Vec3::ZERO);
     let half = Vec3::new(0.1, 0.00025, 0.1);
     let plate = cuboid(-half, half);
-    let way = (Detection::DistanceField, 0.0);
-    let says = ["resolution is 0 m", "samples", "least extent is 0.0005 m"];
-    assert_refused(&mut world, |world| mesh_tool(world, &plate, way, Vec3::Y), &says);
+    let detection_settings = (Detection::DistanceField, 0.0);
+    let expected = ["resolution is 0 m", "samples", "least extent is 0.0005 m"];
+    assert_refused(
+        &mut world,
+        |world| mesh_tool(world, &plate, detection_settings, Vec3::Y),
+        &expected,
+    );
     for detection in [Detection::Exact, Detection::ImageSpace] {
         mesh_tool(&mut world, &plate, (detection, 0.0), Vec3::Y).expect("a plate");
     }

@@ -1,4 +1,4 @@
-//! Tools that are rigid bodies: weight, momentum and energy, light on heavy tissue and heavy on light.
+//! Dynamic tools: weight, momentum and energy, for light tools on heavy tissue and heavy tools on light tissue.
 
 use crate::support::hanging::nodes_at;
 use crate::support::scene::SOLVERS;
@@ -10,8 +10,8 @@ use sinew::{BodyDefinition, BodyId, MassProperties, Shape, Solver, ToolId, Value
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 const DT: f32 = 1.0 / 60.0;
 
-/// A ball of even density.
-fn of_ball(mass: f32, radius: f32) -> MassProperties {
+/// Returns the mass properties of a ball of uniform density.
+fn ball_properties(mass: f32, radius: f32) -> MassProperties {
     let moment = 0.4 * mass * radius * radius;
     MassProperties {
         mass,
@@ -22,7 +22,9 @@ fn of_ball(mass: f32, radius: f32) -> MassProperties {
 
 fn ball(world: &mut World, mass: f32, radius: f32, position: Vec3) -> ToolId {
     let ball = sphere(world, radius, position);
-    world.set_dynamic(ball, Some(&of_ball(mass, radius))).expect("a ball");
+    world
+        .set_dynamic(ball, Some(&ball_properties(mass, radius)))
+        .expect("a ball");
     ball
 }
 
@@ -32,7 +34,7 @@ fn steps(world: &mut World, dt: f32, count: usize) {
     }
 }
 
-/// A block of springs on a floor, or with its lowest nodes pinned.
+/// Creates a block of springs on a floor, or with its lowest nodes pinned.
 fn block(world: &mut World, solver: Solver, on_floor: bool) -> BodyId {
     let tissue = Tissue {
         mass: 0.5,
@@ -52,20 +54,20 @@ fn block(world: &mut World, solver: Solver, on_floor: bool) -> BodyId {
 }
 
 #[test]
-fn a_ball_comes_to_rest_on_tissue_with_its_weight() {
-    a_ball_comes_to_rest_on_tissue_with_its_weight_of(&SOLVERS[..2], &[(0.6, false)]);
+fn tissue_carries_the_weight_of_a_ball_at_rest() {
+    check_tissue_carries_the_weight_of_a_ball_at_rest(&SOLVERS[..2], &[(0.6, false)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_ball_comes_to_rest_on_tissue_with_its_weight_whatever_that_is() {
-    a_ball_comes_to_rest_on_tissue_with_its_weight_of(&SOLVERS[2..], &[(0.6, false)]);
-    a_ball_comes_to_rest_on_tissue_with_its_weight_of(&SOLVERS, &[(5e-6, true), (0.02, false), (0.6, true)]);
+fn a_ball_of_any_weight_comes_to_rest_on_tissue() {
+    check_tissue_carries_the_weight_of_a_ball_at_rest(&SOLVERS[2..], &[(0.6, false)]);
+    check_tissue_carries_the_weight_of_a_ball_at_rest(&SOLVERS, &[(5e-6, true), (0.02, false), (0.6, true)]);
 }
 
-/// Masses, kg, and whether the tissue lies on a floor.
-fn a_ball_comes_to_rest_on_tissue_with_its_weight_of(solvers: &[Solver], balls: &[(f32, bool)]) {
-    // 5.5 g a node: from a thousand times lighter than a node to heavier than the tissue.
+/// Each entry of `balls` is a mass (kg), and true if the tissue lies on a floor.
+fn check_tissue_carries_the_weight_of_a_ball_at_rest(solvers: &[Solver], balls: &[(f32, bool)]) {
+    // A node has 5.5 g. Tools range from a thousandth of a node's mass to more than the mass of the tissue.
     for &solver in solvers {
         for &(mass, on_floor) in balls {
             if solver == Solver::Newton && on_floor {
@@ -73,7 +75,7 @@ fn a_ball_comes_to_rest_on_tissue_with_its_weight_of(solvers: &[Solver], balls: 
             }
             let mut world = world(DOWN);
             let block = block(&mut world, solver, on_floor);
-            // A light ball dents nothing, and would roll off.
+            // A light ball makes no dent and would roll off.
             let shape = if mass < 0.1 {
                 Shape::Box {
                     half_extents: Vec3::splat(0.03),
@@ -83,7 +85,7 @@ fn a_ball_comes_to_rest_on_tissue_with_its_weight_of(solvers: &[Solver], balls: 
             };
             let ball = tool(&mut world, shape, 0.2, Vec3::new(0.003, 0.06, 0.002), Quat::IDENTITY);
             world
-                .set_dynamic(ball, Some(&of_ball(mass, 0.03)))
+                .set_dynamic(ball, Some(&ball_properties(mass, 0.03)))
                 .expect("a dynamic tool");
             let mut highest = 0.0_f32;
             for step in 0..240 {
@@ -103,7 +105,7 @@ fn a_ball_comes_to_rest_on_tissue_with_its_weight_of(solvers: &[Solver], balls: 
                 "{case}: {force} of {weight} N"
             );
             assert!(all_finite(body(&world, block)), "{case}");
-            // It may be pushed out for some steps more.
+            // The ball can still be pushed out for a few more steps.
             let deepest = penetration_of(&world, block, shape, ball);
             assert!(deepest < 2e-4, "{case}: {deepest} m deep");
         }
@@ -111,7 +113,7 @@ fn a_ball_comes_to_rest_on_tissue_with_its_weight_of(solvers: &[Solver], balls: 
 }
 
 #[test]
-fn a_ball_is_carried_by_thin_tissue_on_a_plane_however_heavy() {
+fn thin_tissue_on_a_plane_carries_a_ball_of_any_mass() {
     for (mass, dt) in [(0.5, 1.0 / 480.0), (0.5, DT), (50.0, DT), (50_000.0, DT)] {
         let mut world = world(DOWN);
         tool(&mut world, Shape::Plane, 0.5, Vec3::ZERO, Quat::IDENTITY);
@@ -137,15 +139,15 @@ fn a_ball_is_carried_by_thin_tissue_on_a_plane_however_heavy() {
         }
         let (force, _) = world.wrench(ball).expect("a ball");
         assert!((force.y - weight).abs() < 0.01 * weight, "{mass} kg: {force} N");
-        let across = world.pose(ball).expect("a ball").position.x;
-        assert!((across - 0.03).abs() < 0.01, "{mass} kg rolled to {across} m");
+        let final_x = world.pose(ball).expect("a ball").position.x;
+        assert!((final_x - 0.03).abs() < 0.01, "{mass} kg rolled to {final_x} m");
         assert!(kinetic(&world, sheet) < 1e-3, "{mass} kg");
     }
 }
 
-/// All momentum and angular momentum about the origin.
+/// Returns the total momentum and the angular momentum about the origin.
 fn momenta(world: &World, (block, node_mass): (BodyId, f32), (tool, mass): (ToolId, &MassProperties)) -> [DVec3; 2] {
-    let it = body(world, block);
+    let tissue = body(world, block);
     let pose = world.pose(tool).expect("a tool");
     let (velocity, spin) = world.tool_velocity(tool).expect("a tool");
     let center = pose.position.as_dvec3() + pose.orientation.as_dquat() * mass.center_of_mass.as_dvec3();
@@ -159,13 +161,13 @@ fn momenta(world: &World, (block, node_mass): (BodyId, f32), (tool, mass): (Tool
     let linear = velocity.as_dvec3() * f64::from(mass.mass);
     let angular = center.cross(linear) + pose.orientation.as_dquat() * own;
     [
-        momentum(it, node_mass) + linear,
-        angular_momentum(it, node_mass, DVec3::ZERO) + angular,
+        momentum(tissue, node_mass) + linear,
+        angular_momentum(tissue, node_mass, DVec3::ZERO) + angular,
     ]
 }
 
 #[test]
-fn a_free_body_and_a_tool_keep_their_momentum() {
+fn a_free_body_and_a_tool_conserve_momentum() {
     let shapes = [
         Shape::Sphere { radius: 0.02 },
         Shape::Capsule {
@@ -192,29 +194,32 @@ fn a_free_body_and_a_tool_keep_their_momentum() {
                 let block = tissue.put_for(solver, &mut world, &mesh);
                 let node_mass = tissue.node_mass(&mesh);
                 let turned = Quat::from_rotation_z(0.7);
-                let it = tool(&mut world, shape, friction, Vec3::new(0.012, 0.065, 0.004), turned);
-                let mass = world.mass_of_density(it, density).expect("a mass");
-                world.set_dynamic(it, Some(&mass)).expect("a dynamic tool");
+                let tool_id = tool(&mut world, shape, friction, Vec3::new(0.012, 0.065, 0.004), turned);
+                let mass = world.mass_of_density(tool_id, density).expect("a mass");
+                world.set_dynamic(tool_id, Some(&mass)).expect("a dynamic tool");
                 world
-                    .set_tool_velocity(it, Vec3::new(0.1, -0.5, 0.0), Vec3::new(2.0, 1.0, -3.0))
+                    .set_tool_velocity(tool_id, Vec3::new(0.1, -0.5, 0.0), Vec3::new(2.0, 1.0, -3.0))
                     .expect("a velocity");
-                let [linear, angular] = momenta(&world, (block, node_mass), (it, &mass));
-                let (mut given, mut turning) = (0.0, 0.0);
+                let [linear, angular] = momenta(&world, (block, node_mass), (tool_id, &mass));
+                let (mut impulse, mut angular_impulse) = (0.0, 0.0);
                 for _ in 0..20 {
                     world.step(DT).expect("a step");
-                    let (force, torque) = world.wrench(it).expect("a tool");
-                    given += f64::from(force.length() * DT);
-                    turning += f64::from((force.length() * 0.05 + torque.length()) * DT);
+                    let (force, torque) = world.wrench(tool_id).expect("a tool");
+                    impulse += f64::from(force.length() * DT);
+                    angular_impulse += f64::from((force.length() * 0.05 + torque.length()) * DT);
                 }
                 let case = format!("{solver:?}, {shape:?}, {density} kg/m3");
-                assert!(given > 1e-4, "{case}: not touched");
-                let [now, turned] = momenta(&world, (block, node_mass), (it, &mass));
-                let size = linear.length() + given;
-                // Sums over f32 velocities, and an implicit step to its own accuracy.
+                assert!(impulse > 1e-4, "{case}: not touched");
+                let [now, turned] = momenta(&world, (block, node_mass), (tool_id, &mass));
+                let size = linear.length() + impulse;
+                // The tolerance covers sums over f32 velocities and the accuracy of an implicit step.
                 assert!((now - linear).length() < 2e-5 * size, "{case}: {linear} to {now}");
-                // An arm is off by the way of a substep.
+                // The lever arm changes by the displacement of a substep.
                 let off = (turned - angular).length();
-                assert!(off < 0.02 * turning, "{case}: {angular} to {turned}, {turning}");
+                assert!(
+                    off < 0.02 * angular_impulse,
+                    "{case}: {angular} to {turned}, {angular_impulse}"
+                );
             }
         }
     }
@@ -232,25 +237,29 @@ fn two_bodies_share_the_momentum_of_a_tool() {
     let apart = [-0.032, 0.032].map(|x| moved(mesh.clone(), Vec3::X * x));
     let blocks = apart.map(|mesh| tissue.put(&mut world, &mesh));
     let radius = 0.02;
-    let it = ball(&mut world, 0.05, radius, Vec3::new(0.0, 0.038, 0.0));
+    let tool_id = ball(&mut world, 0.05, radius, Vec3::new(0.0, 0.038, 0.0));
     world
-        .set_tool_velocity(it, Vec3::Y * -1.0, Vec3::ZERO)
+        .set_tool_velocity(tool_id, Vec3::Y * -1.0, Vec3::ZERO)
         .expect("a velocity");
     let node_mass = tissue.node_mass(&mesh);
     for _ in 0..20 {
         world.step(DT).expect("a step");
-        let (velocity, _) = world.tool_velocity(it).expect("a ball");
+        let (velocity, _) = world.tool_velocity(tool_id).expect("a ball");
         let tissue: DVec3 = blocks
             .iter()
             .map(|&block| momentum(body(&world, block), node_mass))
             .sum();
         let all = tissue + velocity.as_dvec3() * 0.05;
         assert!((all - DVec3::Y * -0.05).length() < 2e-7, "{all} N s");
-        let of = |block| momentum(body(&world, block), node_mass);
-        // What lies left and right is the same, mirrored.
-        assert!((of(blocks[0]).y - of(blocks[1]).y).abs() < 1e-3, "{:?}", blocks.map(of));
+        let momentum_of = |block| momentum(body(&world, block), node_mass);
+        // The left and right halves mirror each other.
+        assert!(
+            (momentum_of(blocks[0]).y - momentum_of(blocks[1]).y).abs() < 1e-3,
+            "{:?}",
+            blocks.map(momentum_of)
+        );
     }
-    assert!(world.tool_velocity(it).expect("a ball").0.y > -0.3);
+    assert!(world.tool_velocity(tool_id).expect("a ball").0.y > -0.3);
 }
 
 #[test]
@@ -267,13 +276,13 @@ fn a_collision_gains_no_energy() {
             let mesh = Mesh::block([0.08, 0.04, 0.08], [4, 2, 4]).expect("a block");
             let block = tissue.put(&mut world, &mesh);
             let from = random.direction();
-            let properties = of_ball(mass, 0.015);
-            let it = ball(&mut world, mass, 0.015, from * 0.075);
+            let properties = ball_properties(mass, 0.015);
+            let tool_id = ball(&mut world, mass, 0.015, from * 0.075);
             world
-                .set_tool_velocity(it, -1.5 * from, random.vector() * 5.0)
+                .set_tool_velocity(tool_id, -1.5 * from, random.vector() * 5.0)
                 .expect("a velocity");
             let energy = |world: &World| {
-                let (velocity, spin) = world.tool_velocity(it).expect("a ball");
+                let (velocity, spin) = world.tool_velocity(tool_id).expect("a ball");
                 let own = mass * velocity.length_squared() + properties.inertia[0] * spin.length_squared();
                 total_energy(world, block) + 0.5 * f64::from(own)
             };
@@ -281,7 +290,7 @@ fn a_collision_gains_no_energy() {
             for step in 0..60 {
                 world.step(0.005).expect("a step");
                 let now = energy(&world);
-                // Kicks of the leapfrog and what is pushed out: a part of what the collision had.
+                // Leapfrog kicks and push-out add at most a fraction of the collision energy.
                 assert!(now < 1.01 * first, "{mass} kg, step {step}: {first} J to {now} J");
             }
         }
@@ -292,8 +301,8 @@ fn a_collision_gains_no_energy() {
 fn a_free_flight_is_a_parabola_and_keeps_its_spin() {
     let mut world = world(DOWN);
     let half_extents = Vec3::new(0.01, 0.03, 0.05);
-    let it = tool(&mut world, Shape::Box { half_extents }, 0.0, Vec3::ZERO, Quat::IDENTITY);
-    let mass = world.mass_of_density(it, 1e3).expect("a mass");
+    let tool_id = tool(&mut world, Shape::Box { half_extents }, 0.0, Vec3::ZERO, Quat::IDENTITY);
+    let mass = world.mass_of_density(tool_id, 1e3).expect("a mass");
     let volume = 8.0 * half_extents.element_product();
     assert!((mass.mass - 1e3 * volume).abs() < 1e-6 * mass.mass);
     for (axis, moment) in mass.inertia[..3].iter().enumerate() {
@@ -301,24 +310,26 @@ fn a_free_flight_is_a_parabola_and_keeps_its_spin() {
         let exact = mass.mass * squares / 3.0;
         assert!((moment - exact).abs() < 1e-5 * exact, "{moment} of {exact}");
     }
-    world.set_dynamic(it, Some(&mass)).expect("a dynamic tool");
+    world.set_dynamic(tool_id, Some(&mass)).expect("a dynamic tool");
     let (velocity, spin) = (Vec3::new(1.0, 2.0, 0.0), Vec3::new(0.1, 8.0, 0.1));
-    world.set_tool_velocity(it, velocity, spin).expect("a velocity");
+    world.set_tool_velocity(tool_id, velocity, spin).expect("a velocity");
     let momentum_of = |world: &World| {
-        let turn = world.pose(it).expect("a tool").orientation;
-        let spin = turn.inverse() * world.tool_velocity(it).expect("a tool").1;
+        let turn = world.pose(tool_id).expect("a tool").orientation;
+        let spin = turn.inverse() * world.tool_velocity(tool_id).expect("a tool").1;
         turn * (spin * Vec3::from_slice(&mass.inertia[..3]))
     };
     let first = momentum_of(&world);
     steps(&mut world, DT, 60);
-    let at = world.pose(it).expect("a tool").position;
+    let at = world.pose(tool_id).expect("a tool").position;
     assert!(at.distance(velocity + 0.5 * DOWN) < 1e-5, "at {at}");
     assert!(momentum_of(&world).distance(first) < 1e-5 * first.length());
-    // It tumbles: the middle axis is not one to turn about.
-    world.apply_wrench(it, mass.mass * -DOWN, Vec3::ZERO).expect("a force");
-    let before = world.tool_velocity(it).expect("a tool").0;
+    // The tool tumbles, because rotation about the intermediate axis is unstable.
+    world
+        .apply_wrench(tool_id, mass.mass * -DOWN, Vec3::ZERO)
+        .expect("a force");
+    let before = world.tool_velocity(tool_id).expect("a tool").0;
     world.step(DT).expect("a step");
-    let after = world.tool_velocity(it).expect("a tool").0;
+    let after = world.tool_velocity(tool_id).expect("a tool").0;
     assert!(
         after.distance(before) < 1e-6,
         "its weight is carried: {before} to {after}"
@@ -348,7 +359,7 @@ fn pinned_tissue_stops_a_dynamic_tool() {
     }
 }
 
-/// A scene with all in it: two bodies, a floor and two dynamic tools.
+/// Creates a scene with two bodies, a floor and two dynamic tools.
 fn scene(threads: u32) -> World {
     let mut world = World::new(WorldDefinition {
         thread_count: threads,
@@ -370,16 +381,16 @@ fn scene(threads: u32) -> World {
 
 #[test]
 fn a_dynamic_tool_is_the_same_for_any_number_of_threads_and_after_a_snapshot() {
-    a_dynamic_tool_is_the_same_for_any_number_of_threads_and_after_a_snapshot_of(6);
+    check_a_dynamic_tool_is_the_same_for_any_number_of_threads_and_after_a_snapshot(6);
 }
 
 #[test]
 #[ignore = "long"]
 fn a_dynamic_tool_is_the_same_for_any_number_of_threads_and_after_a_snapshot_for_long() {
-    a_dynamic_tool_is_the_same_for_any_number_of_threads_and_after_a_snapshot_of(40);
+    check_a_dynamic_tool_is_the_same_for_any_number_of_threads_and_after_a_snapshot(40);
 }
 
-fn a_dynamic_tool_is_the_same_for_any_number_of_threads_and_after_a_snapshot_of(steps: usize) {
+fn check_a_dynamic_tool_is_the_same_for_any_number_of_threads_and_after_a_snapshot(steps: usize) {
     let mut one = scene(1);
     let mut two = scene(2);
     for step in 0..steps {
@@ -399,89 +410,100 @@ fn a_tool_is_teleported_without_sweeping() {
     for is_dynamic in [false, true] {
         let mut world = world(Vec3::ZERO);
         let sheet = Tissue::VISCOUS.put(&mut world, &square(0.2, 10));
-        let it = sphere(&mut world, 0.02, Vec3::Y * 0.1);
+        let tool_id = sphere(&mut world, 0.02, Vec3::Y * 0.1);
         if is_dynamic {
-            world.set_dynamic(it, Some(&of_ball(0.1, 0.02))).expect("a ball");
             world
-                .set_tool_velocity(it, Vec3::X * 0.01, Vec3::ZERO)
+                .set_dynamic(tool_id, Some(&ball_properties(0.1, 0.02)))
+                .expect("a ball");
+            world
+                .set_tool_velocity(tool_id, Vec3::X * 0.01, Vec3::ZERO)
                 .expect("a velocity");
         }
         steps(&mut world, DT, 2);
-        world.teleport(it, Vec3::Y * -0.1, None).expect("teleported");
-        assert_eq!(world.pose(it).expect("a tool").position, Vec3::Y * -0.1);
+        world.teleport(tool_id, Vec3::Y * -0.1, None).expect("teleported");
+        assert_eq!(world.pose(tool_id).expect("a tool").position, Vec3::Y * -0.1);
         steps(&mut world, DT, 3);
-        assert_eq!(world.wrench(it).expect("a tool").0, Vec3::ZERO);
-        // Lengths at rest are rounded.
-        assert!(kinetic(&world, sheet) < 1e-10, "nothing was touched on the way");
+        assert_eq!(world.wrench(tool_id).expect("a tool").0, Vec3::ZERO);
+        // Rest lengths are rounded.
+        assert!(kinetic(&world, sheet) < 1e-10, "nothing may be touched in between");
         if is_dynamic {
-            assert_eq!(world.tool_velocity(it).expect("a ball").0, Vec3::X * 0.01);
+            assert_eq!(world.tool_velocity(tool_id).expect("a ball").0, Vec3::X * 0.01);
         }
     }
 }
 
 #[test]
-fn what_a_dynamic_tool_cannot_be_is_refused_and_changes_nothing() {
+fn invalid_dynamic_tools_are_refused_and_change_nothing() {
     let mut world = world(DOWN);
     let plane = tool(&mut world, Shape::Plane, 0.0, Vec3::ZERO, Quat::IDENTITY);
-    let it = sphere(&mut world, 0.02, Vec3::Y * 0.1);
+    let tool_id = sphere(&mut world, 0.02, Vec3::Y * 0.1);
     let cloth = Tissue::SOFT.put(&mut world, &moved(square(0.2, 4), Vec3::Y * 0.5));
     let first = world.state_hash();
-    let fine = of_ball(1.0, 0.02);
+    let valid = ball_properties(1.0, 0.02);
     let refused = [
-        MassProperties { mass: 0.0, ..fine },
-        MassProperties { mass: f32::NAN, ..fine },
-        MassProperties { mass: 1e13, ..fine },
+        MassProperties { mass: 0.0, ..valid },
+        MassProperties {
+            mass: f32::NAN,
+            ..valid
+        },
+        MassProperties { mass: 1e13, ..valid },
         MassProperties {
             center_of_mass: Vec3::splat(f32::INFINITY),
-            ..fine
+            ..valid
         },
         MassProperties {
             inertia: [0.0; 6],
-            ..fine
+            ..valid
         },
         MassProperties {
             inertia: [1.0, 1.0, 3.0, 0.0, 0.0, 0.0],
-            ..fine
+            ..valid
         },
         MassProperties {
             inertia: [1.0, 1.0, 1.0, 2.0, 0.0, 0.0],
-            ..fine
+            ..valid
         },
         MassProperties {
             inertia: [1.0, f32::NAN, 1.0, 0.0, 0.0, 0.0],
-            ..fine
+            ..valid
         },
     ];
     for properties in refused {
-        assert!(world.set_dynamic(it, Some(&properties)).is_err(), "{properties:?}");
+        assert!(world.set_dynamic(tool_id, Some(&properties)).is_err(), "{properties:?}");
     }
-    assert!(world.set_dynamic(plane, Some(&fine)).is_err());
+    assert!(world.set_dynamic(plane, Some(&valid)).is_err());
     assert!(world.mass_of_density(plane, 1e3).is_err());
-    assert!(world.mass_of_density(it, 0.0).is_err());
-    assert!(world.tool_velocity(it).is_err());
-    assert!(world.set_tool_velocity(it, Vec3::X, Vec3::ZERO).is_err());
-    assert!(world.apply_wrench(it, Vec3::X, Vec3::ZERO).is_err());
-    assert!(world.teleport(it, Vec3::NAN, None).is_err());
+    assert!(world.mass_of_density(tool_id, 0.0).is_err());
+    assert!(world.tool_velocity(tool_id).is_err());
+    assert!(world.set_tool_velocity(tool_id, Vec3::X, Vec3::ZERO).is_err());
+    assert!(world.apply_wrench(tool_id, Vec3::X, Vec3::ZERO).is_err());
+    assert!(world.teleport(tool_id, Vec3::NAN, None).is_err());
     assert_eq!(world.state_hash(), first);
-    let held = world.attach_node(cloth, 0, it, f32::INFINITY).expect("attached");
-    assert!(world.set_dynamic(it, Some(&fine)).is_err(), "it holds something");
-    assert!(world.teleport(it, Vec3::ZERO, None).is_err(), "it holds something");
+    let held = world.attach_node(cloth, 0, tool_id, f32::INFINITY).expect("attached");
+    assert!(
+        world.set_dynamic(tool_id, Some(&valid)).is_err(),
+        "nodes are attached to it"
+    );
+    assert!(
+        world.teleport(tool_id, Vec3::ZERO, None).is_err(),
+        "nodes are attached to it"
+    );
     world.release(held).expect("released");
-    world.set_dynamic(it, Some(&fine)).expect("a dynamic tool");
-    assert_eq!(world.mass_properties(it).expect("a tool"), Some(fine));
+    world.set_dynamic(tool_id, Some(&valid)).expect("a dynamic tool");
+    assert_eq!(world.mass_properties(tool_id).expect("a tool"), Some(valid));
     let first = world.state_hash();
-    assert!(world.set_pose(it, Vec3::ZERO, None).is_err());
-    assert!(world.attach_node(cloth, 0, it, f32::INFINITY).is_err());
-    assert!(world.set_tool_velocity(it, Vec3::NAN, Vec3::ZERO).is_err());
-    assert!(world.apply_wrench(it, Vec3::ZERO, Vec3::INFINITY).is_err());
+    assert!(world.set_pose(tool_id, Vec3::ZERO, None).is_err());
+    assert!(world.attach_node(cloth, 0, tool_id, f32::INFINITY).is_err());
+    assert!(world.set_tool_velocity(tool_id, Vec3::NAN, Vec3::ZERO).is_err());
+    assert!(world.apply_wrench(tool_id, Vec3::ZERO, Vec3::INFINITY).is_err());
     assert_eq!(world.state_hash(), first);
-    world.set_dynamic(it, None).expect("kinematic again");
-    world.set_pose(it, Vec3::ZERO, None).expect("a pose");
+    world.set_dynamic(tool_id, None).expect("kinematic again");
+    world.set_pose(tool_id, Vec3::ZERO, None).expect("a pose");
 }
 
-/// Nodes of very different masses, with the tool's own in between.
+/// The nodes have very different masses; the tool's mass lies between them.
 #[test]
-fn a_ball_of_any_mass_falls_on_a_sheet_of_heavy_nodes_and_is_not_flung() {
+fn a_ball_of_any_mass_that_falls_on_a_sheet_of_heavy_nodes_is_not_flung() {
     for mass in [1e-5, 0.03, 0.1, 1.0, 10.0] {
         let mut world = world(DOWN);
         let mesh = square(1.1, 11);
@@ -504,38 +526,46 @@ fn a_ball_of_any_mass_falls_on_a_sheet_of_heavy_nodes_and_is_not_flung() {
                 highest = highest.max(world.pose(ball).expect("a ball").position.y);
             }
         }
-        // Contact is without rebound; the sheet swings by what it fell.
+        // Contact has no rebound. The sheet swings by the energy of the fall.
         assert!(highest < 0.3, "{mass} kg: thrown to {highest} m");
     }
 }
 
 #[test]
-fn the_velocity_of_a_tool_changes_by_what_it_feels_as_an_engine_beside_needs_it() {
-    // The body of another engine: a spring of that engine pulls it up, and the tool takes its pose and velocity before each step.
+fn the_velocity_change_of_a_tool_matches_its_wrench_for_coupling_to_an_engine() {
+    // The body of another engine: a spring of that engine pulls it up, and the tool takes its pose and velocity before
+    // each step.
     let (mass, dt) = (0.05_f32, DT);
     let mut world = world(DOWN);
     let block = block(&mut world, Solver::Verlet, true);
-    let it = sphere(&mut world, 0.03, Vec3::Y * 0.06);
-    world.set_dynamic(it, Some(&of_ball(mass, 0.03))).expect("a ball");
-    let (mut place, mut velocity) = (Vec3::Y * 0.06, Vec3::ZERO);
+    let tool_id = sphere(&mut world, 0.03, Vec3::Y * 0.06);
+    world
+        .set_dynamic(tool_id, Some(&ball_properties(mass, 0.03)))
+        .expect("a ball");
+    let (mut position, mut velocity) = (Vec3::Y * 0.06, Vec3::ZERO);
     let mut force = Vec3::ZERO;
     for step in 0..240 {
-        let spring = (Vec3::Y * 0.1 - place) * 2.0 - velocity * 0.3;
-        world.teleport(it, place, None).expect("teleported");
-        world.set_tool_velocity(it, velocity, Vec3::ZERO).expect("a velocity");
-        world.apply_wrench(it, spring, Vec3::ZERO).expect("a force");
+        let spring = (Vec3::Y * 0.1 - position) * 2.0 - velocity * 0.3;
+        world.teleport(tool_id, position, None).expect("teleported");
+        world
+            .set_tool_velocity(tool_id, velocity, Vec3::ZERO)
+            .expect("a velocity");
+        world.apply_wrench(tool_id, spring, Vec3::ZERO).expect("a force");
         world.step(dt).expect("a step");
-        let after = world.tool_velocity(it).expect("a ball").0;
-        force = world.wrench(it).expect("a ball").0;
+        let after = world.tool_velocity(tool_id).expect("a ball").0;
+        force = world.wrench(tool_id).expect("a ball").0;
         let impulse = (after - velocity - DOWN * dt) * mass - spring * dt;
         assert!(
             impulse.distance(force * dt) < 1e-5 * mass,
             "step {step}: {impulse} of {force}"
         );
-        (place, velocity) = (world.pose(it).expect("a ball").position, after);
+        (position, velocity) = (world.pose(tool_id).expect("a ball").position, after);
     }
-    let carried = mass * 9.81 - 2.0 * (0.1 - place.y);
+    let carried = mass * 9.81 - 2.0 * (0.1 - position.y);
     assert!((force.y - carried).abs() < 0.01 * carried, "{force} of {carried} N");
-    assert!(velocity.length() < 2e-3 && place.y < 0.055, "{velocity} m/s at {place}");
+    assert!(
+        velocity.length() < 2e-3 && position.y < 0.055,
+        "{velocity} m/s at {position}"
+    );
     assert!(all_finite(body(&world, block)));
 }

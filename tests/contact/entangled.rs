@@ -1,4 +1,4 @@
-//! Sheets that were made through each other.
+//! Sheets that pass through each other when they are created.
 
 use crate::support::hanging::nodes_at;
 use crate::support::tissue::*;
@@ -10,7 +10,7 @@ const SIZE: [f32; 2] = [0.2, 0.04];
 const CELLS: [u32; 2] = [10, 2];
 const CELL: f32 = 0.02;
 
-/// A ribbon along the x axis, held at its ends, and one that stands upright in it.
+/// Creates a ribbon along the x axis that is pinned at its ends, and an upright ribbon that passes through it.
 fn ribbons(world: &mut World, thickness: f32, solver: Solver) -> [BodyId; 2] {
     let lying = Mesh::cloth(SIZE, CELLS).expect("a ribbon");
     let mut standing = lying.clone();
@@ -45,19 +45,19 @@ fn middle(world: &World, id: BodyId) -> Vec3 {
 }
 
 #[test]
-fn a_ribbon_that_was_made_through_another_falls_freely() {
+fn a_ribbon_created_through_another_falls_freely() {
     const GRAVITY: f32 = 9.81;
-    for (part, solver) in [
+    for (thickness_ratio, solver) in [
         (0.0, Solver::Verlet),
         (0.1, Solver::Verlet),
         (0.2, Solver::Verlet),
         (0.2, Solver::Implicit),
     ] {
         let mut world = world(Vec3::new(0.0, -GRAVITY, 0.0));
-        let [held, falling] = ribbons(&mut world, part * CELL, solver);
+        let [held, falling] = ribbons(&mut world, thickness_ratio * CELL, solver);
         let start = middle(&world, falling).y;
         let report = world.step(1e-3).expect("a step");
-        assert!(report.crossings > 0, "they were to cross");
+        assert!(report.crossings > 0, "the ribbons must cross");
         assert!(
             [Some(held), Some(falling)].contains(&report.crossing_body),
             "{report:?}"
@@ -66,21 +66,21 @@ fn a_ribbon_that_was_made_through_another_falls_freely() {
         for _ in 0..499 {
             crossings = world.step(1e-3).expect("a step").crossings;
         }
-        assert_eq!(crossings, 0, "{solver:?}, thickness {part}");
-        let way = start - middle(&world, falling).y;
+        assert_eq!(crossings, 0, "{solver:?}, thickness {thickness_ratio}");
+        let fallen = start - middle(&world, falling).y;
         let free = 0.5 * GRAVITY * 0.5 * 0.5;
         assert!(
-            (way - free).abs() < 0.01 * free,
-            "{solver:?}, thickness {part}: fell {way} m of {free}"
+            (fallen - free).abs() < 0.01 * free,
+            "{solver:?}, thickness {thickness_ratio}: fell {fallen} m of {free}"
         );
     }
 }
 
 #[test]
-fn ribbons_that_have_come_out_of_each_other_keep_each_other_off_again() {
-    for part in [0.1, 0.2] {
+fn ribbons_collide_again_after_they_have_separated() {
+    for thickness_ratio in [0.1, 0.2] {
         let mut world = world(Vec3::ZERO);
-        let [_, thrown] = ribbons(&mut world, part * CELL, Solver::Verlet);
+        let [_, thrown] = ribbons(&mut world, thickness_ratio * CELL, Solver::Verlet);
         let throw = |world: &mut World, speed: f32| {
             let velocities = vec![Vec3::new(0.0, speed, 0.0); body(world, thrown).node_count()];
             let thrown = world.body_mut(thrown).expect("a body");
@@ -94,12 +94,23 @@ fn ribbons_that_have_come_out_of_each_other_keep_each_other_off_again() {
             let positions = body(world, thrown).positions();
             positions.iter().fold(f32::NEG_INFINITY, |highest, p| highest.max(p.y))
         };
-        assert!(highest(&world) < -0.01, "it was to be out: {}", highest(&world));
+        assert!(
+            highest(&world) < -0.01,
+            "the ribbon must have separated: {}",
+            highest(&world)
+        );
         throw(&mut world, 1.0);
-        // Far enough to pass as a whole, were nothing there.
+        // This is enough to pass completely if nothing were in the way.
         for _ in 0..300 {
-            assert_eq!(world.step(1e-3).expect("a step").crossings, 0, "thickness {part}");
+            assert_eq!(
+                world.step(1e-3).expect("a step").crossings,
+                0,
+                "thickness {thickness_ratio}"
+            );
         }
-        assert!(middle(&world, thrown).y < 0.0, "thickness {part}: it passed");
+        assert!(
+            middle(&world, thrown).y < 0.0,
+            "thickness {thickness_ratio}: it passed through"
+        );
     }
 }

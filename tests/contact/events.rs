@@ -1,13 +1,13 @@
-//! Contact of bodies with each other begins and ends, each once.
+//! Contact events between bodies: each contact begins once and ends once.
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
 use sinew::{BodyContact, BodyDefinition, BodyId, Error, Sleep, Solver, Values, World, WorldDefinition};
 
-/// A block of 4 cm that meets others, with its middle here.
+/// Creates a block of 4 cm with its center at `at`. It collides with other bodies and with itself.
 fn block(world: &mut World, at: Vec3, speed: f32, solver: Solver, sleep: Sleep) -> BodyId {
     let mesh = Mesh::block([0.04; 3], [3; 3]).expect("a block");
-    let positions: Vec<Vec3> = mesh.positions.iter().map(|&place| place + at).collect();
+    let positions: Vec<Vec3> = mesh.positions.iter().map(|&position| position + at).collect();
     let body = world
         .create_body(&BodyDefinition {
             positions: &positions,
@@ -41,7 +41,7 @@ fn world(gravity: f32) -> World {
     .expect("a world")
 }
 
-/// The events of a step, the lower body first.
+/// Returns the events of a step; `bodies` has the lower id first.
 fn events(world: &World, bodies: [BodyId; 2]) -> Vec<bool> {
     let changes = world.body_contact_changes().map(|change| {
         assert_eq!(change.bodies, bodies);
@@ -51,47 +51,54 @@ fn events(world: &World, bodies: [BodyId; 2]) -> Vec<bool> {
 }
 
 #[test]
-fn blocks_that_bounce_begin_to_touch_once_and_cease_once() {
+fn bouncing_blocks_begin_and_end_contact_once() {
     for solvers in [
         [Solver::Verlet; 2],
         [Solver::Implicit; 2],
         [Solver::Verlet, Solver::Implicit],
     ] {
         let mut world = world(0.0);
-        let places = [Vec3::new(-0.03, 0.0, 0.0), Vec3::new(0.03, 0.002, 0.001)];
+        let positions = [Vec3::new(-0.03, 0.0, 0.0), Vec3::new(0.03, 0.002, 0.001)];
         let bodies = [0, 1].map(|side| {
             let speed = [0.5, -0.5][side];
-            block(&mut world, places[side], speed, solvers[side], Sleep::default())
+            block(&mut world, positions[side], speed, solvers[side], Sleep::default())
         });
-        let (mut touch, mut seen) = (false, Vec::new());
+        let (mut in_contact, mut all_events) = (false, Vec::new());
         for step in 0..200 {
             world.step(1e-3).expect("a step");
             let events = events(&world, bodies);
             for &has_begun in &events {
-                assert_ne!(has_begun, touch, "{solvers:?}, step {step}");
-                touch = has_begun;
+                assert_ne!(has_begun, in_contact, "{solvers:?}, step {step}");
+                in_contact = has_begun;
             }
             let contacts = world.tissue_contacts(bodies[0]).expect("a body");
             let others = contacts.filter(|contact| contact.body == bodies[1]).count();
-            assert!(touch || others == 0, "{solvers:?}, step {step}: what presses touches");
-            seen.extend(events);
-            // A world that was saved tells the same.
-            if touch && step % 7 == 0 {
+            assert!(
+                in_contact || others == 0,
+                "{solvers:?}, step {step}: what presses touches"
+            );
+            all_events.extend(events);
+            // A saved world returns the same events.
+            if in_contact && step % 7 == 0 {
                 let loaded = World::load(&world.save().expect("bytes"), 1, None).expect("a world");
                 let both = [&world, &loaded].map(|world| world.body_contact_changes().collect::<Vec<_>>());
                 assert_eq!(both[0], both[1]);
             }
         }
         assert_eq!(
-            (seen.first(), seen.last(), seen.len() % 2),
+            (all_events.first(), all_events.last(), all_events.len() % 2),
             (Some(&true), Some(&false), 0)
         );
-        assert!(seen.len() <= 4, "{solvers:?}: {} events of a bounce", seen.len());
+        assert!(
+            all_events.len() <= 4,
+            "{solvers:?}: {} events of a bounce",
+            all_events.len()
+        );
     }
 }
 
 #[test]
-fn a_block_that_rests_goes_on_touching_also_where_it_sleeps() {
+fn a_resting_block_stays_in_contact_while_asleep() {
     let sleep = Sleep { speed: 5e-3, time: 0.1 };
     for solver in [Solver::Verlet, Solver::Implicit] {
         let mut world = world(-10.0);
@@ -101,10 +108,10 @@ fn a_block_that_rests_goes_on_touching_also_where_it_sleeps() {
             .filter(|&node| lower.positions()[node as usize].y < -0.019)
             .collect();
         ground.iter().for_each(|&node| lower.pin(node).expect("a node"));
-        let mut seen = Vec::new();
+        let mut all_events = Vec::new();
         for _ in 0..300 {
             world.step(5e-3).expect("a step");
-            seen.extend(events(&world, bodies));
+            all_events.extend(events(&world, bodies));
         }
         assert!(
             bodies
@@ -113,13 +120,13 @@ fn a_block_that_rests_goes_on_touching_also_where_it_sleeps() {
             "{solver:?}"
         );
         assert_eq!(world.tissue_contacts(bodies[0]).expect("a body").count(), 0, "asleep");
-        let sum = seen
+        let sum = all_events
             .iter()
             .map(|&has_begun| if has_begun { 1 } else { -1 })
             .sum::<i32>();
-        assert_eq!(sum, 1, "{solver:?}: {seen:?}");
+        assert_eq!(sum, 1, "{solver:?}: {all_events:?}");
 
-        // A step that is refused tells nothing new, and with what is destroyed nothing ceases.
+        // A refused step returns no new events. Destroying a body produces no end events.
         world.body_mut(bodies[1]).expect("a body").wake();
         world.set_substeps(1, 1).expect("substeps");
         if solver == Solver::Verlet {
@@ -134,7 +141,7 @@ fn a_block_that_rests_goes_on_touching_also_where_it_sleeps() {
 }
 
 #[test]
-fn a_block_that_is_lifted_off_ceases_to_touch() {
+fn lifting_a_block_ends_its_contact() {
     let mut world = world(0.0);
     let bodies = [0.0, 0.0402].map(|y| block(&mut world, Vec3::Y * y, 0.0, Solver::Verlet, Sleep::default()));
     let push = |world: &mut World, speed: f32| {
@@ -142,17 +149,17 @@ fn a_block_that_is_lifted_off_ceases_to_touch() {
         let velocities = vec![Vec3::Y * speed; upper.node_count()];
         upper.set_velocities(&velocities).expect("velocities");
     };
-    let mut seen = Vec::new();
+    let mut all_events = Vec::new();
     for step in 0..120 {
         if step % 40 == 0 {
             push(&mut world, if step == 40 { 0.3 } else { -0.1 });
         }
         world.step(1e-3).expect("a step");
-        seen.extend(events(&world, bodies));
+        all_events.extend(events(&world, bodies));
     }
-    assert_eq!(seen.first(), Some(&true));
-    assert!(seen.contains(&false));
-    for pair in seen.windows(2) {
+    assert_eq!(all_events.first(), Some(&true));
+    assert!(all_events.contains(&false));
+    for pair in all_events.windows(2) {
         assert_ne!(pair[0], pair[1]);
     }
 }

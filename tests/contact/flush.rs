@@ -1,4 +1,4 @@
-//! Bodies that are made flush, beside each other, with thicknesses that reach into one another.
+//! Bodies that are created flush with each other, with overlapping contact thicknesses.
 
 use crate::support::tissue::*;
 use glam::Vec3;
@@ -9,7 +9,7 @@ use sinew::{Anchor, BodyContact, BodyDefinition, BodyId, Solver, Values, Viscosi
 const SIDE: f32 = 0.8;
 const MASS: f32 = 2.7;
 
-/// Two cubes side by side, of which the second reaches into the first by `overlap`, m.
+/// Creates two cubes side by side. The second overlaps the first by `overlap` (m).
 fn cubes(world: &mut World, solver: Solver, overlap: f32) -> ([BodyId; 2], Mesh) {
     let mesh = Mesh::block([SIDE; 3], [2; 3]).expect("a block");
     let ids = [0.0, SIDE - overlap].map(|x| {
@@ -47,19 +47,19 @@ fn energy(world: &World, ids: [BodyId; 2]) -> f64 {
 }
 
 #[test]
-fn cubes_that_begin_flush_gain_no_energy_where_one_moves_into_the_other() {
-    cubes_that_begin_flush_gain_no_energy_where_one_moves_into_the_other_of(Solver::Verlet);
+fn flush_cubes_gain_no_energy_when_one_moves_into_the_other() {
+    check_flush_cubes_gain_no_energy_when_one_moves_into_the_other(Solver::Verlet);
 }
 
 #[test]
 #[ignore = "long"]
-fn cubes_that_begin_flush_gain_no_energy_where_one_moves_into_the_other_implicit() {
-    cubes_that_begin_flush_gain_no_energy_where_one_moves_into_the_other_of(Solver::Implicit);
+fn flush_cubes_gain_no_energy_when_one_moves_into_the_other_implicit() {
+    check_flush_cubes_gain_no_energy_when_one_moves_into_the_other(Solver::Implicit);
 }
 
-fn cubes_that_begin_flush_gain_no_energy_where_one_moves_into_the_other_of(solver: Solver) {
+fn check_flush_cubes_gain_no_energy_when_one_moves_into_the_other(solver: Solver) {
     for are_attached in [false, true] {
-        let what = format!("{solver:?}, attached: {are_attached}");
+        let case = format!("{solver:?}, attached: {are_attached}");
         let mut world = world(Vec3::ZERO);
         let (ids, mesh) = cubes(&mut world, solver, 0.0);
         if are_attached {
@@ -80,21 +80,21 @@ fn cubes_that_begin_flush_gain_no_energy_where_one_moves_into_the_other_of(solve
         for index in 0..120 {
             world.step(1.0 / 60.0).expect("a step");
             let now = energy(&world, ids);
-            assert!(now <= start * (1.0 + 1e-3), "{what}, step {index}: {now} J of {start}");
+            assert!(now <= start * (1.0 + 1e-3), "{case}, step {index}: {now} J of {start}");
         }
         let node_mass = MASS / mesh.positions.len() as f32;
         let momentum: glam::DVec3 = ids.iter().map(|&id| momentum(body(&world, id), node_mass)).sum();
-        let off = (momentum - glam::DVec3::new(1.5, 0.0, 0.0)).length();
-        assert!(off < 1e-4, "{what}: momentum {momentum}");
+        let error = (momentum - glam::DVec3::new(1.5, 0.0, 0.0)).length();
+        assert!(error < 1e-4, "{case}: momentum {momentum}");
     }
 }
 
 #[test]
-fn cubes_that_are_flush_but_for_rounding_are_parted_no_faster_than_is_said() {
+fn nearly_flush_cubes_separate_no_faster_than_documented() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let mut world = world(Vec3::ZERO);
         let (ids, _) = cubes(&mut world, solver, 2e-5);
-        // What began too close is moved apart by 0.3 of an extent in a second at most.
+        // Bodies that start too close are moved apart by at most 0.3 of their extent per second.
         let bound = 2.0 * 0.5 * f64::from(MASS * (0.3 * SIDE).powi(2));
         for index in 0..60 {
             world.step(1.0 / 60.0).expect("a step");

@@ -1,4 +1,4 @@
-//! Scenes that nobody should make, and somebody will.
+//! Extreme contact scenes that a program should not make but some will.
 
 use crate::support::tissue::*;
 use glam::{Quat, Vec3};
@@ -7,25 +7,25 @@ use sinew::{BodyDefinition, Pose, Shape, ToolId, Values, World};
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
-fn felt(world: &World, tool: ToolId) -> f32 {
+fn force_on(world: &World, tool: ToolId) -> f32 {
     let (force, torque) = world.wrench(tool).expect("a tool");
     assert!(force.is_finite() && torque.is_finite(), "{force}, {torque}");
     force.length()
 }
 
 #[test]
-fn a_tool_made_inside_pushes_the_body_out_of_it() {
-    a_tool_made_inside_pushes_the_body_out_of_it_of(1.0 / 60.0);
+fn a_tool_created_inside_a_body_pushes_the_body_out() {
+    check_a_tool_created_inside_a_body_pushes_the_body_out(1.0 / 60.0);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_tool_made_inside_pushes_the_body_out_of_it_in_short_steps() {
-    a_tool_made_inside_pushes_the_body_out_of_it_of(0.001);
+fn a_tool_created_inside_a_body_pushes_the_body_out_in_short_steps() {
+    check_a_tool_created_inside_a_body_pushes_the_body_out(0.001);
 }
 
-fn a_tool_made_inside_pushes_the_body_out_of_it_of(dt: f32) {
-    for (radius, place) in [
+fn check_a_tool_created_inside_a_body_pushes_the_body_out(dt: f32) {
+    for (radius, target) in [
         (0.02, Vec3::ZERO),
         (0.02, Vec3::new(0.03, 0.01, 0.02)),
         (0.005, Vec3::new(0.001, 0.002, 0.003)),
@@ -38,14 +38,14 @@ fn a_tool_made_inside_pushes_the_body_out_of_it_of(dt: f32) {
         let mut world = world(Vec3::ZERO);
         let mesh = Mesh::block([0.08, 0.08, 0.08], [6, 6, 6]).expect("a block");
         let block = tissue.put(&mut world, &mesh);
-        let ball = sphere(&mut world, radius, place);
-        // What stretching all springs by the ball's size would take is more than any clean way out.
+        let ball = sphere(&mut world, radius, target);
+        // Stretching all springs by the diameter of the ball takes more energy than any clean push-out.
         let springs = mesh.edges().expect("edges").len() as f64;
         let bound = 0.5 * f64::from(tissue.stiffness) * springs * f64::from(2.0 * radius).powi(2);
         for step in 0..(1.0 / dt) as u32 {
             let report = world.step(dt).expect("a step");
             assert_eq!(report.bodies_restored, 0);
-            felt(&world, ball);
+            force_on(&world, ball);
             let energy = total_energy(&world, block);
             assert!(
                 energy <= bound,
@@ -55,24 +55,27 @@ fn a_tool_made_inside_pushes_the_body_out_of_it_of(dt: f32) {
         let deepest = body(&world, block)
             .positions()
             .iter()
-            .map(|position| radius - position.distance(place))
+            .map(|position| radius - position.distance(target))
             .fold(f32::NEG_INFINITY, f32::max);
-        assert!(deepest < 0.001, "radius {radius} at {place}, dt {dt}: {deepest} m deep");
+        assert!(
+            deepest < 0.001,
+            "radius {radius} at {target}, dt {dt}: {deepest} m deep"
+        );
     }
 }
 
 #[test]
 fn a_body_crushed_between_tools_recovers() {
-    a_body_crushed_between_tools_recovers_of(1.0 / 60.0);
+    check_a_body_crushed_between_tools_recovers(1.0 / 60.0);
 }
 
 #[test]
 #[ignore = "long"]
 fn a_body_crushed_between_tools_recovers_in_short_steps() {
-    a_body_crushed_between_tools_recovers_of(0.002);
+    check_a_body_crushed_between_tools_recovers(0.002);
 }
 
-fn a_body_crushed_between_tools_recovers_of(dt: f32) {
+fn check_a_body_crushed_between_tools_recovers(dt: f32) {
     for planes in [true, false] {
         let tissue = Tissue {
             drag: 5.0,
@@ -87,26 +90,26 @@ fn a_body_crushed_between_tools_recovers_of(dt: f32) {
         } else {
             (Shape::Sphere { radius: 0.08 }, 0.08)
         };
-        let place = |gap: f32, side: f32| Vec3::Y * side * (0.5 * gap + reach);
-        let over = Quat::from_rotation_x(std::f32::consts::PI);
-        let below = tool(&mut world, shape, 0.5, place(0.061, -1.0), Quat::IDENTITY);
-        let above = tool(&mut world, shape, 0.5, place(0.061, 1.0), over);
+        let position = |gap: f32, side: f32| Vec3::Y * side * (0.5 * gap + reach);
+        let upside_down = Quat::from_rotation_x(std::f32::consts::PI);
+        let below = tool(&mut world, shape, 0.5, position(0.061, -1.0), Quat::IDENTITY);
+        let above = tool(&mut world, shape, 0.5, position(0.061, 1.0), upside_down);
         let steps = (0.5 / dt) as u32;
         for step in 0..3 * steps {
-            // Together to a tenth of a millimetre, hold, apart.
+            // The tools move together to a tenth of a millimeter, hold, and move apart.
             let part = (step as f32 / steps as f32).min(1.0);
             let gap = if step < 2 * steps { 0.061 - 0.0609 * part } else { 0.2 };
-            world.set_pose(below, place(gap, -1.0), None).expect("a pose");
-            world.set_pose(above, place(gap, 1.0), None).expect("a pose");
+            world.set_pose(below, position(gap, -1.0), None).expect("a pose");
+            world.set_pose(above, position(gap, 1.0), None).expect("a pose");
             let report = world
                 .step(dt)
                 .unwrap_or_else(|error| panic!("dt {dt}, planes {planes}, step {step}: {error}"));
             assert_eq!(report.bodies_restored, 0, "step {step}");
-            let most = felt(&world, below).max(felt(&world, above));
-            // All springs pressed flat, all at once, pull less than that.
-            assert!(most < 1e4, "dt {dt}, planes {planes}, step {step}: {most} N");
+            let largest = force_on(&world, below).max(force_on(&world, above));
+            // All springs compressed flat at once pull with less than that.
+            assert!(largest < 1e4, "dt {dt}, planes {planes}, step {step}: {largest} N");
         }
-        assert_eq!((felt(&world, below), felt(&world, above)), (0.0, 0.0));
+        assert_eq!((force_on(&world, below), force_on(&world, above)), (0.0, 0.0));
         assert!(kinetic(&world, block) < 0.1, "{}", kinetic(&world, block));
     }
 }
@@ -118,20 +121,20 @@ fn a_capsule_without_length_is_a_sphere() {
         let cloth = Tissue::VISCOUS.put(&mut world, &square(0.2, 10));
         pin_all(&mut world, cloth, &rim(10));
         let tip = tool(&mut world, shape, 0.4, Vec3::new(0.013, 0.012, 0.007), Quat::IDENTITY);
-        let mut seen = Vec::new();
+        let mut states = Vec::new();
         for step in 0..150 {
-            let way = Vec3::new(0.0001, -0.0003, 0.0) * step as f32;
-            let turned = Quat::from_rotation_z(0.02 * step as f32);
+            let displacement = Vec3::new(0.0001, -0.0003, 0.0) * step as f32;
+            let rotation = Quat::from_rotation_z(0.02 * step as f32);
             world
-                .set_pose(tip, Vec3::new(0.013, 0.012, 0.007) + way, Some(turned))
+                .set_pose(tip, Vec3::new(0.013, 0.012, 0.007) + displacement, Some(rotation))
                 .expect("a pose");
             world.step(0.003).expect("a step");
-            seen.push((
+            states.push((
                 world.wrench(tip).expect("a tool").0,
                 body(&world, cloth).positions().to_vec(),
             ));
         }
-        seen
+        states
     };
     let radius = 0.01;
     let as_sphere = run(Shape::Sphere { radius });
@@ -144,8 +147,9 @@ fn a_capsule_without_length_is_a_sphere() {
 }
 
 #[test]
-fn far_from_the_origin_a_tool_feels_the_same() {
-    // All poses are whole steps of 1/1024 m, which a float still holds there: the same motion in the body's coordinates.
+fn forces_are_the_same_far_from_the_origin() {
+    // All poses are multiples of 1/1024 m, which floats represent exactly even far away, so the motion in body
+    // coordinates is the same.
     let run = |offset: Vec3| {
         let mut world = world(DOWN);
         let cloth = Tissue::CALM.put(&mut world, &moved(square(0.25, 16), offset));
@@ -161,16 +165,18 @@ fn far_from_the_origin_a_tool_feels_the_same() {
         }
         forces
     };
-    let here = run(Vec3::ZERO);
-    let most = here.iter().fold(0.0_f32, |most, force| most.max(force.length()));
-    assert!(most > 0.02, "{most}");
+    let at_origin = run(Vec3::ZERO);
+    let largest = at_origin
+        .iter()
+        .fold(0.0_f32, |largest, force| largest.max(force.length()));
+    assert!(largest > 0.02, "{largest}");
     for offset in [Vec3::new(1024.0, 0.0, -1024.0), Vec3::new(-8192.0, 8192.0, 8192.0)] {
-        let there = run(offset);
-        for (step, (here, there)) in here.iter().zip(&there).enumerate() {
-            let off = here.distance(*there);
+        let offset_forces = run(offset);
+        for (step, (at_origin, offset_forces)) in at_origin.iter().zip(&offset_forces).enumerate() {
+            let error = at_origin.distance(*offset_forces);
             assert!(
-                off < 0.01 * most,
-                "at {offset}, step {step}: {there}, at the origin {here}"
+                error < 0.01 * largest,
+                "at {offset}, step {step}: {offset_forces}, at the origin {at_origin}"
             );
         }
     }
@@ -189,13 +195,13 @@ fn pinned_nodes_stay_in_a_tool() {
             .set_pose(ball, Vec3::Y * (0.005 - 0.001 * step as f32), None)
             .expect("a pose");
         world.step(0.01).expect("a step");
-        felt(&world, ball);
+        force_on(&world, ball);
     }
     assert!(body(&world, cloth).positions() == mesh.positions);
 }
 
 #[test]
-fn one_second_frames_are_finite() {
+fn steps_of_one_second_stay_finite() {
     for substeps in [0, 2000] {
         let mut world = World::new(sinew::WorldDefinition {
             substeps,
@@ -207,22 +213,22 @@ fn one_second_frames_are_finite() {
         let plane = tool(&mut world, Shape::Plane, 0.3, Vec3::ZERO, Quat::IDENTITY);
         let ball = sphere(&mut world, 0.03, Vec3::new(0.0, 0.3, 0.0));
         for step in 0..6 {
-            let place = Vec3::new(0.0, if step % 2 == 0 { 0.05 } else { 0.3 }, 0.0);
-            world.set_pose(ball, place, None).expect("a pose");
+            let position = Vec3::new(0.0, if step % 2 == 0 { 0.05 } else { 0.3 }, 0.0);
+            world.set_pose(ball, position, None).expect("a pose");
             let report = world.step(1.0).expect("a step");
             assert_eq!(report.bodies_restored, 0);
-            assert!(felt(&world, plane) + felt(&world, ball) < 1e4);
+            assert!(force_on(&world, plane) + force_on(&world, ball) < 1e4);
             assert!(penetration_of(&world, cloth, Shape::Plane, plane) < 1e-4);
         }
     }
 }
 
 #[test]
-fn a_tool_that_is_restored_from_a_blown_up_body_goes_on() {
-    // The body is put back, the tool has moved, the other body has stepped, and the next step is finite.
+fn a_tool_keeps_working_after_a_body_is_rolled_back() {
+    // The body is rolled back, the tool has moved, the other body has stepped, and the next step is finite.
     let mut world = world_of(Vec3::ZERO, 1);
     let ball = sphere(&mut world, 0.01, Vec3::ZERO);
-    let hurt = world
+    let exploding = world
         .create_body(&BodyDefinition {
             positions: &[Vec3::Y * 0.5],
             masses: Values::Uniform(1e-30),
@@ -231,32 +237,32 @@ fn a_tool_that_is_restored_from_a_blown_up_body_goes_on() {
         .expect("a body");
     let cloth = Tissue::SOFT.put(&mut world, &moved(square(0.1, 6), Vec3::Y * -0.02));
     world
-        .body_mut(hurt)
+        .body_mut(exploding)
         .expect("a body")
         .apply_force(0, Vec3::Y * 1e30)
         .expect("a force");
     world.set_pose(ball, Vec3::Y * -0.015, None).expect("a pose");
     let report = world.step(0.001).expect("a step");
-    assert_eq!((report.bodies_restored, report.restored_body), (1, Some(hurt)));
-    assert_eq!(body(&world, hurt).positions(), &[Vec3::Y * 0.5]);
+    assert_eq!((report.bodies_restored, report.restored_body), (1, Some(exploding)));
+    assert_eq!(body(&world, exploding).positions(), &[Vec3::Y * 0.5]);
     assert_eq!(world.pose(ball).expect("a tool").position, Vec3::Y * -0.015);
-    assert!(felt(&world, ball) > 0.0);
+    assert!(force_on(&world, ball) > 0.0);
     assert_eq!(world.step(0.001).expect("a step").bodies_restored, 0);
     assert!(all_finite(body(&world, cloth)));
 }
 
 #[test]
-fn random_tools_that_jump_about() {
-    random_tools_that_jump_about_of(20);
+fn randomly_jumping_tools_stay_stable() {
+    check_randomly_jumping_tools_stay_stable(20);
 }
 
 #[test]
 #[ignore = "long"]
-fn random_tools_that_jump_about_for_long() {
-    random_tools_that_jump_about_of(60);
+fn randomly_jumping_tools_stay_stable_for_long() {
+    check_randomly_jumping_tools_stay_stable(60);
 }
 
-fn random_tools_that_jump_about_of(steps: usize) {
+fn check_randomly_jumping_tools_stay_stable(steps: usize) {
     let mut random = Random::new(11);
     let mut world = world(DOWN);
     let organ = Mesh::organ(0.2, 0.024).expect("an organ");
@@ -283,15 +289,15 @@ fn random_tools_that_jump_about_of(steps: usize) {
                     half_length: random.between(0.0, 0.08),
                 },
             };
-            let place = random.vector() * 0.2 - Vec3::Y * if index == 0 { 0.3 } else { 0.0 };
+            let target = random.vector() * 0.2 - Vec3::Y * if index == 0 { 0.3 } else { 0.0 };
             (
-                tool(&mut world, shape, random.between(0.0, 1.0), place, Quat::IDENTITY),
+                tool(&mut world, shape, random.between(0.0, 1.0), target, Quat::IDENTITY),
                 shape,
             )
         })
         .collect();
     let before = bodies.map(|id| total_energy(&world, id));
-    let mut given = 0.0_f64;
+    let mut work = 0.0_f64;
     for step in 0..steps {
         let dt = [0.004, 1.0 / 60.0, 1.0 / 30.0][random.below(3)];
         let poses: Vec<Pose> = tools
@@ -321,24 +327,24 @@ fn random_tools_that_jump_about_of(steps: usize) {
             Err(error) => panic!("step {step}: {error}"),
         }
         for (&(tool, _), from) in tools.iter().zip(&poses) {
-            felt(&world, tool);
+            force_on(&world, tool);
             let to = world.pose(tool).expect("a tool");
             let (force, torque) = world.wrench(tool).expect("a tool");
             let change = to.orientation * from.orientation.conjugate();
             let turn = if change.w < 0.0 { -change } else { change }.to_scaled_axis();
-            given -= f64::from(force.dot(to.position - from.position) + torque.dot(turn));
+            work -= f64::from(force.dot(to.position - from.position) + torque.dot(turn));
         }
-        // Contact takes energy, never gives: what there is came from the tools. Some is lost in the tools' turns,
-        // which a mean torque does not show, and in what is pushed out where a tool and a pin leave no room.
+        // Contact only dissipates energy, so all energy comes from the tools. The tolerance covers work of rotations,
+        // which a mean torque does not capture, and push-out where a tool and a pin leave no space.
         let mut gained = 0.0;
         for (&id, before) in bodies.iter().zip(before) {
             assert!(all_finite(body(&world, id)));
             gained += total_energy(&world, id) - before;
         }
-        assert!(gained < 1.2 * given + 1.0, "step {step}: {gained} J of {given} J");
-        // 0.52 m and 0.08 m by 3.1 rad in 4 ms are 192 m/s; what slips out of a wedge between two tools is faster, four
-        // times at 15 degrees: 59 kJ for 0.2 kg.
+        assert!(gained < 1.2 * work + 1.0, "step {step}: {gained} J of {work} J");
+        // A tool that moves 0.52 m and turns a lever of 0.08 m by 3.1 rad in 4 ms reaches 192 m/s. Tissue squeezed out
+        // of a wedge of 15 degrees between two tools is four times faster: 59 kJ for 0.2 kg.
         assert!(gained < 59e3, "step {step}: {gained} J");
     }
-    assert!(given > 0.0);
+    assert!(work > 0.0);
 }

@@ -1,4 +1,4 @@
-//! Contact in image space, against brute force in `f64`.
+//! Contact in image space, compared with brute force in `f64`.
 
 use crate::support::solid::{ball, real};
 use glam::{DVec3, Quat, Vec3};
@@ -9,14 +9,14 @@ use sinew::detection::image_space::{
 };
 use sinew::mesh::{ClosedSurface, Mesh};
 
-/// Half the diagonal of a pixel: how far a point can be from the ray in the middle of its pixel.
+/// Half the diagonal of a pixel, in pixels: the largest distance of a point from the ray at the center of its pixel.
 const HALF_DIAGONAL: f64 = 0.7072;
 
-/// A small generator with a fixed seed (xorshift64*).
+/// A generator of pseudo-random numbers with a fixed seed (xorshift64*).
 struct Random(u64);
 
 impl Random {
-    /// From 0 to 1.
+    /// Returns a number from 0 to 1.
     fn unit(&mut self) -> f32 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -24,7 +24,7 @@ impl Random {
         (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 40) as f32 / (1 << 24) as f32
     }
 
-    /// From -1 to 1 along each axis.
+    /// Returns a vector with coordinates from -1 to 1.
     fn vector(&mut self) -> Vec3 {
         Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
     }
@@ -39,7 +39,7 @@ impl Random {
     }
 }
 
-/// Nodes and triangles.
+/// A mesh: nodes and triangles.
 #[derive(Clone)]
 struct Shape {
     positions: Vec<Vec3>,
@@ -47,7 +47,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// Of radius 1.
+    /// Returns a ball of radius 1.
     fn sphere(cuts: u32) -> Self {
         let Mesh {
             positions, triangles, ..
@@ -55,7 +55,7 @@ impl Shape {
         Self { positions, triangles }
     }
 
-    /// A ball with dents and bumps.
+    /// Returns a ball with dents and bumps.
     fn bumpy(cuts: u32) -> Self {
         Self::sphere(cuts)
             .moved(|p| p * (1.0 + 0.15 * (5.0 * p.x).sin() * (4.0 * p.y + 1.0).cos() + 0.1 * (6.0 * p.z).sin()))
@@ -66,7 +66,7 @@ impl Shape {
         Self { positions, triangles }
     }
 
-    /// A grid of 2 x 2 m in the plane z = 0.
+    /// Returns a grid of 2 x 2 m in the plane z = 0.
     fn grid(cells: u32) -> Self {
         let row = cells + 1;
         let at =
@@ -102,7 +102,7 @@ impl Shape {
         cones.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
     }
 
-    /// How the volume changes with each node.
+    /// Returns the derivative of the volume with respect to each node.
     fn volume_gradient(&self) -> Vec<DVec3> {
         let mut gradient = vec![DVec3::ZERO; self.positions.len()];
         for &triangle in &self.triangles {
@@ -114,16 +114,16 @@ impl Shape {
         gradient
     }
 
-    /// The signed distance of a point by all triangles: the side by the solid angle that they cover.
+    /// Returns the signed distance of a point from all triangles. The sign comes from the solid angle that they cover.
     fn distance(&self, point: DVec3) -> f64 {
         let (mut least, mut angle) = (f64::MAX, 0.0);
         for &triangle in &self.triangles {
             let [a, b, c] = self.corners(triangle).map(|corner| corner - point);
             least = least.min(distance_to_origin([a, b, c]));
-            // Van Oosterom and Strackee 1983.
+            // The solid angle (van Oosterom and Strackee 1983).
             let [la, lb, lc] = [a, b, c].map(DVec3::length);
-            let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-            angle += 2.0 * a.dot(b.cross(c)).atan2(below);
+            let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+            angle += 2.0 * a.dot(b.cross(c)).atan2(denominator);
         }
         if angle > std::f64::consts::TAU { -least } else { least }
     }
@@ -164,7 +164,7 @@ fn placed<'a>(surface: &'a Surface, shape: &'a Shape) -> Placed<'a> {
     }
 }
 
-/// Whether a point of an edge, given as a fraction, lies in a part of it that was found; a little next to one counts.
+/// Returns true if a point of an edge, given as a fraction, lies in or just beside a detected part of the edge.
 fn is_found(overlap: &Overlap, side: usize, edge: usize, share: f64) -> bool {
     let parts = overlap.inside[side]
         .edges
@@ -175,7 +175,7 @@ fn is_found(overlap: &Overlap, side: usize, edge: usize, share: f64) -> bool {
         .any(|part| f64::from(part.entry) - 1e-5 <= share && share <= f64::from(part.exit) + 1e-5)
 }
 
-/// The slope of log(error) against log(size), by least squares.
+/// Returns the slope of log(error) against log(size), by least squares.
 fn order(sizes: &[f64], errors: &[f64]) -> f64 {
     let mean = |values: &[f64]| values.iter().map(|v| v.ln()).sum::<f64>() / values.len() as f64;
     let (x, y) = (mean(sizes), mean(errors));
@@ -184,23 +184,24 @@ fn order(sizes: &[f64], errors: &[f64]) -> f64 {
 }
 
 #[test]
-fn edges_of_a_grid_enter_and_leave_a_ball_where_they_do_to_first_order() {
+fn entry_and_exit_of_grid_edges_in_a_ball_converge_with_first_order() {
     let ball = Shape::sphere(5);
-    // Through the ball, turned so that nothing is along a view.
+    // The grid passes through the ball, rotated so that no edge is parallel to a view.
     let turn = Quat::from_euler(glam::EulerRot::XYZ, 0.4, 0.3, 0.2);
     let grid = Shape::grid(24).moved(|p| turn * (p * 1.3 + Vec3::new(0.02, -0.03, 0.15)));
     let (occluder, other) = (ball.closed(), grid.open());
-    // Where the line through an edge passes the sphere; the mesh lies within it by less than this.
+    // The positions where the line through an edge crosses the sphere. The mesh lies inside the sphere by less than
+    // `flatness`.
     let flatness = 3e-4;
-    let passes: Vec<_> = other
+    let crossings: Vec<_> = other
         .edges()
         .iter()
         .map(|edge| {
             let [a, b] = edge.map(|node| grid.positions[node as usize].as_dvec3());
             let along = b - a;
             let (half, square) = (-a.dot(along) / along.length_squared(), along.length_squared());
-            let rest = half * half - (a.length_squared() - 1.0) / square;
-            (a, along, half, rest.max(0.0).sqrt())
+            let half_chord = half * half - (a.length_squared() - 1.0) / square;
+            (a, along, half, half_chord.max(0.0).sqrt())
         })
         .collect();
     let (mut pixels, mut errors) = (Vec::new(), Vec::new());
@@ -223,7 +224,7 @@ fn edges_of_a_grid_enter_and_leave_a_ball_where_they_do_to_first_order() {
         assert!((pixel * f64::from(parts) - 2.0).abs() < 1e-6);
         let bound = HALF_DIAGONAL * pixel;
         let (mut sum, mut count) = (0.0, 0);
-        for (edge, &(start, along, half, rest)) in passes.iter().enumerate() {
+        for (edge, &(start, along, half, half_chord)) in crossings.iter().enumerate() {
             for i in 0..=16 {
                 let share = f64::from(i) / 16.0;
                 let depth = 1.0 - (start + along * share).length();
@@ -237,9 +238,9 @@ fn edges_of_a_grid_enter_and_leave_a_ball_where_they_do_to_first_order() {
                     "1/{parts}: edge {edge} at {share}, {depth} m deep, found"
                 );
             }
-            // Ends that cross the sphere at no flat angle.
-            let slope = rest * along.length();
-            for (share, is_entry) in [(half - rest, true), (half + rest, false)] {
+            // Ends that cross the sphere at a steep angle.
+            let slope = half_chord * along.length();
+            for (share, is_entry) in [(half - half_chord, true), (half + half_chord, false)] {
                 if slope < 0.5 || !(0.1..0.9).contains(&share) {
                     continue;
                 }
@@ -268,9 +269,9 @@ fn edges_of_a_grid_enter_and_leave_a_ball_where_they_do_to_first_order() {
 
 #[test]
 fn the_volume_of_half_a_ball_and_its_gradient_converge() {
-    // Symmetric about z = 0, down to which a box covers it.
+    // The ball is symmetric about z = 0, and a box covers its lower half.
     let ball = Shape::sphere(4).moved(|p| p + Vec3::new(0.013, 0.007, 0.0));
-    // The whole section lies in the triangle 4 7 6 of its upper side.
+    // The whole section lies in the triangle 4 7 6 of the box's upper side.
     let half_space = Shape::cuboid(Vec3::new(-1.5, -8.0, -3.0), Vec3::new(8.0, 1.5, 0.0));
     let surfaces = [ball.closed(), half_space.closed()];
     let exact = ball.volume() / 2.0;
@@ -288,7 +289,7 @@ fn the_volume_of_half_a_ball_and_its_gradient_converge() {
         let pixel = f64::from(overlap.pixel);
         let error = (overlap.volume - exact).abs() / exact;
         assert!(error < pixel, "1/{parts}: {error}");
-        // The ball is pushed straight up, by its volume over the area of its section.
+        // The ball is pushed straight up by its volume divided by the area of its section.
         let section = std::f64::consts::PI;
         assert!(
             overlap.normal.dot(Vec3::Z) > 1.0 - pixel as f32,
@@ -300,9 +301,9 @@ fn the_volume_of_half_a_ball_and_its_gradient_converge() {
         let sums = [0, 1].map(|side| overlap.gradients[side].iter().sum::<DVec3>());
         assert!(
             (sums[0] + sums[1]).length() < 0.1 * pixel,
-            "moved together they keep it: {sums:?}"
+            "a common translation must not change the volume: {sums:?}"
         );
-        // The section's middle shares it among the corners.
+        // The gradient is distributed to the corners by the barycentric coordinates of the section's center.
         let [a, b, c] = half_space.corners([4, 7, 6]);
         let middle = DVec3::new(0.013, 0.007, 0.0);
         let area = (b - a).cross(c - a).z;
@@ -321,13 +322,13 @@ fn the_volume_of_half_a_ball_and_its_gradient_converge() {
 }
 
 #[test]
-fn the_gradient_is_that_of_the_volume_node_by_node() {
+fn the_gradient_of_each_node_is_the_derivative_of_the_volume() {
     let body = Shape::bumpy(2);
-    let around = Shape::cuboid(Vec3::splat(-2.0), Vec3::splat(2.0));
-    let surfaces = [body.closed(), around.closed()];
+    let enclosing = Shape::cuboid(Vec3::splat(-2.0), Vec3::splat(2.0));
+    let surfaces = [body.closed(), enclosing.closed()];
     let mut detector = detector(2.0 / 512.0, Views::Axes, Form::Intervals, &[&surfaces[0], &surfaces[1]]);
     let overlap = detector
-        .detect(&[placed(&surfaces[0], &body), placed(&surfaces[1], &around)])
+        .detect(&[placed(&surfaces[0], &body), placed(&surfaces[1], &enclosing)])
         .expect("an overlap");
     assert!((overlap.volume / body.volume() - 1.0).abs() < 1e-3);
     let exact = body.volume_gradient();
@@ -341,7 +342,7 @@ fn the_gradient_is_that_of_the_volume_node_by_node() {
 }
 
 #[test]
-fn edges_that_point_at_the_viewer_are_missed_where_edges_are_drawn_and_found_from_the_side() {
+fn edges_along_the_view_are_missed_by_counting_and_found_from_the_side() {
     let block = Shape::cuboid(Vec3::splat(-1.0), Vec3::splat(1.0));
     let rod = Shape::cuboid(Vec3::new(-0.3, -0.35, -3.0), Vec3::new(0.32, 0.31, 3.0));
     let surfaces = [block.closed(), rod.closed()];
@@ -370,7 +371,7 @@ fn edges_that_point_at_the_viewer_are_missed_where_edges_are_drawn_and_found_fro
 }
 
 #[test]
-fn of_edges_drawn_into_the_same_pixel_the_nearest_alone_is_counted() {
+fn only_the_nearest_edge_in_a_pixel_is_counted() {
     let block = Shape::cuboid(Vec3::splat(-1.0), Vec3::splat(1.0));
     let inside = [
         Vec3::new(-0.5, 0.013, 0.0),
@@ -400,17 +401,17 @@ fn of_edges_drawn_into_the_same_pixel_the_nearest_alone_is_counted() {
 }
 
 #[test]
-fn a_plate_thinner_than_a_pixel_is_found_by_its_thickness_or_by_intervals() {
+fn a_plate_thinner_than_a_pixel_is_detected_with_a_thickness_or_by_intervals() {
     let pixel = 1.0 / 64.0;
     let plate = Shape::cuboid(Vec3::new(-1.0, -1.0, 0.1), Vec3::new(1.0, 1.0, 0.1 + pixel / 10.0));
-    // Slanted needles, each one triangle of two long edges and one short.
+    // Slanted needles; each is a triangle with two long edges and a short one.
     let mut random = Random(3);
     let mut needles = Shape {
         positions: Vec::new(),
         triangles: Vec::new(),
     };
     for needle in 0..50 {
-        // Side by side, so that none hides another.
+        // Side by side, so that no needle hides another.
         let foot = Vec3::new(0.6 * random.unit(), needle as f32 / 30.0 - 0.8, -0.5);
         let tip = foot + Vec3::new(0.3, 0.0, 1.2);
         needles.positions.extend([foot, foot + Vec3::X * 0.01, tip]);
@@ -440,34 +441,35 @@ fn a_plate_thinner_than_a_pixel_is_found_by_its_thickness_or_by_intervals() {
     assert_eq!(needles_found(above, Form::Counted, 3.0 * pixel), 50);
     assert_eq!(needles_found(above, Form::Intervals, 0.0), 50);
     assert_eq!(needles_found(Views::Axes, Form::Intervals, 0.0), 50);
-    // Edge on the image is one pixel high, cropped to the plate, and its rays run through the middle of it.
+    // Seen edge on, the image is one pixel high and cropped to the plate, and its rays pass through the middle of the
+    // plate.
     assert_eq!(needles_found(Views::Along(Vec3::X), Form::Intervals, 0.0), 50);
 }
 
 #[test]
-fn from_anywhere_hardly_an_edge_is_missed_and_none_that_is_deeper_than_a_ray_is_off() {
+fn few_edges_are_missed_from_random_views_and_none_deeper_than_a_ray_offset() {
     let shapes = [
         Shape::bumpy(3),
         Shape::bumpy(2).moved(|p| Quat::from_rotation_x(1.0) * p * 0.8 + Vec3::new(0.9, 0.5, 0.3)),
     ];
     let surfaces = shapes.each_ref().map(Shape::closed);
-    // The signed distance of points along all edges from the other body.
+    // The signed distances of points along all edges from the other body.
     const STEPS: usize = 8;
     let depths = [0, 1].map(|side| {
         let edges = surfaces[side].edges().iter();
-        let of_edge = |edge: &[u32; 2]| {
+        let depths_along = |edge: &[u32; 2]| {
             let [a, b] = edge.map(|node| shapes[side].positions[node as usize].as_dvec3());
             let depth = |i: usize| -shapes[1 - side].distance(a.lerp(b, i as f64 / STEPS as f64));
             std::array::from_fn::<f64, { STEPS + 1 }, _>(depth)
         };
-        edges.map(of_edge).collect::<Vec<_>>()
+        edges.map(depths_along).collect::<Vec<_>>()
     });
     let pixel = 2.0 / 256.0;
     let bound = HALF_DIAGONAL * f64::from(pixel);
     let mut random = Random(9);
     let [mut drawn, mut missed] = [0, 0];
     for _ in 0..10 {
-        // As described, along three axes that are turned against the bodies.
+        // Form::Counted, along three axes that are rotated relative to the bodies.
         let turn = Quat::from_axis_angle(random.direction(), 3.0 * random.unit());
         let turned = shapes.clone().map(|shape| shape.moved(|p| turn * p));
         let mut counted = detector(pixel, Views::Axes, Form::Counted, &[&surfaces[0], &surfaces[1]]);
@@ -490,7 +492,7 @@ fn from_anywhere_hardly_an_edge_is_missed_and_none_that_is_deeper_than_a_ray_is_
                 missed += usize::from(deepest > 0.0 && !found[edge]);
             }
         }
-        // By intervals, from one side.
+        // Form::Intervals, from one side.
         let views = Views::Along(random.direction());
         let mut traced = detector(pixel, views, Form::Intervals, &[&surfaces[0], &surfaces[1]]);
         let bodies = [0, 1].map(|side| placed(&surfaces[side], &shapes[side]));
@@ -513,7 +515,7 @@ fn from_anywhere_hardly_an_edge_is_missed_and_none_that_is_deeper_than_a_ray_is_
                     "node {node} of {side}: {depth} m deep, missed"
                 );
                 if let Some(point) = found {
-                    // The way out along the view is no shorter than the shortest.
+                    // The push-out path along the view is no shorter than the shortest.
                     assert!(
                         depth > -bound && f64::from(point.depth) > depth - bound,
                         "{point:?}: {depth}"
@@ -526,7 +528,7 @@ fn from_anywhere_hardly_an_edge_is_missed_and_none_that_is_deeper_than_a_ray_is_
 }
 
 #[test]
-fn distances_from_a_layered_image_are_those_of_the_faces_but_for_a_pixel() {
+fn distances_from_a_layered_image_are_exact_to_a_pixel() {
     for (shape, parts) in [(Shape::bumpy(4), 128), (Shape::sphere(2), 64), (Shape::bumpy(3), 256)] {
         let pixel = 2.4 / parts as f32;
         let image = LayeredImage::new(&shape.positions, &shape.triangles, pixel).expect("a closed surface");
@@ -545,7 +547,7 @@ fn distances_from_a_layered_image_are_those_of_the_faces_but_for_a_pixel() {
             sum += error;
             count += 1;
             assert!((normal.length() - 1.0).abs() < 1e-4);
-            // Along the normal the distance grows.
+            // The distance increases along the normal.
             let step = 0.05 * f64::from(pixel);
             let ahead = shape.distance(point.as_dvec3() + normal.as_dvec3() * step);
             assert!(
@@ -563,7 +565,7 @@ fn distances_from_a_layered_image_are_those_of_the_faces_but_for_a_pixel() {
     }
 }
 
-/// A block with a groove in its upper side, `width` at the top and `depth` deep.
+/// Creates a block with a groove in its upper side. The groove is `width` wide at the top and `depth` deep.
 fn grooved(width: f32, depth: f32) -> Shape {
     let profile = [
         [0.1, 0.5 - depth],
@@ -580,7 +582,7 @@ fn grooved(width: f32, depth: f32) -> Shape {
     for corner in 0..count {
         let next = (corner + 1) % count;
         triangles.extend([[corner, next, next + count], [corner, next + count, corner + count]]);
-        // The bottom of the groove sees all of the ends.
+        // The end faces are fans of triangles from the bottom of the groove.
         if corner > 0 && next > 0 {
             triangles.extend([[0, next, corner], [count, corner + count, next + count]]);
         }
@@ -594,7 +596,7 @@ fn grooved(width: f32, depth: f32) -> Shape {
 }
 
 #[test]
-fn what_is_below_a_groove_narrower_than_a_pixel_is_not_deep_inside() {
+fn points_below_a_groove_narrower_than_a_pixel_are_not_deep_inside() {
     let pixel = 0.02;
     let mut random = Random(77);
     for (width, depth) in [(0.6, 8.0), (0.3, 15.0), (1.5, 5.0)] {
@@ -617,7 +619,7 @@ fn what_is_below_a_groove_narrower_than_a_pixel_is_not_deep_inside() {
 }
 
 #[test]
-fn organs_are_seen_as_they_are_but_for_a_pixel() {
+fn organs_are_represented_to_within_a_pixel() {
     for name in ["stomach.stl", "liver_collision.stl"] {
         let Some(mesh) = real(name, 1e-3) else {
             continue;
@@ -625,7 +627,7 @@ fn organs_are_seen_as_they_are_but_for_a_pixel() {
         let surface = ClosedSurface::new(&mesh.positions, &mesh.triangles).expect(name);
         let exact = Exact::new(&surface).expect("a solid");
         let [low, high] =
-            [Vec3::min, Vec3::max].map(|most| mesh.positions.iter().copied().reduce(most).expect("nodes"));
+            [Vec3::min, Vec3::max].map(|pick| mesh.positions.iter().copied().reduce(pick).expect("nodes"));
         let pixel = (high - low).max_element() / 256.0;
         let image = LayeredImage::new(surface.positions(), surface.triangles(), pixel).expect("a closed surface");
         let mut random = Random(77);
@@ -648,7 +650,7 @@ fn organs_are_seen_as_they_are_but_for_a_pixel() {
 }
 
 #[test]
-fn the_nearest_face_of_a_ball_is_found_from_deep_inside_and_from_beside() {
+fn the_nearest_face_of_a_ball_is_found_from_inside_and_outside() {
     let ball = Shape::sphere(4);
     let pixel = 2.0 / 256.0;
     let image = LayeredImage::new(&ball.positions, &ball.triangles, pixel).expect("a closed surface");
@@ -667,7 +669,7 @@ fn the_nearest_face_of_a_ball_is_found_from_deep_inside_and_from_beside() {
 }
 
 #[test]
-fn pixels_grow_where_memory_would_not_do() {
+fn pixels_grow_if_memory_is_insufficient() {
     let shapes = [Shape::bumpy(3), Shape::bumpy(3).moved(|p| p + Vec3::X)];
     let surfaces = shapes.each_ref().map(Shape::closed);
     let bodies = [0, 1].map(|side| placed(&surfaces[side], &shapes[side]));
@@ -691,39 +693,39 @@ fn pixels_grow_where_memory_would_not_do() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused_by_name() {
+fn invalid_surfaces_and_definitions_are_refused_by_name() {
     let ball = Shape::sphere(2);
-    let said = |result: Result<(), Error>, words: &[&str]| match result {
+    let assert_refused = |result: Result<(), Error>, words: &[&str]| match result {
         Err(Error::InvalidArgument(message)) => {
             assert!(words.iter().all(|word| message.contains(word)), "{message}");
         }
         other => panic!("{other:?}"),
     };
     let open = &ball.triangles[1..];
-    said(Surface::closed(ball.positions.len(), open).map(drop), &["not closed"]);
-    said(LayeredImage::new(&ball.positions, open, 0.1).map(drop), &["not closed"]);
-    said(
+    assert_refused(Surface::closed(ball.positions.len(), open).map(drop), &["not closed"]);
+    assert_refused(LayeredImage::new(&ball.positions, open, 0.1).map(drop), &["not closed"]);
+    assert_refused(
         Surface::closed(5, &ball.triangles).map(drop),
         &["names node", "there are 5"],
     );
-    said(Surface::open(0, &[]).map(drop), &["triangles"]);
+    assert_refused(Surface::open(0, &[]).map(drop), &["triangles"]);
     for pixel in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        said(
+        assert_refused(
             LayeredImage::new(&ball.positions, &ball.triangles, pixel).map(drop),
             &["pixel", &pixel.to_string()],
         );
-        said(
+        assert_refused(
             ImageSpace::new(&ImageSpaceDefinition::new(pixel), &[]).map(drop),
             &["pixel"],
         );
     }
-    said(
+    assert_refused(
         LayeredImage::new(&ball.positions, &ball.triangles, 1e-6).map(drop),
         &["pixel", "16777216"],
     );
     let mut broken = ball.clone();
     broken.positions[7].y = f32::NAN;
-    said(
+    assert_refused(
         LayeredImage::new(&broken.positions, &broken.triangles, 0.1).map(drop),
         &["node 7"],
     );
@@ -733,17 +735,17 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         views: Views::Along(Vec3::ZERO),
         ..definition
     };
-    said(ImageSpace::new(&along_nothing, &[]).map(drop), &["view"]);
+    assert_refused(ImageSpace::new(&along_nothing, &[]).map(drop), &["view"]);
     let too_many = ImageSpaceDefinition {
         pixels: u32::MAX,
         ..definition
     };
-    said(ImageSpace::new(&too_many, &[]).map(drop), &["pixels", "4294967295"]);
+    assert_refused(ImageSpace::new(&too_many, &[]).map(drop), &["pixels", "4294967295"]);
     let surfaces = [ball.closed(), ball.open()];
     let mut detector = ImageSpace::new(&definition, &[&surfaces[0]]).expect("a detector");
     let [closed, sheet] = surfaces.each_ref().map(|surface| placed(surface, &ball));
-    said(detector.detect(&[sheet, sheet]).map(drop), &["open"]);
-    said(
+    assert_refused(detector.detect(&[sheet, sheet]).map(drop), &["open"]);
+    assert_refused(
         detector
             .detect(&[
                 Placed {
@@ -755,11 +757,11 @@ fn what_cannot_be_drawn_is_refused_by_name() {
             .map(drop),
         &["thickness"],
     );
-    said(
+    assert_refused(
         detector.detect(&[placed(&surfaces[0], &broken), closed]).map(drop),
         &["node 7"],
     );
-    said(
+    assert_refused(
         detector
             .detect(&[
                 Placed {
@@ -777,12 +779,12 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         detector.detect(&[placed(&surface, &larger), closed]),
         Err(Error::Capacity(_))
     ));
-    // Refused, it goes on as before; what is far away has nothing in common.
+    // After refused calls the detector works as before. A distant body has no overlap.
     assert!(!detector.detect(&[closed, closed]).expect("an overlap").is_empty());
-    let away = ball.clone().moved(|p| p + Vec3::X * 5.0);
+    let distant = ball.clone().moved(|p| p + Vec3::X * 5.0);
     assert!(
         detector
-            .detect(&[closed, placed(&surfaces[0], &away)])
+            .detect(&[closed, placed(&surfaces[0], &distant)])
             .expect("none")
             .is_empty()
     );

@@ -1,4 +1,4 @@
-//! IMPLICIT bodies that press each other: their equations know of it, and nothing else comes of it.
+//! Contact between IMPLICIT bodies: forces match theory, and neither energy nor trembling results.
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
@@ -15,19 +15,20 @@ const SOFT: f32 = 5400.0;
 /// kg/m³
 const DENSITY: f32 = 1060.0;
 
-const MEETS: BodyContact = BodyContact {
+const COLLIDES: BodyContact = BodyContact {
     with_bodies: true,
     ..BodyContact::NOTHING
 };
 
-/// A world with gravity and a floor.
+/// Creates a world with gravity and a floor.
 fn floor() -> World {
     let mut world = world(Vec3::Y * -9.81);
     world.create_tool(&ToolDefinition::new(Shape::Plane)).expect("a floor");
     world
 }
 
-/// A block of soft tetrahedra; mirrored: upside down, so that two of them are each other's images, its elements and triangles inside out.
+/// Creates a block of soft tetrahedra. A mirrored block is upside down, so that two blocks are mirror images, with
+/// inverted elements and triangles.
 fn block(
     world: &mut World,
     (solver, stiffness): (Solver, f32),
@@ -37,7 +38,7 @@ fn block(
 ) -> (BodyId, Mesh) {
     let mut mesh = Mesh::block(SIZE, CELLS).expect("a block");
     if mirrored {
-        mesh.positions.iter_mut().for_each(|place| place.y = -place.y);
+        mesh.positions.iter_mut().for_each(|position| position.y = -position.y);
     }
     let mesh = moved(mesh, Vec3::Y * height);
     let node_mass = DENSITY * SIZE.iter().product::<f32>() / mesh.positions.len() as f32;
@@ -52,55 +53,56 @@ fn block(
                 ..Default::default()
             }),
             solver,
-            contact: MEETS,
+            contact: COLLIDES,
             ..BodyDefinition::of(&mesh)
         })
         .expect("a body");
     (id, mesh)
 }
 
-/// Two blocks between pinned plates that come 4 mm closer than the blocks are high, and apart again: what the lower plate feels then, N.
-fn pressed(of: (Solver, f32), dt: f32) -> [f64; 2] {
+/// Presses two blocks between pinned plates that come 4 mm closer than the blocks are high, then separates them.
+/// Returns the force on the lower plate while pressed and afterwards (N).
+fn pressed_and_separated(model: (Solver, f32), dt: f32) -> [f64; 2] {
     let mut world = world(Vec3::ZERO);
-    let damping = 30.0 * (of.1 / SOFT).sqrt();
-    let (lower, below) = block(&mut world, of, -0.5 * SIZE[1], false, damping);
-    let (upper, above) = block(&mut world, of, 0.5 * SIZE[1] + 2e-4, true, damping);
-    let ground = nodes_at(&below, |place| place.y < -0.999 * SIZE[1]);
-    let plate = nodes_at(&above, |place| place.y > SIZE[1] + 1.9e-4);
+    let damping = 30.0 * (model.1 / SOFT).sqrt();
+    let (lower, below) = block(&mut world, model, -0.5 * SIZE[1], false, damping);
+    let (upper, above) = block(&mut world, model, 0.5 * SIZE[1] + 2e-4, true, damping);
+    let ground = nodes_at(&below, |position| position.y < -0.999 * SIZE[1]);
+    let plate = nodes_at(&above, |position| position.y > SIZE[1] + 1.9e-4);
     pin_all(&mut world, lower, &ground);
     pin_all(&mut world, upper, &plate);
-    let lead = |world: &mut World, seconds: f32, from: f32, to: f32| {
+    let move_plate = |world: &mut World, seconds: f32, from: f32, to: f32| {
         let steps = (seconds / dt) as usize;
         for step in 1..=steps {
-            let way = from + (to - from) * step as f32 / steps as f32;
+            let depth = from + (to - from) * step as f32 / steps as f32;
             for &node in &plate {
-                let place = above.positions[node as usize] - Vec3::Y * way;
+                let position = above.positions[node as usize] - Vec3::Y * depth;
                 world
                     .body_mut(upper)
                     .expect("a body")
-                    .move_pin(node, place)
+                    .move_pin(node, position)
                     .expect("a pin");
             }
             world.step(dt).expect("a step");
         }
     };
-    lead(&mut world, 0.6, 0.0, 4.2e-3);
-    lead(&mut world, 0.6, 4.2e-3, 4.2e-3);
+    move_plate(&mut world, 0.6, 0.0, 4.2e-3);
+    move_plate(&mut world, 0.6, 4.2e-3, 4.2e-3);
     let together = pin_forces(&world, lower, &ground).y;
-    lead(&mut world, 0.2, 4.2e-3, -5e-3);
-    lead(&mut world, 0.6, -5e-3, -5e-3);
+    move_plate(&mut world, 0.2, 4.2e-3, -5e-3);
+    move_plate(&mut world, 0.6, -5e-3, -5e-3);
     [together, pin_forces(&world, lower, &ground).y]
 }
 
 #[test]
-fn tissue_pressed_on_tissue_bears_what_it_should() {
-    tissue_pressed_on_tissue_bears_what_it_should_of(&[(Solver::Implicit, 2.5e5, FRAME)]);
+fn tissue_pressed_on_tissue_carries_the_expected_force() {
+    check_tissue_pressed_on_tissue_carries_the_expected_force(&[(Solver::Implicit, 2.5e5, FRAME)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn tissue_pressed_on_tissue_bears_what_it_should_in_the_other_cases() {
-    tissue_pressed_on_tissue_bears_what_it_should_of(&[
+fn tissue_pressed_on_tissue_carries_the_expected_force_in_the_other_cases() {
+    check_tissue_pressed_on_tissue_carries_the_expected_force(&[
         (Solver::Verlet, SOFT, FRAME),
         (Solver::Implicit, SOFT, FRAME),
         (Solver::Implicit, SOFT, 4e-3),
@@ -111,23 +113,25 @@ fn tissue_pressed_on_tissue_bears_what_it_should_in_the_other_cases() {
     ]);
 }
 
-fn tissue_pressed_on_tissue_bears_what_it_should_of(cases: &[(Solver, f32, f32)]) {
-    // Of two mirrored blocks each bears what one does against a smooth plane: from finite elements in double precision, N.
-    const RIGHT: f64 = 1.3394;
+fn check_tissue_pressed_on_tissue_carries_the_expected_force(cases: &[(Solver, f32, f32)]) {
+    // Each of two mirrored blocks carries the force of one block on a smooth plane, from finite elements in double
+    // precision (N).
+    const EXPECTED: f64 = 1.3394;
     for &(solver, stiffness, dt) in cases {
-        let [together, apart] = pressed((solver, stiffness), dt).map(|force| force / f64::from(stiffness / SOFT));
-        let off = together.abs() / RIGHT - 1.0;
-        assert!(off.abs() < 0.005, "{solver:?}, {stiffness} Pa, {dt} s: {together} N");
+        let [together, apart] =
+            pressed_and_separated((solver, stiffness), dt).map(|force| force / f64::from(stiffness / SOFT));
+        let error = together.abs() / EXPECTED - 1.0;
+        assert!(error.abs() < 0.005, "{solver:?}, {stiffness} Pa, {dt} s: {together} N");
         assert!(
-            apart.abs() < 1e-3 * RIGHT,
+            apart.abs() < 1e-3 * EXPECTED,
             "{solver:?}, {stiffness} Pa, {dt} s: {apart} N once apart"
         );
     }
 }
 
 #[test]
-fn bodies_that_collide_with_implicit_ones_keep_their_momentum_and_gain_no_energy() {
-    for (of, below) in [
+fn collisions_with_implicit_bodies_conserve_momentum_and_gain_no_energy() {
+    for (model, below) in [
         ((Solver::Implicit, SOFT), SOFT),
         ((Solver::Verlet, SOFT), SOFT),
         ((Solver::Implicit, 2.5e6), 2.5e6),
@@ -135,14 +139,14 @@ fn bodies_that_collide_with_implicit_ones_keep_their_momentum_and_gain_no_energy
         ((Solver::Implicit, SOFT), 5e6),
         ((Solver::Implicit, 5e6), SOFT),
     ] {
-        collide(of, below);
+        collide(model, below);
     }
 }
 
-fn collide(of: (Solver, f32), below: f32) {
+fn collide(model: (Solver, f32), below: f32) {
     let mut world = world(Vec3::ZERO);
     let (lower, mesh) = block(&mut world, (Solver::Implicit, below), -0.5 * SIZE[1] - 1e-3, false, 0.0);
-    let (upper, _) = block(&mut world, of, 0.5 * SIZE[1] + 1e-3, true, 0.0);
+    let (upper, _) = block(&mut world, model, 0.5 * SIZE[1] + 1e-3, true, 0.0);
     let nodes = mesh.positions.len();
     let node_mass = DENSITY * SIZE.iter().product::<f32>() / nodes as f32;
     world
@@ -157,35 +161,35 @@ fn collide(of: (Solver, f32), below: f32) {
     let (start, energy) = all(&world);
     for frame in 0..60 {
         world.step(FRAME).expect("a step");
-        let (now, left) = all(&world);
+        let (now, remaining) = all(&world);
         let lost = (now - start).length() / start.length();
         assert!(
             lost < 1e-4,
-            "{of:?} on {below} Pa, frame {frame}: {lost} of the momentum"
+            "{model:?} on {below} Pa, frame {frame}: {lost} of the momentum"
         );
         assert!(
-            left < 1.001 * energy,
-            "{of:?} on {below} Pa, frame {frame}: {left} J of {energy} J"
+            remaining < 1.001 * energy,
+            "{model:?} on {below} Pa, frame {frame}: {remaining} J of {energy} J"
         );
     }
     assert!(
         kinetic(&world, upper) > 0.1 * energy,
-        "{of:?} on {below} Pa: it never touched"
+        "{model:?} on {below} Pa: they never touched"
     );
 }
 
 #[test]
-fn implicit_bodies_that_lie_on_each_other_stay_calm() {
-    implicit_bodies_that_lie_on_each_other_stay_calm_of(150);
+fn implicit_bodies_stacked_on_each_other_stay_at_rest() {
+    check_implicit_bodies_stacked_on_each_other_stay_at_rest(150);
 }
 
 #[test]
 #[ignore = "long"]
-fn implicit_bodies_that_lie_on_each_other_stay_calm_for_long() {
-    implicit_bodies_that_lie_on_each_other_stay_calm_of(300);
+fn implicit_bodies_stacked_on_each_other_stay_at_rest_for_long() {
+    check_implicit_bodies_stacked_on_each_other_stay_at_rest(300);
 }
 
-fn implicit_bodies_that_lie_on_each_other_stay_calm_of(frames: usize) {
+fn check_implicit_bodies_stacked_on_each_other_stay_at_rest(frames: usize) {
     let mut world = floor();
     let (lower, _) = block(&mut world, (Solver::Implicit, SOFT), 0.5 * SIZE[1], false, 2.0);
     let (upper, _) = block(&mut world, (Solver::Implicit, SOFT), 1.5 * SIZE[1], true, 2.0);
@@ -200,27 +204,28 @@ fn implicit_bodies_that_lie_on_each_other_stay_calm_of(frames: usize) {
     }
 }
 
-/// Where contacts of a corner with faces, or of a long edge with short ones, took turns, the block was never at rest. Every node is seen as fast as
-/// it goes: over a step the two differ by no more than a node that swings gains in half of it.
+/// Contacts of a corner with faces, or of a long edge with short ones, once alternated, so that the block never came to
+/// rest. The velocity of each node is compared with its displacement over the step. They differ by at most the velocity
+/// that an oscillating node gains in half a step.
 #[test]
 fn a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble() {
-    a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble_of(150);
+    check_a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble(150);
 }
 
 #[test]
 #[ignore = "long"]
 fn a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble_for_long() {
-    a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble_of(240);
+    check_a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble(240);
 }
 
-fn a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble_of(frames: usize) {
+fn check_a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble(frames: usize) {
     let mut world = floor();
     let block = moved(Mesh::block([1.0; 3], [2; 3]).expect("a block"), Vec3::Y * 0.6);
     let cloth = moved(Mesh::cloth([1.8; 2], [15; 2]).expect("a cloth"), Vec3::Y * 1.25);
     let contact = |thickness| BodyContact {
         thickness,
         friction: 0.7,
-        ..MEETS
+        ..COLLIDES
     };
     let below = BodyDefinition {
         masses: Values::Uniform(0.1),
@@ -244,9 +249,9 @@ fn a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble_of(frames: usi
         ..BodyDefinition::of(&cloth)
     };
     let ids = [below, above].map(|definition| world.create_body(&definition).expect("a body"));
-    let places = |world: &World, id| body(world, id).positions().to_vec();
+    let positions_of = |world: &World, id| body(world, id).positions().to_vec();
     for frame in 0..frames {
-        let before = ids.map(|id| places(&world, id));
+        let before = ids.map(|id| positions_of(&world, id));
         world.step(FRAME).expect("a step");
         if frame < 120 {
             continue;
@@ -259,10 +264,10 @@ fn a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble_of(frames: usi
                 .zip(it.positions().iter().zip(before))
                 .enumerate()
             {
-                let off = (*velocity - (*now - *before) / FRAME).length();
+                let error = (*velocity - (*now - *before) / FRAME).length();
                 assert!(
-                    off < 5e-3,
-                    "frame {frame}, node {node} of {id:?}: {velocity} m/s, off by {off}"
+                    error < 5e-3,
+                    "frame {frame}, node {node} of {id:?}: {velocity} m/s, off by {error}"
                 );
             }
         }

@@ -1,4 +1,4 @@
-//! A tool of limited force presses with no more, while it comes and long after, and with no less where it does not get to its pose.
+//! A tool with a force limit presses with no more than the limit, and with no less while it cannot reach its pose.
 
 use crate::support::hanging::nodes_at;
 use glam::Vec3;
@@ -9,8 +9,8 @@ const LIMIT: f32 = 0.25;
 const RADIUS: f32 = 0.02;
 const DEPTH: f32 = 0.01;
 
-/// Sent deep into a block at this speed, and to the same place for as long again and 0.3 s: by how much it exceeds the limit at most, by
-/// how much it falls short of it at most in the last 0.2 s, as parts of it, and how deep it gets, m.
+/// Moves a tool into a block at this speed, then holds its target for 0.3 s. Returns the largest excess over the limit,
+/// the largest shortfall in the last 0.2 s, both relative to the limit, and the depth reached (m).
 fn press(solver: Solver, speed: f32, dt: f32, drag: f32) -> (f32, f32, f32) {
     let size = [0.06, 0.04, 0.06];
     let mesh = Mesh::block(size, [6, 4, 6]).expect("a block");
@@ -42,16 +42,16 @@ fn press(solver: Solver, speed: f32, dt: f32, drag: f32) -> (f32, f32, f32) {
             ..ToolDefinition::new(Shape::Sphere { radius: RADIUS })
         })
         .expect("a tool");
-    let coming = (DEPTH / (speed * dt)).ceil() as usize;
-    let staying = (0.3 / dt) as usize;
+    let moving = (DEPTH / (speed * dt)).ceil() as usize;
+    let holding = (0.3 / dt) as usize;
     let (mut over, mut under) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
-    for frame in 1..=coming + staying {
+    for frame in 1..=moving + holding {
         let depth = (speed * dt * frame as f32).min(DEPTH);
         world.set_pose(tool, start - Vec3::Y * depth, None).expect("a pose");
         world.step(dt).expect("a step");
         let excess = world.wrench(tool).expect("a tool").0.length() / LIMIT - 1.0;
         over = over.max(excess);
-        if frame > coming + staying / 3 {
+        if frame > moving + holding / 3 {
             under = under.max(-excess);
         }
     }
@@ -59,8 +59,8 @@ fn press(solver: Solver, speed: f32, dt: f32, drag: f32) -> (f32, f32, f32) {
 }
 
 #[test]
-fn a_limit_is_kept_while_the_tool_comes_and_while_it_stands() {
-    a_limit_is_kept_while_the_tool_comes_and_while_it_stands_of(&[
+fn a_force_limit_holds_while_the_tool_moves_and_rests() {
+    check_a_force_limit_holds_while_the_tool_moves_and_rests(&[
         (Solver::Verlet, 0.01, 0.01, 100.0),
         (Solver::Verlet, 0.05, 1.0 / 60.0, 5.0),
         (Solver::Verlet, 0.3, 1.0 / 60.0, 100.0),
@@ -69,14 +69,14 @@ fn a_limit_is_kept_while_the_tool_comes_and_while_it_stands() {
 
 #[test]
 #[ignore = "long"]
-fn a_limit_is_kept_while_the_tool_comes_and_while_it_stands_in_the_other_cases() {
-    a_limit_is_kept_while_the_tool_comes_and_while_it_stands_of(&[
+fn a_force_limit_holds_while_the_tool_moves_and_rests_in_the_other_cases() {
+    check_a_force_limit_holds_while_the_tool_moves_and_rests(&[
         (Solver::Verlet, 0.05, 1e-3, 100.0),
         (Solver::Implicit, 0.05, 1.0 / 60.0, 100.0),
     ]);
 }
 
-fn a_limit_is_kept_while_the_tool_comes_and_while_it_stands_of(cases: &[(Solver, f32, f32, f32)]) {
+fn check_a_force_limit_holds_while_the_tool_moves_and_rests(cases: &[(Solver, f32, f32, f32)]) {
     for &(solver, speed, dt, drag) in cases {
         let case = format!("{solver:?}, {speed} m/s, {dt} s, drag {drag}");
         let (over, under, depth) = press(solver, speed, dt, drag);

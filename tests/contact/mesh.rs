@@ -1,4 +1,4 @@
-//! Tools that are closed meshes, found in each of the three ways.
+//! Tools that are closed meshes, with each kind of detection.
 
 use crate::support::solid::{Solid, real};
 use crate::support::tissue::*;
@@ -8,10 +8,10 @@ use sinew::{
     WorldDefinition,
 };
 
-/// What a cloth keeps off, m.
+/// The contact thickness of the cloth (m).
 const THICKNESS: f32 = 0.2e-3;
 
-/// Of a whole cloth, kg.
+/// The mass of the whole cloth (kg).
 const MASS: f32 = 0.02;
 
 /// A cloth above an organ, and the organ as a tool.
@@ -23,7 +23,7 @@ struct Drape {
 }
 
 impl Drape {
-    /// `None` where the organ's mesh is missing.
+    /// Returns `None` if the organ's mesh is missing.
     fn new(detection: Detection, solver: Solver, cells: u32) -> Option<Self> {
         let stomach = real("stomach.stl", 1e-3)?;
         let low = stomach.positions.iter().copied().reduce(Vec3::min)?;
@@ -63,7 +63,7 @@ impl Drape {
         })
     }
 
-    /// The mean force on the organ over so many steps.
+    /// Takes `steps` steps and returns the mean force on the organ.
     fn fall(&mut self, steps: u32) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for step in 0..steps {
@@ -74,8 +74,8 @@ impl Drape {
         sum / f64::from(steps)
     }
 
-    /// Whether the cloth lies as it should, and the organ has felt this force of late.
-    fn check(&self, felt: DVec3, what: &str) {
+    /// Checks that the cloth lies on the organ, and that the recent mean force on the organ is its weight.
+    fn check(&self, mean_force: DVec3, case: &str) {
         let nodes = body(&self.world, self.cloth).positions();
         let distances: Vec<f64> = nodes
             .iter()
@@ -93,24 +93,24 @@ impl Drape {
         let sum: DVec3 = contacts.iter().map(|contact| contact.force.as_dvec3()).sum();
         assert!(
             inside <= nodes.len() / 50,
-            "{what}: {inside} of {} nodes are inside",
+            "{case}: {inside} of {} nodes are inside",
             nodes.len()
         );
-        assert!(deepest > -0.5e-3, "{what}: {deepest} m deep");
-        assert!(contacts.len() > 10, "{what}: {} contacts", contacts.len());
+        assert!(deepest > -0.5e-3, "{case}: {deepest} m deep");
+        assert!(contacts.len() > 10, "{case}: {} contacts", contacts.len());
         assert!(
             highest < f64::from(THICKNESS) + 0.5e-3,
-            "{what}: something lies at {highest} m"
+            "{case}: a contact point at a distance of {highest} m"
         );
         let down = DVec3::new(0.0, -weight, 0.0);
         assert!(
-            felt.distance(down) < 0.01 * weight,
-            "{what}: a force of {felt} for a weight of {weight}"
+            mean_force.distance(down) < 0.01 * weight,
+            "{case}: a force of {mean_force} for a weight of {weight}"
         );
-        // The contacts are those of the last kick, the wrench is the mean of the step.
+        // The contacts are those of the last kick; the wrench is the mean over the step.
         assert!(
             (sum - force.as_dvec3()).length() < 0.05 * weight,
-            "{what}: contacts make {sum} of {force}"
+            "{case}: contacts make {sum} of {force}"
         );
     }
 }
@@ -119,30 +119,31 @@ fn drape(detection: Detection, solver: Solver, cells: u32) {
     let Some(mut drape) = Drape::new(detection, solver, cells) else {
         return;
     };
-    // In images a cloth trembles between the sides of what is seen, by 2 % of its weight in steps of 1 ms: a frame of 1/60 s is looked at.
+    // With image-space detection, the force varies by 2 % of the weight in steps of 1 ms. The check uses the mean over
+    // a frame of 1/60 s.
     let last = if detection == Detection::ImageSpace { 17 } else { 1 };
     drape.fall(900 - last);
-    let felt = drape.fall(last);
-    drape.check(felt, &format!("{detection:?}, {solver:?}"));
+    let mean_force = drape.fall(last);
+    drape.check(mean_force, &format!("{detection:?}, {solver:?}"));
 }
 
 #[test]
-fn a_cloth_lies_on_an_organ_found_exactly() {
+fn a_cloth_rests_on_an_organ_with_exact_detection() {
     drape(Detection::Exact, Solver::Verlet, 16);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_cloth_of_implicit_lies_on_an_organ() {
+fn a_cloth_rests_on_an_organ_with_implicit() {
     drape(Detection::Exact, Solver::Implicit, 12);
 }
 
 #[test]
-fn a_cloth_lies_on_an_organ_found_by_its_field() {
+fn a_cloth_rests_on_an_organ_with_a_distance_field() {
     drape(Detection::DistanceField, Solver::Verlet, 16);
 }
 
 #[test]
-fn a_cloth_lies_on_an_organ_seen_in_images() {
+fn a_cloth_rests_on_an_organ_with_image_space_detection() {
     drape(Detection::ImageSpace, Solver::Verlet, 8);
 }

@@ -1,4 +1,5 @@
-//! What a tool that is a mesh feels is what the tissue feels, turned round: found in each of the three ways, by each formula.
+//! The wrench on a mesh tool is opposite to the force on the tissue, for each kind of detection and each integration
+//! formula.
 
 use crate::support::solid::ball;
 use crate::support::tissue::*;
@@ -10,11 +11,11 @@ use sinew::{
 };
 
 const GRAVITY: Vec3 = Vec3::new(1.0, -9.81, 0.5);
-const WAYS: [Detection; 3] = [Detection::Exact, Detection::DistanceField, Detection::ImageSpace];
-/// Of a block, kg.
+const DETECTIONS: [Detection; 3] = [Detection::Exact, Detection::DistanceField, Detection::ImageSpace];
+/// The mass of a block (kg).
 const MASS: f32 = 0.2;
 
-/// A block that is thrown at tools, held by some pins.
+/// A block that is thrown at tools, with optional pins.
 struct Thrown {
     world: World,
     block: BodyId,
@@ -31,7 +32,7 @@ struct Setup {
     order: u32,
     detection: Detection,
     friction: f32,
-    /// Of nodes, 1/s.
+    /// The damping of nodes (1/s).
     drag: f32,
     pinned: bool,
     substeps: u32,
@@ -47,11 +48,11 @@ impl Thrown {
         .expect("a world");
         let round = ball(0.02, 2);
         let block = Mesh::block([0.06, 0.03, 0.06], [1, 1, 1]).expect("a block");
-        let places = [
+        let poses = [
             (&round, Vec3::new(0.01, 0.045, 0.005), Quat::IDENTITY),
             (&block, Vec3::new(-0.03, -0.04, 0.02), Quat::from_rotation_z(0.4)),
         ];
-        let tools = places.map(|(mesh, position, orientation)| {
+        let tools = poses.map(|(mesh, position, orientation)| {
             let pose = Pose { position, orientation };
             let tool = ToolDefinition {
                 detection: setup.detection,
@@ -80,7 +81,7 @@ impl Thrown {
                 solver: setup.solver,
                 order: setup.order,
                 accuracy: 1e-6,
-                // A step that tools cut into many parts has no less for each.
+                // A step that tools subdivide has this limit for each substep.
                 iterations: 100_000,
                 ..BodyDefinition::of(&mesh)
             })
@@ -110,14 +111,15 @@ impl Thrown {
         momentum(body(&self.world, self.block), self.node_mass)
     }
 
-    /// Takes a step with the tools on their ways; the sum of forces on the body, and of their sizes.
+    /// Moves the tools along their paths and takes a step. Returns the sum of the forces on the body, and the sum of
+    /// their magnitudes.
     fn step(&mut self, seconds: f32, dt: f32) -> (DVec3, f64) {
         for &(tool, start) in &self.tools {
             let turned = Quat::from_scaled_axis(Vec3::new(0.5, 1.0, -2.0) * seconds) * start.orientation;
-            let place = start.position + Vec3::new(0.1, -0.2, 0.05) * seconds;
-            self.world.set_pose(tool, place, Some(turned)).expect("a pose");
+            let target = start.position + Vec3::new(0.1, -0.2, 0.05) * seconds;
+            self.world.set_pose(tool, target, Some(turned)).expect("a pose");
         }
-        // Forces last for one step, and do nothing to pins.
+        // Applied forces last for one step and do not act on pins.
         let count = body(&self.world, self.block).node_count() as u32;
         let nodes: Vec<u32> = (0..count).filter(|node| !self.pins.contains(node)).collect();
         let forces = vec![self.applied / nodes.len() as f32; nodes.len()];
@@ -142,29 +144,29 @@ impl Thrown {
 }
 
 #[test]
-fn a_block_at_rest_presses_with_its_weight() {
-    a_block_at_rest_presses_with_its_weight_of(|detection, solver| {
+fn a_block_at_rest_presses_on_a_mesh_with_its_weight() {
+    check_a_block_at_rest_presses_on_a_mesh_with_its_weight(|detection, solver| {
         detection == Detection::Exact || solver == Solver::Verlet
     });
 }
 
 #[test]
 #[ignore = "long"]
-fn a_block_at_rest_presses_with_its_weight_in_the_other_cases() {
-    a_block_at_rest_presses_with_its_weight_of(|detection, solver| {
+fn a_block_at_rest_presses_on_a_mesh_with_its_weight_in_the_other_cases() {
+    check_a_block_at_rest_presses_on_a_mesh_with_its_weight(|detection, solver| {
         detection != Detection::Exact && solver != Solver::Verlet
     });
 }
 
-fn a_block_at_rest_presses_with_its_weight_of(is_tried: fn(Detection, Solver) -> bool) {
+fn check_a_block_at_rest_presses_on_a_mesh_with_its_weight(is_selected: fn(Detection, Solver) -> bool) {
     let mesh = Mesh::block([0.04, 0.02, 0.04], [3, 2, 3]).expect("a block");
     let table = Mesh::block([0.1, 0.03, 0.1], [1, 1, 1]).expect("a block");
     let node_mass = MASS / mesh.positions.len() as f32;
     let applied = Vec3::new(0.1, -0.4, 0.2);
-    for detection in WAYS {
+    for detection in DETECTIONS {
         for solver in [Solver::Verlet, Solver::Implicit]
             .into_iter()
-            .filter(|&solver| is_tried(detection, solver))
+            .filter(|&solver| is_selected(detection, solver))
         {
             let mut world = world(GRAVITY * Vec3::Y);
             let tool = ToolDefinition {
@@ -202,16 +204,17 @@ fn a_block_at_rest_presses_with_its_weight_of(is_tried: fn(Detection, Solver) ->
                 world.step(0.002).expect("a step");
             }
             let force = world.wrench(tool).expect("a tool").0;
-            let wanted = GRAVITY * Vec3::Y * MASS + applied;
-            let off = (force - wanted).length() / wanted.length();
-            assert!(off < 0.01, "{detection:?} {solver:?}: {force} for {wanted}");
+            let expected = GRAVITY * Vec3::Y * MASS + applied;
+            let error = (force - expected).length() / expected.length();
+            assert!(error < 0.01, "{detection:?} {solver:?}: {force} for {expected}");
         }
     }
 }
 
-/// The largest part by which impulses and momentum differ, over a throw up and one down; how often a tool touched.
-fn unbalanced(setup: Setup, dt: f32) -> (f64, usize) {
-    let (mut largest, mut touched) = (0.0_f64, 0);
+/// Returns the largest relative difference between impulses and momentum change over a throw up and one down, and the
+/// number of steps with contact.
+fn largest_imbalance(setup: Setup, dt: f32) -> (f64, usize) {
+    let (mut largest, mut contact_steps) = (0.0_f64, 0);
     let throws: &[f32] = if setup.solver == Solver::Verlet {
         &[0.6, -0.6]
     } else {
@@ -226,61 +229,61 @@ fn unbalanced(setup: Setup, dt: f32) -> (f64, usize) {
             let (sum, sizes) = thrown.step(dt * step as f32, dt);
             let after = thrown.momentum();
             let h = f64::from(dt);
-            let off = if setup.solver == Solver::Verlet {
-                // What a node loses in a step is between what it loses at its speeds before and after.
+            let error = if setup.solver == Solver::Verlet {
+                // The damping loss of a step lies between the losses at the velocities before and after.
                 let damped = (now + after) * (0.5 * h * f64::from(thrown.drag));
                 (after - now - sum * h + damped).length()
             } else {
-                // By the formula of order 1 or 2: contact begins a history anew.
-                let by = |t: f64, c: f64| {
+                // The formula of order 1 or 2; contact restarts the velocity history.
+                let imbalance = |t: f64, c: f64| {
                     let damped = after * (t * h * f64::from(thrown.drag));
                     (after - now - (now - before) * c - sum * (t * h) + damped).length()
                 };
-                by(1.0, 0.0).min(by(2.0 / 3.0, 1.0 / 3.0))
+                imbalance(1.0, 0.0).min(imbalance(2.0 / 3.0, 1.0 / 3.0))
             };
-            let felt = thrown
+            let in_contact = thrown
                 .tools
                 .iter()
                 .any(|&(tool, _)| thrown.world.wrench(tool).expect("a tool").0 != Vec3::ZERO);
-            touched += usize::from(felt);
-            largest = largest.max(off / (sizes * h));
+            contact_steps += usize::from(in_contact);
+            largest = largest.max(error / (sizes * h));
             (before, now) = (now, after);
         }
     }
-    (largest, touched)
+    (largest, contact_steps)
 }
 
 #[test]
-fn the_momentum_meshes_give_is_the_momentum_that_arrives() {
-    the_momentum_meshes_give_is_the_momentum_that_arrives_of(|detection, solver| {
+fn the_impulse_of_mesh_tools_equals_the_momentum_change() {
+    check_the_impulse_of_mesh_tools_equals_the_momentum_change(|detection, solver| {
         (detection == Detection::Exact) == (solver == Solver::Verlet)
     });
 }
 
 #[test]
 #[ignore = "long"]
-fn the_momentum_meshes_give_is_the_momentum_that_arrives_in_the_other_cases() {
-    the_momentum_meshes_give_is_the_momentum_that_arrives_of(|detection, solver| {
+fn the_impulse_of_mesh_tools_equals_the_momentum_change_in_the_other_cases() {
+    check_the_impulse_of_mesh_tools_equals_the_momentum_change(|detection, solver| {
         (detection == Detection::Exact) != (solver == Solver::Verlet)
     });
 }
 
-fn the_momentum_meshes_give_is_the_momentum_that_arrives_of(is_tried: fn(Detection, Solver) -> bool) {
+fn check_the_impulse_of_mesh_tools_equals_the_momentum_change(is_selected: fn(Detection, Solver) -> bool) {
     let mut failures = Vec::new();
-    for detection in WAYS {
+    for detection in DETECTIONS {
         for (solver, order) in [(Solver::Verlet, 0), (Solver::Implicit, 1), (Solver::Implicit, 2)] {
-            if !is_tried(detection, solver) {
+            if !is_selected(detection, solver) {
                 continue;
             }
             for (friction, drag, pinned) in [(0.0, 0.0, false), (0.6, 0.1, false), (0.6, 0.0, true)] {
                 for dt in [0.001, 1.0 / 60.0] {
-                    // The rest adds little but time: near tools both orders are one.
+                    // The remaining cases add little but time, because both orders are the same near tools.
                     let others = detection != Detection::Exact || order == 2;
                     if solver != Solver::Verlet && others && (dt < 0.01 || !pinned) {
                         continue;
                     }
                     if dt > 0.01 && drag > 0.0 {
-                        // What is lost within the step cannot be told from its ends.
+                        // The damping loss within the step cannot be computed from its end states.
                         continue;
                     }
                     let setup = Setup {
@@ -292,9 +295,11 @@ fn the_momentum_meshes_give_is_the_momentum_that_arrives_of(is_tried: fn(Detecti
                         pinned,
                         substeps: u32::from(dt < 0.01 && solver == Solver::Verlet),
                     };
-                    let (off, touched) = unbalanced(setup, dt);
-                    if !(off < 1e-4) || touched < 3 {
-                        failures.push(format!("{setup:?}, dt {dt}: {off:.2e}, touched in {touched} steps"));
+                    let (error, contact_steps) = largest_imbalance(setup, dt);
+                    if !(error < 1e-4) || contact_steps < 3 {
+                        failures.push(format!(
+                            "{setup:?}, dt {dt}: {error:.2e}, touched in {contact_steps} steps"
+                        ));
                     }
                 }
             }

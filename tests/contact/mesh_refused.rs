@@ -1,11 +1,12 @@
-//! Meshes that are no solid are refused with what is wrong and where, and nothing changes; odd ones that are solids work.
+//! Meshes that bound no solid are refused with the defect and its location, and nothing changes. Unusual but valid
+//! solids work.
 
 use crate::support::solid::{ball, cuboid};
 use crate::support::tissue::*;
 use glam::{Quat, Vec3};
 use sinew::{Detection, Error, Pose, Shape, ToolDefinition};
 
-const WAYS: [Detection; 3] = [Detection::Exact, Detection::DistanceField, Detection::ImageSpace];
+const DETECTIONS: [Detection; 3] = [Detection::Exact, Detection::DistanceField, Detection::ImageSpace];
 
 type Parts = (Vec<Vec3>, Vec<[u32; 3]>);
 
@@ -19,12 +20,12 @@ fn with(change: impl FnOnce(&mut Vec<Vec3>, &mut Vec<[u32; 3]>)) -> Parts {
     (positions, triangles)
 }
 
-/// What is wrong, and words that its refusal has in it.
-fn wrong() -> Vec<(&'static str, Parts, &'static [&'static str])> {
+/// Returns invalid meshes: a name, the mesh, and words of the error message.
+fn invalid_meshes() -> Vec<(&'static str, Parts, &'static [&'static str])> {
     let second = |by: Vec3, scale: f32| {
         with(|positions, triangles| {
-            let (more, others) = cube();
-            positions.extend(more.iter().map(|corner| *corner * scale + by));
+            let (corners, others) = cube();
+            positions.extend(corners.iter().map(|corner| *corner * scale + by));
             triangles.extend(others.iter().map(|triangle| triangle.map(|node| node + 8)));
         })
     };
@@ -138,14 +139,14 @@ fn wrong() -> Vec<(&'static str, Parts, &'static [&'static str])> {
 }
 
 #[test]
-fn what_is_no_solid_is_refused_and_nothing_changes() {
+fn meshes_that_bound_no_solid_are_refused_and_nothing_changes() {
     let mut world = world(Vec3::ZERO);
     TISSUE.put(&mut world, &square(0.1, 4));
     sphere(&mut world, 0.01, Vec3::Y * 0.01);
     world.step(0.001).expect("a step");
     let before = world.state_hash();
-    for (what, (positions, triangles), words) in wrong() {
-        for detection in WAYS {
+    for (name, (positions, triangles), words) in invalid_meshes() {
+        for detection in DETECTIONS {
             let shape = Shape::Mesh {
                 positions: &positions,
                 triangles: &triangles,
@@ -156,30 +157,30 @@ fn what_is_no_solid_is_refused_and_nothing_changes() {
             };
             let error = match world.create_tool(&definition) {
                 Err(Error::InvalidArgument(error)) => error,
-                other => panic!("{what}, {detection:?}: {other:?}"),
+                other => panic!("{name}, {detection:?}: {other:?}"),
             };
             let error = error.to_string();
             for word in words {
-                assert!(error.contains(word), "{what}, {detection:?}: {error:?} has no {word:?}");
+                assert!(error.contains(word), "{name}, {detection:?}: {error:?} has no {word:?}");
             }
-            assert_eq!(world.state_hash(), before, "{what}, {detection:?}");
+            assert_eq!(world.state_hash(), before, "{name}, {detection:?}");
         }
     }
-    // As many tools as before.
+    // The number of tools is unchanged.
     world.step(0.001).expect("a step");
 }
 
 const TISSUE: Tissue = Tissue::CALM;
 
 #[test]
-fn a_fineness_that_cannot_be_is_refused() {
+fn an_invalid_resolution_is_refused() {
     let (positions, triangles) = cube();
     let shape = Shape::Mesh {
         positions: &positions,
         triangles: &triangles,
     };
     let mut world = world(Vec3::ZERO);
-    for detection in WAYS {
+    for detection in DETECTIONS {
         for resolution in [-1.0, f32::NAN, f32::INFINITY, 1e-9] {
             if detection == Detection::Exact && resolution == 1e-9 {
                 continue;
@@ -198,9 +199,10 @@ fn a_fineness_that_cannot_be_is_refused() {
     }
 }
 
-/// A ball pressed into a cloth of its own size, somewhere, and what it feels: as a part of the stiffness times the size.
-fn felt(detection: Detection, size: f32, place: Vec3) -> (Vec3, f64) {
-    let mesh = moved(square(2.0 * size, 6), place);
+/// Presses a ball into a cloth of this size with its center at `center`. Returns the force divided by stiffness times
+/// size, and the relative depth.
+fn press_force(detection: Detection, size: f32, center: Vec3) -> (Vec3, f64) {
+    let mesh = moved(square(2.0 * size, 6), center);
     let mut world = world_of(Vec3::ZERO, 4);
     let cloth = Tissue {
         drag: 100.0,
@@ -209,7 +211,7 @@ fn felt(detection: Detection, size: f32, place: Vec3) -> (Vec3, f64) {
     .put(&mut world, &mesh);
     pin_all(&mut world, cloth, &rim(6));
     let round = ball(0.25 * size, 2);
-    let at = |height: f32| place + Vec3::new(0.05, height, 0.03) * size;
+    let at = |height: f32| center + Vec3::new(0.05, height, 0.03) * size;
     let tool = world
         .create_tool(&ToolDefinition {
             detection,
@@ -243,23 +245,23 @@ fn felt(detection: Detection, size: f32, place: Vec3) -> (Vec3, f64) {
 }
 
 #[test]
-fn solids_of_every_size_and_place_press_alike() {
+fn solids_press_alike_at_every_size_and_position() {
     let mut failures = Vec::new();
     for detection in [Detection::Exact, Detection::DistanceField] {
-        let (force, depth) = felt(detection, 0.1, Vec3::ZERO);
+        let (force, depth) = press_force(detection, 0.1, Vec3::ZERO);
         assert!(force.y > 0.02 && depth < 0.01, "{detection:?}: {force}, {depth}");
-        for (size, place, allowed) in [
-            // A micrometre, a kilometre.
+        for (size, center, allowed) in [
+            // A micrometer and a kilometer.
             (1e-6, Vec3::ZERO, 0.1),
             (1e3, Vec3::ZERO, 0.1),
-            // As far from the origin as f32 leaves a thousandth of its size.
+            // At this distance from the origin, f32 resolves a thousandth of the size.
             (0.1, Vec3::new(800.0, -300.0, 500.0), 0.15),
         ] {
-            let (other, deep) = felt(detection, size, place);
-            let off = (other - force).length() / force.length();
-            if !(off < allowed) || !(deep < 0.01) {
+            let (other, deep) = press_force(detection, size, center);
+            let error = (other - force).length() / force.length();
+            if !(error < allowed) || !(deep < 0.01) {
                 failures.push(format!(
-                    "{detection:?} {size} m at {place}: {other} for {force}, {deep} deep"
+                    "{detection:?} {size} m at {center}: {other} for {force}, {deep} deep"
                 ));
             }
         }

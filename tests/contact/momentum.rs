@@ -1,4 +1,4 @@
-//! What a tool feels is what the tissue feels, turned round.
+//! The wrench on a tool is opposite to the force and torque on the tissue.
 
 use crate::support::tissue::*;
 use glam::{DVec3, Quat, Vec3};
@@ -7,7 +7,7 @@ use sinew::{Pose, Shape};
 
 const GRAVITY: Vec3 = Vec3::new(1.0, -9.81, 0.5);
 
-/// A tool that comes to a free block, and how it moves: per step, and turning.
+/// A tool that meets a free block, with its velocity and angular velocity.
 struct Visit {
     shape: Shape<'static>,
     friction: f32,
@@ -49,8 +49,8 @@ fn visits() -> Vec<Visit> {
     visits
 }
 
-/// The largest errors over a visit of 0.2 s: of the momentum, and of the angular momentum about the tool, as parts of
-/// what the tool gave; and what it gave, N s.
+/// Returns the largest errors over 0.2 s of the momentum and of the angular momentum about the tool, relative to the
+/// tool's impulse, and that impulse (N s).
 fn errors(visit: &Visit, dt: f32, substeps: u32) -> (f64, f64, f64) {
     let tissue = Tissue {
         mass: 0.2,
@@ -69,7 +69,7 @@ fn errors(visit: &Visit, dt: f32, substeps: u32) -> (f64, f64, f64) {
         visit.start.orientation,
     );
     let block = tissue.put(&mut world, &mesh);
-    // Into the tool, and tumbling.
+    // Towards the tool, and tumbling.
     let toward = if visit.shape == Shape::Plane { -0.3 } else { 0.6 };
     let thrown: Vec<Vec3> = mesh
         .positions
@@ -81,14 +81,14 @@ fn errors(visit: &Visit, dt: f32, substeps: u32) -> (f64, f64, f64) {
         .expect("a body")
         .set_velocities(&thrown)
         .expect("velocities");
-    let (mut linear, mut angular, mut given) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let (mut linear, mut angular, mut impulse) = (0.0_f64, 0.0_f64, 0.0_f64);
     for step in 1..=(0.2 / dt) as u32 {
         let seconds = dt * step as f32;
-        let turned = Quat::from_scaled_axis(visit.spin * seconds) * visit.start.orientation;
-        let place = visit.start.position + visit.velocity * seconds;
-        world.set_pose(tip, place, Some(turned)).expect("a pose");
-        // About where the tool ends up.
-        let about = place.as_dvec3();
+        let orientation = Quat::from_scaled_axis(visit.spin * seconds) * visit.start.orientation;
+        let target = visit.start.position + visit.velocity * seconds;
+        world.set_pose(tip, target, Some(orientation)).expect("a pose");
+        // About the end position of the tool.
+        let about = target.as_dvec3();
         let before = body(&world, block);
         let (p, l) = (momentum(before, node_mass), angular_momentum(before, node_mass, about));
         let from = centre(before);
@@ -98,82 +98,83 @@ fn errors(visit: &Visit, dt: f32, substeps: u32) -> (f64, f64, f64) {
         let dt = f64::from(dt);
         let weight = GRAVITY.as_dvec3() * mass;
         let change = momentum(after, node_mass) - p - (weight - force.as_dvec3()) * dt;
-        // The weight acts at the middle of the body, which moves.
+        // The weight acts at the center of the body, which moves.
         let middle = (from + centre(after)) / 2.0 - about;
-        let turning = angular_momentum(after, node_mass, about) - l - (middle.cross(weight) - torque.as_dvec3()) * dt;
+        let angular_change =
+            angular_momentum(after, node_mass, about) - l - (middle.cross(weight) - torque.as_dvec3()) * dt;
         linear = linear.max(change.length());
-        angular = angular.max(turning.length());
-        given = given.max(f64::from(force.length()) * dt);
+        angular = angular.max(angular_change.length());
+        impulse = impulse.max(f64::from(force.length()) * dt);
     }
-    assert!(given > 1e-4, "{:?} was not touched", visit.shape);
-    (linear / given, angular / given, given)
+    assert!(impulse > 1e-4, "{:?} was not touched", visit.shape);
+    (linear / impulse, angular / impulse, impulse)
 }
 
 #[test]
-fn the_momentum_a_tool_gives_is_the_momentum_that_arrives() {
+fn the_impulse_of_a_tool_equals_the_momentum_change() {
     for (index, visit) in visits().iter().enumerate() {
         for (dt, substeps) in [(0.001, 1), (0.002, 0), (1.0 / 60.0, 0), (1.0 / 60.0, 30)] {
-            let (linear, _, given) = errors(visit, dt, substeps);
-            // The roundings of a sum over the body's momentum in f32 beside 1e-5 of what was given.
-            let rounding = 3e-7 * 0.2 / given;
+            let (linear, _, impulse) = errors(visit, dt, substeps);
+            // Rounding of an f32 sum over the body's momentum, in addition to 1e-5 of the impulse.
+            let rounding = 3e-7 * 0.2 / impulse;
             assert!(
                 linear < 1e-5 + rounding,
-                "visit {index}, dt {dt}: {linear} of {given} N s"
+                "visit {index}, dt {dt}: {linear} of {impulse} N s"
             );
         }
     }
 }
 
 #[test]
-fn the_angular_momentum_a_tool_gives_arrives_up_to_the_motion_of_a_substep() {
-    the_angular_momentum_a_tool_gives_arrives_up_to_the_motion_of_a_substep_of(|visit| visit % 4 == 1);
+fn the_angular_impulse_of_a_tool_arrives_up_to_the_motion_of_a_substep() {
+    check_the_angular_impulse_of_a_tool_arrives_up_to_the_motion_of_a_substep(|visit| visit % 4 == 1);
 }
 
 #[test]
 #[ignore = "long"]
-fn the_angular_momentum_a_tool_gives_arrives_up_to_the_motion_of_a_substep_in_other_visits() {
-    the_angular_momentum_a_tool_gives_arrives_up_to_the_motion_of_a_substep_of(|visit| visit % 4 != 1);
+fn the_angular_impulse_of_a_tool_arrives_up_to_the_motion_of_a_substep_in_other_visits() {
+    check_the_angular_impulse_of_a_tool_arrives_up_to_the_motion_of_a_substep(|visit| visit % 4 != 1);
 }
 
-fn the_angular_momentum_a_tool_gives_arrives_up_to_the_motion_of_a_substep_of(is_tried: fn(usize) -> bool) {
-    // A contact acts where the node is at the beginning or at the end of a substep, which moves the arm by about the
-    // speed times the substep: of first order, so that a tenth of the substep leaves a tenth of the error.
-    for (index, visit) in visits().iter().enumerate().filter(|visit| is_tried(visit.0)) {
+fn check_the_angular_impulse_of_a_tool_arrives_up_to_the_motion_of_a_substep(is_selected: fn(usize) -> bool) {
+    // A contact acts at the node's position at the start or the end of a substep, so the lever arm is off by about
+    // speed times substep. The error is of first order: a tenth of the substep leaves a tenth of the error.
+    for (index, visit) in visits().iter().enumerate().filter(|visit| is_selected(visit.0)) {
         let (_, coarse, _) = errors(visit, 0.001, 1);
         let (_, fine, _) = errors(visit, 0.0001, 1);
-        // Nothing is faster than 2 m/s: the arm is off by less than 2 mm, and by less than 0.2 mm.
+        // Speeds are below 2 m/s, so the arm is off by less than 2 mm, or 0.2 mm.
         assert!(coarse < 0.002, "visit {index}: arm off by {coarse} m");
         assert!(fine < 0.0002, "visit {index}: arm off by {fine} m");
     }
 }
 
 #[test]
-fn a_smooth_ball_feels_no_torque() {
+fn a_ball_without_friction_has_no_torque() {
     for dt in [0.001, 1.0 / 60.0] {
         let mut world = world(GRAVITY);
         let ball = sphere(&mut world, 0.02, Vec3::new(0.01, -0.0205, 0.0));
         Tissue::VISCOUS.put(&mut world, &square(0.2, 12));
-        let mut most = 0.0_f32;
+        let mut largest = 0.0_f32;
         for step in 0..(0.3 / dt) as u32 {
-            let aside = Vec3::new(0.02, -0.0205, 0.05 * step as f32 * dt);
+            let position = Vec3::new(0.02, -0.0205, 0.05 * step as f32 * dt);
             world
-                .set_pose(ball, aside, Some(Quat::from_rotation_x(step as f32)))
+                .set_pose(ball, position, Some(Quat::from_rotation_x(step as f32)))
                 .expect("a pose");
             world.step(dt).expect("a step");
             let (force, torque) = world.wrench(ball).expect("a tool");
-            most = most.max(force.length());
+            largest = largest.max(force.length());
             assert!(
                 torque.length() <= 1e-4 * 0.02 * force.length(),
                 "dt {dt}, step {step}: {force} N, {torque} N m"
             );
         }
-        assert!(most > 0.1, "it fell past");
+        assert!(largest > 0.1, "the cloth missed the ball");
     }
 }
 
 #[test]
 fn two_bodies_share_a_tool() {
-    // What the tool feels with both is what it feels with each alone, because they do not feel each other.
+    // The force of both bodies is the sum of the forces of each alone, because they do not collide with each other.
     let path = |step: u32| Vec3::new(0.0, 0.012 - 0.0005 * step as f32, 0.0);
     let run = |first: bool, second: bool| {
         let mut world = world_of(Vec3::ZERO, 4);
@@ -184,20 +185,20 @@ fn two_bodies_share_a_tool() {
         if second {
             Tissue::VISCOUS.put(&mut world, &moved(square(0.2, 7), Vec3::Y * -0.005));
         }
-        let mut felt = Vec::new();
+        let mut forces = Vec::new();
         for step in 1..60 {
             world.set_pose(tip, path(step), None).expect("a pose");
             world.step(0.002).expect("a step");
-            felt.push(world.wrench(tip).expect("a tool").0.as_dvec3());
+            forces.push(world.wrench(tip).expect("a tool").0.as_dvec3());
         }
-        felt
+        forces
     };
     let (first, second, both) = (run(true, false), run(false, true), run(true, true));
-    let most = both.iter().fold(0.0_f64, |most, force| most.max(force.length()));
-    assert!(most > 0.01);
+    let largest = both.iter().fold(0.0_f64, |largest, force| largest.max(force.length()));
+    assert!(largest > 0.01);
     for ((first, second), both) in first.iter().zip(&second).zip(&both) {
-        let off = (*first + *second).distance(*both);
-        assert!(off <= 1e-5 * most, "{first} and {second}, together {both}");
+        let error = (*first + *second).distance(*both);
+        assert!(error <= 1e-5 * largest, "{first} and {second}, together {both}");
     }
     assert!(both.iter().any(|force| force.dot(DVec3::Y) > 0.0));
 }

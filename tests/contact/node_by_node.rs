@@ -1,4 +1,4 @@
-//! Nodes that meet a tool one by one: a round tool, the same as a mesh, and what happens between nodes.
+//! Node contacts of round tools: comparison with a mesh of the same shape, and penetration between nodes.
 
 use crate::support::solid::ball;
 use crate::support::tissue::*;
@@ -15,7 +15,7 @@ const TISSUE: Tissue = Tissue {
     spring_damping: 0.0,
 };
 
-/// A cloth that is held at its rim, and this tool above its middle.
+/// Creates a cloth that is pinned at its border, and a tool above its middle.
 fn above(cells: u32, shape: Shape, friction: f32) -> (World, BodyId, ToolId) {
     let mut world = world(Vec3::ZERO);
     let cloth = TISSUE.put(&mut world, &square(SIZE, cells));
@@ -24,31 +24,32 @@ fn above(cells: u32, shape: Shape, friction: f32) -> (World, BodyId, ToolId) {
     (world, cloth, tool)
 }
 
-/// Presses the tool `depth` into the cloth within half a second, moves it `aside`, and waits: the force on it.
-fn press(world: &mut World, tool: ToolId, depth: f32, aside: f32, mut look: impl FnMut(&World)) -> Vec3 {
+/// Presses the tool `depth` into the cloth within half a second, moves it `aside`, and waits. Returns the force on it.
+fn press(world: &mut World, tool: ToolId, depth: f32, aside: f32, mut visit: impl FnMut(&World)) -> Vec3 {
     for frame in 1..=90 {
         let [down, along] = [frame, frame - 30].map(|frame| (frame as f32 / 30.0).clamp(0.0, 1.0));
-        let place = Vec3::new(aside * along, RADIUS - depth * down, 0.0);
-        world.set_pose(tool, place, None).expect("a pose");
+        let position = Vec3::new(aside * along, RADIUS - depth * down, 0.0);
+        world.set_pose(tool, position, None).expect("a pose");
         world.step(FRAME).expect("a step");
-        look(world);
+        visit(world);
     }
     world.wrench(tool).expect("a tool").0
 }
 
-/// A chord of length l within a ball of radius R sags by l² / 8R, a triangle by no more than l² / 6R; the cloth may stretch by a third on the way.
+/// A chord of length l within a ball of radius R sags by l² / 8R, a triangle by at most l² / 6R. The cloth may stretch
+/// by a third.
 #[test]
-fn between_nodes_a_cloth_is_no_deeper_than_a_chord_of_the_ball() {
-    between_nodes_a_cloth_is_no_deeper_than_a_chord_of_the_ball_of(&[20, 40]);
+fn a_cloth_between_nodes_is_no_deeper_than_a_chord_of_the_ball() {
+    check_a_cloth_between_nodes_is_no_deeper_than_a_chord_of_the_ball(&[20, 40]);
 }
 
 #[test]
 #[ignore = "long"]
-fn between_nodes_a_cloth_is_no_deeper_than_a_chord_of_the_ball_with_more_cells() {
-    between_nodes_a_cloth_is_no_deeper_than_a_chord_of_the_ball_of(&[60]);
+fn a_cloth_between_nodes_is_no_deeper_than_a_chord_of_the_ball_with_more_cells() {
+    check_a_cloth_between_nodes_is_no_deeper_than_a_chord_of_the_ball(&[60]);
 }
 
-fn between_nodes_a_cloth_is_no_deeper_than_a_chord_of_the_ball_of(sizes: &[u32]) {
+fn check_a_cloth_between_nodes_is_no_deeper_than_a_chord_of_the_ball(sizes: &[u32]) {
     for &cells in sizes {
         let shape = Shape::Sphere { radius: RADIUS };
         let (mut world, cloth, ball) = above(cells, shape, 0.0);
@@ -74,23 +75,23 @@ fn between_nodes_a_cloth_is_no_deeper_than_a_chord_of_the_ball_of(sizes: &[u32])
             middles < sag,
             "{cells}: middles of faces {middles} m deep, {sag} allowed"
         );
-        assert!(middles > 0.0, "{cells}: nothing lay on the ball");
+        assert!(middles > 0.0, "{cells}: no face touched the ball");
     }
 }
 
-/// A ball of triangles lies within the round one by a chord of its edges: the same press but for that.
+/// A ball of triangles lies within the round ball by the sag of its edges. Apart from that, both press the same.
 #[test]
-fn a_mesh_of_a_ball_presses_as_the_ball_does() {
-    a_mesh_of_a_ball_presses_as_the_ball_does_of(0.4, 0.03);
+fn a_mesh_of_a_ball_presses_like_the_ball() {
+    check_a_mesh_of_a_ball_presses_like_the_ball(0.4, 0.03);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_mesh_of_a_ball_presses_as_the_ball_does_without_friction() {
-    a_mesh_of_a_ball_presses_as_the_ball_does_of(0.0, 0.0);
+fn a_mesh_of_a_ball_presses_like_the_ball_without_friction() {
+    check_a_mesh_of_a_ball_presses_like_the_ball(0.0, 0.0);
 }
 
-fn a_mesh_of_a_ball_presses_as_the_ball_does_of(friction: f32, aside: f32) {
+fn check_a_mesh_of_a_ball_presses_like_the_ball(friction: f32, aside: f32) {
     let mesh = ball(RADIUS, 4);
     let (mut world, _, round) = above(40, Shape::Sphere { radius: RADIUS }, friction);
     let exact = press(&mut world, round, 0.03, aside, |_| ());
@@ -99,17 +100,17 @@ fn a_mesh_of_a_ball_presses_as_the_ball_does_of(friction: f32, aside: f32) {
         triangles: &mesh.triangles,
     };
     let (mut world, _, meshed) = above(40, shape, friction);
-    let found = press(&mut world, meshed, 0.03, aside, |_| ());
-    assert!(exact.y > 0.1, "nothing to be measured: {exact}");
+    let measured = press(&mut world, meshed, 0.03, aside, |_| ());
+    assert!(exact.y > 0.1, "no force to measure: {exact}");
     assert!(
-        found.distance(exact) < 0.02 * exact.length(),
-        "friction {friction}: {found} N by the mesh, {exact} N by the ball"
+        measured.distance(exact) < 0.02 * exact.length(),
+        "friction {friction}: {measured} N by the mesh, {exact} N by the ball"
     );
 }
 
-/// What two tools give to nodes that they share is found together: pressed from both sides, each feels what the other does.
+/// Contacts of two tools with shared nodes are solved together. When they press from both sides, the forces balance.
 #[test]
-fn balls_on_both_sides_of_a_cloth_feel_each_other() {
+fn balls_on_both_sides_of_a_cloth_balance_each_other() {
     let (mut world, cloth, upper) = above(40, Shape::Sphere { radius: RADIUS }, 0.3);
     let lower = tool(
         &mut world,
@@ -119,9 +120,9 @@ fn balls_on_both_sides_of_a_cloth_feel_each_other() {
         Quat::IDENTITY,
     );
     for frame in 1..=60 {
-        let way = 0.002 * (frame as f32 / 30.0).min(1.0);
+        let displacement = 0.002 * (frame as f32 / 30.0).min(1.0);
         world
-            .set_pose(upper, Vec3::Y * (RADIUS + 0.001 - way), None)
+            .set_pose(upper, Vec3::Y * (RADIUS + 0.001 - displacement), None)
             .expect("a pose");
         world
             .set_pose(lower, Vec3::NEG_Y * (RADIUS + 0.001), None)
@@ -137,19 +138,20 @@ fn balls_on_both_sides_of_a_cloth_feel_each_other() {
     );
 }
 
-/// A cloth is stretched to several times its length under a ball, and the ball becomes small beside its edges: they take part as soon as they are long.
+/// A cloth is stretched to several times its length under a ball, so that the ball becomes small relative to its edges.
+/// Edges join contact detection as soon as they are long.
 #[test]
-fn a_cloth_that_is_stretched_lets_no_ball_through() {
-    a_cloth_that_is_stretched_lets_no_ball_through_of(20, 3.0);
+fn a_ball_does_not_pass_through_a_stretched_cloth() {
+    check_a_ball_does_not_pass_through_a_stretched_cloth(20, 3.0);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_cloth_that_is_stretched_lets_no_ball_through_of_more_cells() {
-    a_cloth_that_is_stretched_lets_no_ball_through_of(40, 4.0);
+fn a_ball_does_not_pass_through_a_stretched_cloth_of_more_cells() {
+    check_a_ball_does_not_pass_through_a_stretched_cloth(40, 4.0);
 }
 
-fn a_cloth_that_is_stretched_lets_no_ball_through_of(cells: u32, times: f32) {
+fn check_a_ball_does_not_pass_through_a_stretched_cloth(cells: u32, times: f32) {
     let edge = SIZE / cells as f32;
     let radius = times * edge;
     let mut world = world(Vec3::ZERO);
@@ -163,14 +165,14 @@ fn a_cloth_that_is_stretched_lets_no_ball_through_of(cells: u32, times: f32) {
     let ball = tool(&mut world, Shape::Sphere { radius }, 0.0, start, Quat::IDENTITY);
     let mut before = 0.0;
     for frame in 1..=120 {
-        let place = start - Vec3::Y * (0.2 * frame as f32 / 150.0);
-        world.set_pose(ball, place, None).expect("a pose");
+        let position = start - Vec3::Y * (0.2 * frame as f32 / 150.0);
+        world.set_pose(ball, position, None).expect("a pose");
         world.step(FRAME).expect("a step");
         if frame % 20 == 0 {
             let force = world.wrench(ball).expect("a ball").0.y;
             assert!(
                 force > before,
-                "{cells} cells: {force} N after {before} N: it went through"
+                "{cells} cells: {force} N after {before} N: it passed through"
             );
             before = force;
         }

@@ -1,4 +1,4 @@
-//! Tissue that is pinned all about a tool presses back like a spring, and stops a tool of limited force.
+//! Tissue whose nodes around a tool are all pinned presses back like a spring, and stops a tool with a force limit.
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -10,14 +10,15 @@ use crate::support::solid::cuboid;
 
 const DT: f32 = 1.0 / 60.0;
 
-/// Of the springs, N/m.
+/// The stiffness of the springs (N/m).
 const STIFFNESS: f32 = 1000.0;
 
-/// A sheet of 0.9 m at y = 0 with edges of 0.1 m, all of it pinned, its middle between nodes, and a tool of this shape 1 mm above `place`.
+/// Creates a fully pinned sheet of 0.9 m at y = 0 with edges of 0.1 m and its center between nodes, and a tool 1 mm
+/// above `target`.
 fn scene(
     solver: Solver,
     shape: Shape,
-    (place, orientation): (Vec3, Quat),
+    (target, orientation): (Vec3, Quat),
     force_limit: f32,
 ) -> (World, BodyId, ToolId) {
     let mut world = World::new(FREE).expect("a world");
@@ -37,7 +38,7 @@ fn scene(
     }
     let tool = ToolDefinition {
         pose: Pose {
-            position: place + Vec3::Y * 1e-3,
+            position: target + Vec3::Y * 1e-3,
             orientation,
         },
         force_limit,
@@ -47,15 +48,15 @@ fn scene(
     (world, body, tool)
 }
 
-/// Where the forces at pins add up.
-fn held(world: &World, body: BodyId) -> DVec3 {
+/// Returns the sum of the pin forces.
+fn pin_force_sum(world: &World, body: BodyId) -> DVec3 {
     let body = world.body(body).expect("a body");
     let nodes = 0..body.node_count() as u32;
     nodes.map(|node| body.pin_force(node).expect("a pin").as_dvec3()).sum()
 }
 
 #[test]
-fn a_tool_that_is_led_into_it_feels_more_the_deeper_it_is() {
+fn the_force_grows_with_the_depth_of_the_tool() {
     let (positions, triangles) = cuboid(Vec3::splat(-0.03), Vec3::splat(0.03));
     let mesh = Shape::Mesh {
         positions: &positions,
@@ -87,9 +88,9 @@ fn a_tool_that_is_led_into_it_feels_more_the_deeper_it_is() {
             let (mut world, body, tool) = scene(solver, shape, pose, f32::INFINITY);
             let mut last = 0.0;
             for millimetre in 0..6 {
-                // Onto the sheet, then a millimetre deeper each time.
-                let place = pose.0 + Vec3::Y * (1e-6 - 1e-3 * millimetre as f32);
-                world.set_pose(tool, place, None).expect("a pose");
+                // First just above the sheet, then a millimeter deeper each time.
+                let target = pose.0 + Vec3::Y * (1e-6 - 1e-3 * millimetre as f32);
+                world.set_pose(tool, target, None).expect("a pose");
                 world.step(DT).expect("a step");
                 let force = world.wrench(tool).expect("a tool").0;
                 if millimetre == 0 {
@@ -97,13 +98,13 @@ fn a_tool_that_is_led_into_it_feels_more_the_deeper_it_is() {
                     continue;
                 }
                 assert!(force.y > last + 0.5, "{case}, {millimetre}: {force} after {last} N");
-                // A node is held by up to eight springs, whose stiffness it has.
+                // A node is held by up to eight springs, and has their stiffness.
                 assert!(force.y < 8.0 * STIFFNESS * 1e-3 * millimetre as f32, "{case}: {force}");
                 assert!(force.x.abs().max(force.z.abs()) < 0.1 * force.y, "{case}: {force}");
-                let held = held(&world, body);
+                let pin_force_sum = pin_force_sum(&world, body);
                 assert!(
-                    held.distance(force.as_dvec3()) < 1e-5 * f64::from(force.y),
-                    "{case}: pins hold {held}, the tool has {force}"
+                    pin_force_sum.distance(force.as_dvec3()) < 1e-5 * f64::from(force.y),
+                    "{case}: pins hold {pin_force_sum}, the tool has {force}"
                 );
                 let contacts: Vec3 = world.contacts(tool).expect("a tool").map(|contact| contact.force).sum();
                 assert_eq!(contacts, force, "{case}");
@@ -114,7 +115,7 @@ fn a_tool_that_is_led_into_it_feels_more_the_deeper_it_is() {
 }
 
 #[test]
-fn it_pushes_back_out_by_the_side_on_which_a_tool_came() {
+fn a_tool_is_pushed_out_on_the_side_from_which_it_came() {
     for solver in SOLVERS {
         let shape = Shape::Sphere { radius: 0.03 };
         let start = Vec3::Y * 0.03;
@@ -122,8 +123,8 @@ fn it_pushes_back_out_by_the_side_on_which_a_tool_came() {
         let mut last = 0.0;
         let depths = (0..56).chain((0..56).rev());
         for (step, depth) in depths.enumerate() {
-            let place = start - Vec3::Y * (1e-3 * depth as f32);
-            world.set_pose(tool, place, None).expect("a pose");
+            let target = start - Vec3::Y * (1e-3 * depth as f32);
+            world.set_pose(tool, target, None).expect("a pose");
             world.step(DT).expect("a step");
             let force = world.wrench(tool).expect("a tool").0.y;
             let case = format!("{solver:?}, step {step}, {depth} mm deep: {force} N after {last} N");
@@ -135,21 +136,21 @@ fn it_pushes_back_out_by_the_side_on_which_a_tool_came() {
 }
 
 #[test]
-fn a_tool_of_limited_force_stops_at_it() {
-    a_tool_of_limited_force_stops_at_it_of(|solver, speed| solver == Solver::Verlet || speed < 1.0);
+fn a_tool_with_a_force_limit_stops_at_it() {
+    check_a_tool_with_a_force_limit_stops_at_it(|solver, speed| solver == Solver::Verlet || speed < 1.0);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_tool_of_limited_force_stops_at_it_in_the_other_cases() {
-    a_tool_of_limited_force_stops_at_it_of(|solver, speed| solver != Solver::Verlet && speed > 1.0);
+fn a_tool_with_a_force_limit_stops_at_it_in_the_other_cases() {
+    check_a_tool_with_a_force_limit_stops_at_it(|solver, speed| solver != Solver::Verlet && speed > 1.0);
 }
 
-fn a_tool_of_limited_force_stops_at_it_of(is_tried: fn(Solver, f32) -> bool) {
+fn check_a_tool_with_a_force_limit_stops_at_it(is_selected: fn(Solver, f32) -> bool) {
     let limit = 1.0;
     for solver in SOLVERS {
-        // What is fast would be beyond the sheet within a step.
-        for speed in [0.6, 60.0_f32].into_iter().filter(|&speed| is_tried(solver, speed)) {
+        // A fast tool would pass the sheet within one step.
+        for speed in [0.6, 60.0_f32].into_iter().filter(|&speed| is_selected(solver, speed)) {
             let case = format!("{solver:?}, {speed} m/s");
             let shape = Shape::Sphere { radius: 0.04 };
             let (mut world, _, tool) = scene(solver, shape, (Vec3::Y * 0.3, Quat::IDENTITY), limit);
@@ -160,10 +161,13 @@ fn a_tool_of_limited_force_stops_at_it_of(is_tried: fn(Solver, f32) -> bool) {
                 let force = world.wrench(tool).expect("a tool").0.length();
                 assert!(force <= 1.01 * limit, "{case}: {force} N");
             }
-            // Radius 0.04 m. The search for where it stops ends within a part of the way that it was to go.
+            // The search for the stopping position is accurate to a fraction of the commanded displacement.
             let highest = 0.0401 + 5e-2 * speed * DT;
-            let left = world.pose(tool).expect("a tool").position.y;
-            assert!((0.0389..highest).contains(&left), "{case}: the ball stands at {left} m");
+            let final_height = world.pose(tool).expect("a tool").position.y;
+            assert!(
+                (0.0389..highest).contains(&final_height),
+                "{case}: the ball stands at {final_height} m"
+            );
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Spheres and capsules pressed into a cloth that is held at its rim: what they feel is what the rim carries.
+//! Spheres and capsules pressed into a cloth that is pinned at its border: the force on the tool equals the force on
+//! the border.
 
 use crate::support::organ::of_elements;
 use crate::support::tissue::*;
@@ -15,25 +16,28 @@ const TISSUE: Tissue = Tissue {
     spring_damping: 0.02,
 };
 
-/// A tool pressed into a cloth of `cells` by `depth` over half a second, then held: checks all of it.
-fn press(dt: f32, cells: u32, shape: Shape, radius: f32, turned: Quat, aside: Vec3, depth: f32) {
-    let case = format!("dt {dt}, {cells} cells, {shape:?}, aside {aside}");
+/// Presses a tool into a cloth of `cells` by `depth` over half a second, then holds it, and checks penetration and
+/// forces.
+fn press(dt: f32, cells: u32, shape: Shape, radius: f32, orientation: Quat, offset: Vec3, depth: f32) {
+    let case = format!("dt {dt}, {cells} cells, {shape:?}, aside {offset}");
     let mesh = square(SIZE, cells);
     let mut world = world(DOWN);
     let cloth = TISSUE.put(&mut world, &mesh);
     let pins = rim(cells);
     pin_all(&mut world, cloth, &pins);
-    // The cloth hangs through before it is touched.
+    // The cloth sags before contact.
     for _ in 0..(0.5 / dt) as u32 {
         world.step(dt).expect("a step");
     }
-    let start = aside + Vec3::Y * (radius + 0.001);
-    let tip = tool(&mut world, shape, 0.0, start, turned);
-    let coming = (0.5 / dt) as u32;
+    let start = offset + Vec3::Y * (radius + 0.001);
+    let tip = tool(&mut world, shape, 0.0, start, orientation);
+    let press_steps = (0.5 / dt) as u32;
     let mut deepest = f64::NEG_INFINITY;
-    for step in 1..=coming {
-        let way = depth * step as f32 / coming as f32;
-        world.set_pose(tip, start - Vec3::Y * way, None).expect("a pose");
+    for step in 1..=press_steps {
+        let displacement = depth * step as f32 / press_steps as f32;
+        world
+            .set_pose(tip, start - Vec3::Y * displacement, None)
+            .expect("a pose");
         world.step(dt).expect("a step");
         deepest = deepest.max(penetration_of(&world, cloth, shape, tip));
     }
@@ -46,75 +50,92 @@ fn press(dt: f32, cells: u32, shape: Shape, radius: f32, turned: Quat, aside: Ve
     assert!(deepest < 0.001, "{case}: {deepest} m deep");
     assert!(kinetic(&world, cloth) < 1e-9, "{case}: J {}", kinetic(&world, cloth));
 
-    // At rest the tool, the rim and the weight hold each other.
+    // At rest, the forces on the tool, the border and the weight balance.
     let (force, torque) = world.wrench(tip).expect("a tool");
     let mass = f64::from(TISSUE.node_mass(&mesh));
     let weight = DOWN.as_dvec3() * mass * mesh.positions.len() as f64;
     let carried = pin_forces(&world, cloth, &pins) + weight;
-    let off = force.as_dvec3().distance(carried);
-    assert!(carried.y > 0.02, "{case}: nothing to be measured, {carried}");
+    let error = force.as_dvec3().distance(carried);
+    assert!(carried.y > 0.02, "{case}: no force to measure: {carried}");
     assert!(
-        off < 0.02 * carried.length(),
+        error < 0.02 * carried.length(),
         "{case}: {force} on the tool, {carried} carried"
     );
     let pose = world.pose(tip).expect("a tool").position.as_dvec3();
     let middle = centre(body(&world, cloth));
     let moment = pin_moments(&world, cloth, &pins, pose) + (middle - pose).cross(weight);
-    let off = torque.as_dvec3().distance(moment);
+    let error = torque.as_dvec3().distance(moment);
     assert!(
-        off < 0.02 * carried.length() * f64::from(SIZE) / 2.0,
+        error < 0.02 * carried.length() * f64::from(SIZE) / 2.0,
         "{case}: torque {torque} on the tool, {moment} carried"
     );
-    // A ball without friction feels no torque about its middle.
+    // A ball without friction has no torque about its center.
     if let Shape::Sphere { .. } = shape {
-        let off = f64::from(torque.length());
+        let error = f64::from(torque.length());
         assert!(
-            off < 1e-4 * carried.length() * f64::from(radius),
+            error < 1e-4 * carried.length() * f64::from(radius),
             "{case}: torque {torque}"
         );
     }
-    // It leaves, and feels nothing at all.
+    // The tool leaves, and its wrench is exactly zero.
     world.set_pose(tip, start + Vec3::Y * 0.2, None).expect("a pose");
     world.step(dt).expect("a step");
     world.step(dt).expect("a step");
     let (force, torque) = world.wrench(tip).expect("a tool");
-    assert_eq!((force, torque), (Vec3::ZERO, Vec3::ZERO), "{case}: gone, yet felt");
+    assert_eq!(
+        (force, torque),
+        (Vec3::ZERO, Vec3::ZERO),
+        "{case}: force after contact has ended"
+    );
 }
 
 #[test]
-fn spheres_feel_what_the_rim_carries() {
-    spheres_feel_what_the_rim_carries_of(&[(1.0 / 60.0, 20), (1.0 / 30.0, 8)]);
+fn the_force_on_spheres_equals_the_force_on_the_border() {
+    check_the_force_on_spheres_equals_the_force_on_the_border(&[(1.0 / 60.0, 20), (1.0 / 30.0, 8)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn spheres_feel_what_the_rim_carries_in_the_other_cases() {
-    spheres_feel_what_the_rim_carries_of(&[(0.001, 8), (0.001, 20), (1.0 / 60.0, 8), (1.0 / 30.0, 20)]);
+fn the_force_on_spheres_equals_the_force_on_the_border_in_the_other_cases() {
+    check_the_force_on_spheres_equals_the_force_on_the_border(&[
+        (0.001, 8),
+        (0.001, 20),
+        (1.0 / 60.0, 8),
+        (1.0 / 30.0, 20),
+    ]);
 }
 
-fn spheres_feel_what_the_rim_carries_of(cases: &[(f32, u32)]) {
+fn check_the_force_on_spheres_equals_the_force_on_the_border(cases: &[(f32, u32)]) {
     for &(dt, cells) in cases {
         let radius = 0.02;
-        let aside = Vec3::new(0.013, 0.0, 0.021);
-        press(dt, cells, Shape::Sphere { radius }, radius, Quat::IDENTITY, aside, 0.05);
+        let offset = Vec3::new(0.013, 0.0, 0.021);
+        press(
+            dt,
+            cells,
+            Shape::Sphere { radius },
+            radius,
+            Quat::IDENTITY,
+            offset,
+            0.05,
+        );
     }
 }
 
 #[test]
 fn spheres_smaller_than_the_mesh_do_not_slip_through() {
-    spheres_smaller_than_the_mesh_do_not_slip_through_of(&[1.0 / 60.0]);
+    check_spheres_smaller_than_the_mesh_do_not_slip_through(&[1.0 / 60.0]);
 }
 
 #[test]
 #[ignore = "long"]
 fn spheres_smaller_than_the_mesh_do_not_slip_through_in_other_steps() {
-    spheres_smaller_than_the_mesh_do_not_slip_through_of(&[0.002, 1.0 / 30.0]);
+    check_spheres_smaller_than_the_mesh_do_not_slip_through(&[0.002, 1.0 / 30.0]);
 }
 
-fn spheres_smaller_than_the_mesh_do_not_slip_through_of(steps: &[f32]) {
-    // On a face, an edge, a node, and anywhere: faces and edges are all that such a sphere meets.
+fn check_spheres_smaller_than_the_mesh_do_not_slip_through(steps: &[f32]) {
+    // On a face, an edge, a node, and another point. Such a sphere meets only faces and edges.
     let spacing = SIZE / 10.0;
-    let places = [
+    let targets = [
         Vec3::new(0.3, 0.0, 0.15),
         Vec3::new(0.5, 0.0, 0.0),
         Vec3::new(0.5, 0.0, 0.5),
@@ -123,7 +144,7 @@ fn spheres_smaller_than_the_mesh_do_not_slip_through_of(steps: &[f32]) {
         Vec3::new(-1.71, 0.0, 2.23),
     ];
     for &dt in steps {
-        for place in places {
+        for target in targets {
             for radius in [0.002, 0.006] {
                 press(
                     dt,
@@ -131,7 +152,7 @@ fn spheres_smaller_than_the_mesh_do_not_slip_through_of(steps: &[f32]) {
                     Shape::Sphere { radius },
                     radius,
                     Quat::IDENTITY,
-                    place * spacing,
+                    target * spacing,
                     0.03,
                 );
             }
@@ -140,17 +161,17 @@ fn spheres_smaller_than_the_mesh_do_not_slip_through_of(steps: &[f32]) {
 }
 
 #[test]
-fn capsules_lie_in_the_cloth() {
-    capsules_lie_in_the_cloth_of(&[(1.0 / 60.0, 16, 0.5), (1.0 / 60.0, 9, 1.1)]);
+fn capsules_rest_in_the_cloth() {
+    check_capsules_rest_in_the_cloth(&[(1.0 / 60.0, 16, 0.5), (1.0 / 60.0, 9, 1.1)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn capsules_lie_in_the_cloth_in_the_other_cases() {
-    capsules_lie_in_the_cloth_of(&[(0.001, 16, 0.0), (1.0 / 30.0, 20, 0.3)]);
+fn capsules_rest_in_the_cloth_in_the_other_cases() {
+    check_capsules_rest_in_the_cloth(&[(0.001, 16, 0.0), (1.0 / 30.0, 20, 0.3)]);
 }
 
-fn capsules_lie_in_the_cloth_of(cases: &[(f32, u32, f32)]) {
+fn check_capsules_rest_in_the_cloth(cases: &[(f32, u32, f32)]) {
     for &(dt, cells, angle) in cases {
         for (radius, half_length) in [(0.01, 0.04), (0.004, 0.05)] {
             let lying = Quat::from_rotation_y(angle) * Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
@@ -161,18 +182,18 @@ fn capsules_lie_in_the_cloth_of(cases: &[(f32, u32, f32)]) {
 }
 
 #[test]
-fn a_box_on_a_block_feels_what_theory_gives_at_rest() {
-    feels_what_theory_gives_at_rest(2);
+fn the_force_on_a_box_on_a_block_matches_theory_at_rest() {
+    assert_force_at_rest_matches_theory(2);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_box_on_a_fine_block_feels_what_theory_gives_at_rest() {
-    feels_what_theory_gives_at_rest(3);
+fn the_force_on_a_box_on_a_fine_block_matches_theory_at_rest() {
+    assert_force_at_rest_matches_theory(3);
 }
 
-/// The strain is the same everywhere, which elements of any size have exactly.
-fn feels_what_theory_gives_at_rest(cells: u32) {
+/// The strain is uniform, which elements of any size represent exactly.
+fn assert_force_at_rest_matches_theory(cells: u32) {
     const SIDE: f32 = 0.04;
     const STRAIN: f32 = 2e-3;
     let mesh = Mesh::block([SIDE; 3], [cells; 3]).expect("a block");
@@ -182,14 +203,14 @@ fn feels_what_theory_gives_at_rest(cells: u32) {
     };
     let mut world = world(Vec3::ZERO);
     let block = world.create_body(&definition).expect("a body");
-    // Held so that it may get wider: along y at its lower side, along x and z at one side each.
+    // The block is free to widen: pinned along y at its lower side, and along x and z at one side each.
     for (node, rest) in (0..).zip(&mesh.positions) {
-        let held = rest.to_array().map(|at| at < -0.499 * SIDE);
-        if held.contains(&true) {
+        let pinned_axes = rest.to_array().map(|at| at < -0.499 * SIDE);
+        if pinned_axes.contains(&true) {
             world
                 .body_mut(block)
                 .expect("the body")
-                .pin_axes(node, held)
+                .pin_axes(node, pinned_axes)
                 .expect("a node");
         }
     }
@@ -227,8 +248,8 @@ fn a_standing_capsule_is_a_sphere_at_its_tip() {
 }
 
 #[test]
-fn what_a_pinned_node_takes_from_a_tool_its_pin_takes() {
-    // All nodes but the middle one are pinned, and the ball lies on edges and faces between it and them.
+fn pin_forces_include_the_tool_forces_on_pinned_nodes() {
+    // All nodes but the middle one are pinned. The ball lies on edges and faces between it and the others.
     let mut world = world(Vec3::ZERO);
     let cloth = TISSUE.put(&mut world, &square(0.1, 2));
     let pins = rim(2);
@@ -244,7 +265,7 @@ fn what_a_pinned_node_takes_from_a_tool_its_pin_takes() {
     let force = world.wrench(ball).expect("a tool").0.as_dvec3();
     let carried = pin_forces(&world, cloth, &pins);
     assert!(kinetic(&world, cloth) < 1e-10);
-    assert!(force.length() > 0.01, "nothing to be measured: {force}");
+    assert!(force.length() > 0.01, "no force to measure: {force}");
     assert!(
         force.distance(carried) < 0.02 * force.length(),
         "{force} on the tool, {carried} carried"

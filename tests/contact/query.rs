@@ -1,4 +1,4 @@
-//! What a ray meets and what is nearest to a point, over the bodies of a world.
+//! Ray casts and nearest-point queries over the bodies of a world.
 
 use glam::{DVec3, Vec3};
 use sinew::cutting::Sweep;
@@ -8,7 +8,7 @@ use sinew::{BodyDefinition, BodyId, SurfaceHit, World, WorldDefinition};
 use crate::support::tissue::Random;
 
 fn add(world: &mut World, mesh: &Mesh, by: Vec3) -> BodyId {
-    let positions: Vec<Vec3> = mesh.positions.iter().map(|place| *place + by).collect();
+    let positions: Vec<Vec3> = mesh.positions.iter().map(|position| *position + by).collect();
     let masses = vec![0.001; positions.len()];
     let surface = mesh.surface().expect("a surface");
     let definition = BodyDefinition {
@@ -20,7 +20,7 @@ fn add(world: &mut World, mesh: &Mesh, by: Vec3) -> BodyId {
     world.create_body(&definition).expect("a body")
 }
 
-/// Two boxes of 0.1 m, the first about the origin, the second 0.3 m further along x.
+/// Creates two boxes of 0.1 m, the first about the origin, the second 0.3 m further along x.
 fn boxes() -> (World, [BodyId; 2]) {
     let mesh = Mesh::lattice(0.025, [4; 3]).expect("a lattice");
     let least = mesh.positions.iter().copied().reduce(Vec3::min).expect("nodes");
@@ -30,45 +30,45 @@ fn boxes() -> (World, [BodyId; 2]) {
     (world, ids)
 }
 
-/// What is told of a point agrees with itself.
-fn check(world: &World, told: &sinew::SurfaceHit) {
-    let body = world.body(told.body).expect("a body");
-    let nodes = body.surface()[told.triangle as usize];
+/// Checks that the fields of a hit are consistent.
+fn check(world: &World, hit: &sinew::SurfaceHit) {
+    let body = world.body(hit.body).expect("a body");
+    let nodes = body.surface()[hit.triangle as usize];
     let corners = nodes.map(|node| body.positions()[node as usize]);
-    let place: Vec3 = corners
+    let position: Vec3 = corners
         .iter()
-        .zip(told.weights)
+        .zip(hit.weights)
         .map(|(corner, weight)| *corner * weight)
         .sum();
-    assert!(place.distance(told.position) < 1e-6, "{told:?}");
-    assert!(told.weights.iter().all(|&weight| weight >= 0.0));
-    assert!((told.weights.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+    assert!(position.distance(hit.position) < 1e-6, "{hit:?}");
+    assert!(hit.weights.iter().all(|&weight| weight >= 0.0));
+    assert!((hit.weights.iter().sum::<f32>() - 1.0).abs() < 1e-6);
 }
 
 #[test]
-fn rays_meet_the_first_body() {
+fn rays_hit_the_first_body() {
     let (world, [near, far]) = boxes();
     for y in [-0.03, 0.0, 0.0125, 0.025] {
         for z in [-0.025, 0.0, 0.011] {
             let from = Vec3::new(-1.0, y, z);
-            let told = world
+            let hit = world
                 .cast_ray(from, Vec3::X * 7.0, f32::INFINITY)
                 .expect("a ray")
                 .expect("a hit");
-            check(&world, &told);
-            assert_eq!(told.body, near);
+            check(&world, &hit);
+            assert_eq!(hit.body, near);
             assert!(
-                (told.distance - 0.95).abs() < 1e-6 && told.normal.distance(Vec3::NEG_X) < 1e-6,
-                "{told:?}"
+                (hit.distance - 0.95).abs() < 1e-6 && hit.normal.distance(Vec3::NEG_X) < 1e-6,
+                "{hit:?}"
             );
-            assert!(told.position.distance(Vec3::new(-0.05, y, z)) < 1e-6);
-            // Backwards the other is first; from between them each is met; too short, or past them, nothing.
-            let told = world
+            assert!(hit.position.distance(Vec3::new(-0.05, y, z)) < 1e-6);
+            // Backward, the other box is hit first. Rays that are too short or pass beside the boxes hit nothing.
+            let hit = world
                 .cast_ray(Vec3::new(1.0, y, z), Vec3::NEG_X, 2.0)
                 .expect("a ray")
                 .expect("a hit");
-            assert_eq!(told.body, far);
-            assert!((told.distance - 0.65).abs() < 1e-6);
+            assert_eq!(hit.body, far);
+            assert!((hit.distance - 0.65).abs() < 1e-6);
             assert_eq!(world.cast_ray(from, Vec3::X, 0.9499).expect("a ray"), None);
             assert_eq!(world.cast_ray(from, Vec3::NEG_X, f32::INFINITY).expect("a ray"), None);
             assert_eq!(
@@ -79,16 +79,16 @@ fn rays_meet_the_first_body() {
             );
         }
     }
-    // From inside the back of the surface is met.
-    let told = world
+    // From inside, the back of the surface is hit.
+    let hit = world
         .cast_ray(Vec3::new(0.31, 0.01, 0.0), Vec3::Y, 1.0)
         .expect("a ray")
         .expect("a hit");
-    assert!(told.body == far && (told.distance - 0.04).abs() < 1e-6 && told.normal.distance(Vec3::Y) < 1e-6);
+    assert!(hit.body == far && (hit.distance - 0.04).abs() < 1e-6 && hit.normal.distance(Vec3::Y) < 1e-6);
 }
 
 #[test]
-fn points_find_the_nearest_body() {
+fn nearest_point_queries_return_the_nearest_body() {
     let (mut world, [near, far]) = boxes();
     for (point, body, distance, position) in [
         (Vec3::new(-0.25, 0.01, 0.02), near, 0.2, Vec3::new(-0.05, 0.01, 0.02)),
@@ -97,46 +97,46 @@ fn points_find_the_nearest_body() {
         (Vec3::new(0.38, 0.09, 0.05), far, 0.05, Vec3::new(0.35, 0.05, 0.05)),
         (Vec3::new(0.3, 0.02, -0.01), far, 0.03, Vec3::new(0.3, 0.05, -0.01)),
     ] {
-        let told = world
+        let hit = world
             .nearest_point(point, f32::INFINITY)
             .expect("a point")
             .expect("a body");
-        check(&world, &told);
-        assert_eq!(told.body, body);
+        check(&world, &hit);
+        assert_eq!(hit.body, body);
         assert!(
-            (told.distance - distance).abs() < 1e-6 && told.position.distance(position) < 1e-6,
-            "{told:?}"
+            (hit.distance - distance).abs() < 1e-6 && hit.position.distance(position) < 1e-6,
+            "{hit:?}"
         );
         assert!(world.nearest_point(point, distance * 0.999).expect("a point").is_none());
     }
-    // Where nodes were put is where they are asked for, and what is destroyed is not found.
+    // Queries use positions that were set, and do not return destroyed bodies.
     let moved: Vec<Vec3> = world
         .body(near)
         .expect("a body")
         .positions()
         .iter()
-        .map(|place| *place + Vec3::Y)
+        .map(|node| *node + Vec3::Y)
         .collect();
     world
         .body_mut(near)
         .expect("a body")
         .set_positions(&moved)
         .expect("places");
-    let told = world
+    let hit = world
         .nearest_point(Vec3::Y * 2.0, 1.0)
         .expect("a point")
         .expect("a body");
-    assert!(told.body == near && (told.distance - 0.95).abs() < 1e-6);
+    assert!(hit.body == near && (hit.distance - 0.95).abs() < 1e-6);
     world.destroy_body(near).expect("a body");
-    let told = world
+    let hit = world
         .nearest_point(Vec3::Y * 2.0, f32::INFINITY)
         .expect("a point")
         .expect("a body");
-    assert_eq!(told.body, far);
+    assert_eq!(hit.body, far);
 }
 
 #[test]
-fn what_is_asked_wrongly_is_refused() {
+fn invalid_queries_are_refused() {
     let (world, _) = boxes();
     let ray = |origin, direction, limit| {
         world
@@ -157,30 +157,30 @@ fn what_is_asked_wrongly_is_refused() {
 }
 
 #[test]
-fn what_is_just_as_far_as_is_asked_for_is_found() {
+fn hits_exactly_at_the_maximum_distance_are_returned() {
     let mesh = Mesh::block([2.0; 3], [2; 3]).expect("a block");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     add(&mut world, &mesh, Vec3::ZERO);
-    let (x, y) = (mesh.positions.iter()).fold((0.0_f32, 0.0_f32), |most, node| {
-        (most.0.max(node.x), most.1.max(node.y))
+    let (x, y) = (mesh.positions.iter()).fold((0.0_f32, 0.0_f32), |largest, node| {
+        (largest.0.max(node.x), largest.1.max(node.y))
     });
-    let place = Vec3::new(x + 1.0, y - 0.7, 0.3);
+    let position = Vec3::new(x + 1.0, y - 0.7, 0.3);
     for limit in [1.0, 1.5, 2.0] {
         let ray = world
-            .cast_ray(place, Vec3::NEG_X, limit)
+            .cast_ray(position, Vec3::NEG_X, limit)
             .expect("a ray")
             .expect("a hit");
         assert_eq!(ray.distance, 1.0);
-        let near = world.nearest_point(place, limit).expect("a point").expect("a body");
+        let near = world.nearest_point(position, limit).expect("a point").expect("a body");
         assert_eq!(near.distance, 1.0);
     }
     let short = 1.0_f32.next_down();
-    assert_eq!(world.cast_ray(place, Vec3::NEG_X, short).expect("a ray"), None);
-    assert_eq!(world.nearest_point(place, short).expect("a point"), None);
+    assert_eq!(world.cast_ray(position, Vec3::NEG_X, short).expect("a ray"), None);
+    assert_eq!(world.nearest_point(position, short).expect("a point"), None);
 }
 
 #[test]
-fn a_ray_finds_a_body_where_it_is_drawn_however_fast_it_moves() {
+fn a_ray_hits_a_fast_body_at_its_current_positions() {
     let mesh = Mesh::lattice(0.05, [2; 3]).expect("a lattice");
     for speed in [0.1, 1.0, 2.0, 4.0, 10.0] {
         let mut world = World::new(WorldDefinition {
@@ -194,20 +194,22 @@ fn a_ray_finds_a_body_where_it_is_drawn_however_fast_it_moves() {
         body.set_velocities(&velocities).expect("velocities");
         for step in 0..100 {
             world.step(1.0 / 60.0).expect("a step");
-            let places = world.body(id).expect("a body").positions();
-            let lowest = places.iter().fold(f32::INFINITY, |lowest, place| lowest.min(place.y));
-            let from = places[0].with_y(lowest - 1e-3) + Vec3::new(0.013, 0.0, 0.017);
+            let positions = world.body(id).expect("a body").positions();
+            let lowest = positions
+                .iter()
+                .fold(f32::INFINITY, |lowest, position| lowest.min(position.y));
+            let from = positions[0].with_y(lowest - 1e-3) + Vec3::new(0.013, 0.0, 0.017);
             let ray = world.cast_ray(from, Vec3::Y, 1.0).expect("a ray");
             let near = world.nearest_point(from, 0.05).expect("a point");
-            for told in [ray, near] {
-                let told = told.unwrap_or_else(|| panic!("nothing at {speed} m/s, step {step}"));
-                assert!((told.distance - 1e-3).abs() < 1e-5, "{told:?}");
+            for hit in [ray, near] {
+                let hit = hit.unwrap_or_else(|| panic!("nothing at {speed} m/s, step {step}"));
+                assert!((hit.distance - 1e-3).abs() < 1e-5, "{hit:?}");
             }
         }
     }
 }
 
-/// All triangles of the bodies, in f64.
+/// Returns all triangles of the bodies, in f64.
 fn triangles<'a>(world: &'a World, ids: &'a [BodyId]) -> impl Iterator<Item = [DVec3; 3]> + 'a {
     ids.iter().flat_map(|&id| {
         let body = world.body(id).expect("a body");
@@ -216,23 +218,23 @@ fn triangles<'a>(world: &'a World, ids: &'a [BodyId]) -> impl Iterator<Item = [D
     })
 }
 
-/// How far along a ray the first triangle is, by looking at each (Moeller, Trumbore 1997).
-fn first_of_each(world: &World, ids: &[BodyId], from: Vec3, along: Vec3) -> f64 {
-    let (from, way) = (from.as_dvec3(), along.as_dvec3().normalize());
+/// Returns the distance to the first triangle along a ray, tested one by one (Moeller, Trumbore 1997).
+fn first_hit_brute_force(world: &World, ids: &[BodyId], from: Vec3, along: Vec3) -> f64 {
+    let (from, direction) = (from.as_dvec3(), along.as_dvec3().normalize());
     let hit = |[a, b, c]: [DVec3; 3]| {
-        let across = way.cross(c - a);
-        let determinant = (b - a).dot(across);
-        let u = (from - a).dot(across) / determinant;
+        let normal = direction.cross(c - a);
+        let determinant = (b - a).dot(normal);
+        let u = (from - a).dot(normal) / determinant;
         let other = (from - a).cross(b - a);
-        let v = way.dot(other) / determinant;
+        let v = direction.dot(other) / determinant;
         let distance = (c - a).dot(other) / determinant;
         (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance >= 0.0).then_some(distance)
     };
     triangles(world, ids).filter_map(hit).fold(f64::INFINITY, f64::min)
 }
 
-/// How far the nearest triangle is, by looking at each: above its face, or beside one of its edges.
-fn nearest_of_each(world: &World, ids: &[BodyId], point: Vec3) -> f64 {
+/// Returns the distance to the nearest triangle, tested one by one: above its face, or to one of its edges.
+fn nearest_distance_brute_force(world: &World, ids: &[BodyId], point: Vec3) -> f64 {
     let point = point.as_dvec3();
     let distance = |corners: [DVec3; 3]| {
         let [a, b, c] = corners;
@@ -241,24 +243,24 @@ fn nearest_of_each(world: &World, ids: &[BodyId], point: Vec3) -> f64 {
         let is_above = sides
             .iter()
             .all(|[p, q]| normal.dot((*q - *p).cross(point - *p)) >= 0.0);
-        let beside = sides.map(|[p, q]| {
+        let to_edges = sides.map(|[p, q]| {
             let along = (point - p).dot(q - p) / (q - p).length_squared();
             point.distance(p.lerp(q, along.clamp(0.0, 1.0)))
         });
-        let beside = beside.into_iter().fold(f64::INFINITY, f64::min);
+        let to_edges = to_edges.into_iter().fold(f64::INFINITY, f64::min);
         if is_above && normal != DVec3::ZERO {
-            beside.min(normal.dot(point - a).abs())
+            to_edges.min(normal.dot(point - a).abs())
         } else {
-            beside
+            to_edges
         }
     };
     triangles(world, ids).map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// Asks about these places: all answers are those of looking at each triangle, on any number of threads at once.
-fn check_queries(world: &World, ids: &[BodyId], random: &mut Random, when: &str) {
+/// Checks random queries against brute force, on several threads at once.
+fn check_queries(world: &World, ids: &[BodyId], random: &mut Random, context: &str) {
     let centre = triangles(world, ids).map(|[a, ..]| a).sum::<DVec3>() / triangles(world, ids).count() as f64;
-    let asked: Vec<(Vec3, Vec3)> = (0..60)
+    let queries: Vec<(Vec3, Vec3)> = (0..60)
         .map(|_| {
             let from = centre.as_vec3() + 0.3 * random.vector();
             let target = centre.as_vec3() + 0.1 * random.vector();
@@ -272,37 +274,40 @@ fn check_queries(world: &World, ids: &[BodyId], random: &mut Random, when: &str)
                 world.nearest_point(from, 1.0).expect("a point"),
             ]
         };
-        asked.iter().map(answer).collect()
+        queries.iter().map(answer).collect()
     };
-    let told = std::thread::scope(|scope| {
+    let thread_answers = std::thread::scope(|scope| {
         let threads = [0; 3].map(|_| scope.spawn(|| answers(world)));
         threads.map(|thread| thread.join().expect("answers"))
     });
-    assert!(told[0] == told[1] && told[0] == told[2], "threads differ {when}");
+    assert!(
+        thread_answers[0] == thread_answers[1] && thread_answers[0] == thread_answers[2],
+        "threads differ {context}"
+    );
     let mut hits = 0;
-    for (&(from, along), [ray, near]) in asked.iter().zip(&told[0]) {
-        for (told, expected) in [
-            (ray, first_of_each(world, ids, from, along)),
-            (near, nearest_of_each(world, ids, from)),
+    for (&(from, along), [ray, near]) in queries.iter().zip(&thread_answers[0]) {
+        for (hit, expected) in [
+            (ray, first_hit_brute_force(world, ids, from, along)),
+            (near, nearest_distance_brute_force(world, ids, from)),
         ] {
-            match told {
-                Some(told) => {
-                    check(world, told);
+            match hit {
+                Some(hit) => {
+                    check(world, hit);
                     assert!(
-                        (f64::from(told.distance) - expected).abs() < 1e-6,
-                        "{when}: {told:?}, not {expected} m"
+                        (f64::from(hit.distance) - expected).abs() < 1e-6,
+                        "{context}: {hit:?}, not {expected} m"
                     );
                 }
-                None => assert!(expected > 1.0 - 1e-6, "{when}: nothing, not {expected} m"),
+                None => assert!(expected > 1.0 - 1e-6, "{context}: nothing, not {expected} m"),
             }
         }
         hits += usize::from(ray.is_some());
     }
-    assert!(hits > 10, "{hits} rays hit {when}");
+    assert!(hits > 10, "{hits} rays hit {context}");
 }
 
 #[test]
-fn queries_answer_as_if_each_triangle_was_looked_at() {
+fn queries_match_brute_force() {
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let cloth = Mesh::cloth([0.2, 0.2], [24, 24]).expect("a cloth");
     let sheet = BodyDefinition {
@@ -318,9 +323,13 @@ fn queries_answer_as_if_each_triangle_was_looked_at() {
         world.body_mut(sheet).and_then(|body| body.pin(corner)).expect("a node");
     }
     let block = Mesh::block([0.08; 3], [4; 3]).expect("a block");
-    let places: Vec<Vec3> = block.positions.iter().map(|place| *place + 0.09 * Vec3::Y).collect();
+    let block_positions: Vec<Vec3> = block
+        .positions
+        .iter()
+        .map(|position| *position + 0.09 * Vec3::Y)
+        .collect();
     let block = BodyDefinition {
-        positions: &places,
+        positions: &block_positions,
         tetrahedra: &block.tetrahedra,
         masses: sinew::Values::Uniform(1e-3),
         stiffnesses: sinew::Values::Uniform(50.0),
@@ -335,8 +344,8 @@ fn queries_answer_as_if_each_triangle_was_looked_at() {
         if step % 6 == 2 {
             let x = 0.03 * (step as f32 / 12.0 - 1.0);
             for id in ids {
-                let places = world.body(id).expect("a body").positions();
-                let middle = places.iter().sum::<Vec3>() / places.len() as f32;
+                let nodes = world.body(id).expect("a body").positions();
+                let middle = nodes.iter().sum::<Vec3>() / nodes.len() as f32;
                 let edge = |z: f32| [-0.05, 0.05].map(|y| middle + Vec3::new(x, y, z));
                 let sweep = Sweep {
                     start: edge(-0.06),
@@ -348,8 +357,11 @@ fn queries_answer_as_if_each_triangle_was_looked_at() {
             check_queries(&world, &ids, &mut random, "after a cut");
         }
         if step == 15 {
-            let places: Vec<Vec3> = world.body(block).expect("a body").positions().to_vec();
-            let moved: Vec<Vec3> = places.iter().map(|place| *place + 0.02 * Vec3::Z).collect();
+            let old_positions: Vec<Vec3> = world.body(block).expect("a body").positions().to_vec();
+            let moved: Vec<Vec3> = old_positions
+                .iter()
+                .map(|position| *position + 0.02 * Vec3::Z)
+                .collect();
             world
                 .body_mut(block)
                 .and_then(|body| body.set_positions(&moved))
@@ -359,28 +371,28 @@ fn queries_answer_as_if_each_triangle_was_looked_at() {
             check_queries(&world, &ids, &mut random, "in motion");
         }
     }
-    let again = World::load(&world.save().expect("bytes"), 1, None).expect("a world");
-    check_queries(&again, &ids, &mut random, "from bytes");
+    let loaded = World::load(&world.save().expect("bytes"), 1, None).expect("a world");
+    check_queries(&loaded, &ids, &mut random, "from bytes");
 }
 
 #[test]
-fn of_what_is_as_near_the_lowest_triangle_is_told() {
+fn equally_near_triangles_resolve_to_the_lowest_index() {
     let (world, ids) = boxes();
     for id in ids {
         let body = world.body(id).expect("a body");
         let middle = body.positions().iter().sum::<Vec3>() / body.node_count() as f32;
-        for (node, &place) in (0..).zip(body.positions()) {
-            let from = place - middle;
+        for (node, &position) in (0..).zip(body.positions()) {
+            let from = position - middle;
             if from.abs().min_element() < 0.049 {
                 continue;
             }
-            // Beyond a corner of the box, all triangles about it are as far.
+            // All triangles around a corner of the box are equally far from a point beyond that corner.
             let first = body.surface().iter().position(|corners| corners.contains(&node));
-            let told = world
-                .nearest_point(place + 0.2 * from, 1.0)
+            let hit = world
+                .nearest_point(position + 0.2 * from, 1.0)
                 .expect("a point")
                 .expect("a body");
-            assert_eq!((told.body, Some(told.triangle as usize)), (id, first));
+            assert_eq!((hit.body, Some(hit.triangle as usize)), (id, first));
         }
     }
 }

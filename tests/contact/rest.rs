@@ -9,7 +9,7 @@ use sinew::{BodyContact, BodyDefinition, BodyId, Shape, Values, World, WorldDefi
 const GRAVITY: f32 = 9.81;
 const DOWN: Vec3 = Vec3::new(0.0, -GRAVITY, 0.0);
 
-/// The mean force on a tool over `count` steps.
+/// Returns the mean force on a tool over `count` steps.
 fn mean_force(world: &mut World, tool: sinew::ToolId, dt: f32, count: u32) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for _ in 0..count {
@@ -44,7 +44,7 @@ fn a_plane_carries_the_weight_of_a_cloth() {
                 assert!(kinetic(&world, cloth) < 1e-12, "{case}: J {}", kinetic(&world, cloth));
                 let deepest = penetration_of(&world, cloth, Shape::Plane, plane);
                 assert!(deepest < 1e-6, "{case}: {deepest} m deep");
-                // Nothing jitters: neither a single step's force nor a node's place.
+                // Neither the force of a single step nor the position of a node jitters.
                 let before = body(&world, cloth).positions().to_vec();
                 for _ in 0..20 {
                     world.step(dt).expect("a step");
@@ -61,16 +61,16 @@ fn a_plane_carries_the_weight_of_a_cloth() {
 
 #[test]
 fn a_plane_carries_the_weight_of_a_block() {
-    a_plane_carries_the_weight_of_a_block_of(&[(1.0 / 60.0, 0.4)]);
+    check_a_plane_carries_the_weight_of_a_block(&[(1.0 / 60.0, 0.4)]);
 }
 
 #[test]
 #[ignore = "long"]
 fn a_plane_carries_the_weight_of_a_block_in_the_other_cases() {
-    a_plane_carries_the_weight_of_a_block_of(&[(0.002, 0.0), (1.0 / 30.0, 1.0)]);
+    check_a_plane_carries_the_weight_of_a_block(&[(0.002, 0.0), (1.0 / 30.0, 1.0)]);
 }
 
-fn a_plane_carries_the_weight_of_a_block_of(cases: &[(f32, f32)]) {
+fn check_a_plane_carries_the_weight_of_a_block(cases: &[(f32, f32)]) {
     let tissue = Tissue {
         mass: 0.5,
         stiffness: 400.0,
@@ -95,18 +95,21 @@ fn a_plane_carries_the_weight_of_a_block_of(cases: &[(f32, f32)]) {
         let weight = tissue.mass * GRAVITY;
         let case = format!("dt {dt}, friction {friction}: {force} of {weight}");
         assert!((force + Vec3::Y * weight).length() < 0.01 * weight, "{case}");
-        // The weight acts at the middle of the block, the torque is about the plane's position.
+        // The weight acts at the center of the block; the torque is about the plane's position.
         let arm = centre(body(&world, block)) - DVec3::new(0.3, 0.0, 0.0);
         let expected = arm.cross(DVec3::NEG_Y * f64::from(weight));
-        let off = torque.as_dvec3().distance(expected);
-        assert!(off < 0.01 * expected.length(), "{case}: torque {torque} of {expected}");
+        let error = torque.as_dvec3().distance(expected);
+        assert!(
+            error < 0.01 * expected.length(),
+            "{case}: torque {torque} of {expected}"
+        );
         assert!(kinetic(&world, block) < 1e-9, "{case}: J {}", kinetic(&world, block));
         let deepest = penetration_of(&world, block, Shape::Plane, plane);
         assert!(deepest < 1e-6, "{case}: {deepest} m deep");
     }
 }
 
-/// A cloth lying on a plane that leans by `angle`, moved and turned with it.
+/// Creates a cloth that lies on a plane inclined by `angle`.
 fn on_a_slope(angle: f32, friction: f32, height: f32) -> (World, sinew::BodyId, sinew::ToolId, Quat) {
     let lean = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), angle);
     let mut mesh = square(0.2, 8);
@@ -120,7 +123,7 @@ fn on_a_slope(angle: f32, friction: f32, height: f32) -> (World, sinew::BodyId, 
 }
 
 #[test]
-fn friction_above_the_slope_holds() {
+fn friction_above_the_slope_holds_the_cloth() {
     for dt in [0.001, 1.0 / 60.0] {
         let (mut world, cloth, plane, _) = on_a_slope(0.4, 1.05 * 0.4_f32.tan(), 0.0);
         let before = centre(body(&world, cloth));
@@ -133,7 +136,7 @@ fn friction_above_the_slope_holds() {
 }
 
 #[test]
-fn friction_below_the_slope_lets_it_slide() {
+fn friction_below_the_slope_lets_the_cloth_slide() {
     for dt in [0.001, 1.0 / 60.0] {
         for (angle, friction) in [(0.4_f32, 0.0), (0.4, 0.2), (0.7, 0.5)] {
             let (mut world, cloth, plane, lean) = on_a_slope(angle, friction, 0.0);
@@ -168,7 +171,7 @@ fn friction_below_the_slope_lets_it_slide() {
 
 #[test]
 fn single_nodes_rest_in_grooves_and_corners() {
-    // Two planes at right angles for a groove, three for a corner: each carries its share of a node without a surface.
+    // Two planes at right angles form a groove, three a corner. Each carries its share of a node without a surface.
     for (count, directions) in [
         (2, [Vec3::new(1.0, 1.0, 0.0), Vec3::new(-1.0, 1.0, 0.0), Vec3::ZERO]),
         (
@@ -218,7 +221,7 @@ fn single_nodes_rest_in_grooves_and_corners() {
 
 #[test]
 fn a_thrown_body_stops_at_a_plane() {
-    // 100 m/s against resting planes and planes that come towards it, in one or in many substeps.
+    // At 100 m/s against planes at rest and planes that move towards the body, in one or in many substeps.
     for substeps in [0, 1, 7] {
         for (dt, towards) in [(0.001, 0.0), (1.0 / 60.0, 0.0), (1.0 / 30.0, 0.01), (1.0 / 60.0, 0.3)] {
             let mut world = World::new(WorldDefinition {
@@ -258,20 +261,20 @@ fn a_thrown_body_stops_at_a_plane() {
     }
 }
 
-/// Three layers of four blocks lie askew on each other, edges across edges. None trembles with more than a tenth of what gravity gives a node in a
-/// substep: 10 mm/s.
+/// Three layers of four blocks lie askew on each other, edges across edges. None trembles by more than a tenth of the
+/// velocity that gravity adds in a substep: 10 mm/s.
 #[test]
-fn blocks_that_lie_across_each_others_edges_do_not_tremble() {
+fn blocks_stacked_edge_across_edge_do_not_tremble() {
     const TREMBLE: f32 = 1e-3;
     let mesh = Mesh::block([0.04; 3], [2; 3]).expect("a block");
     let mut world = world(DOWN);
     tool(&mut world, Shape::Plane, 0.5, Vec3::ZERO, Quat::IDENTITY);
     let mut blocks: Vec<BodyId> = Vec::new();
     for layer in 0..3 {
-        let askew = if layer % 2 == 0 { 0.008 } else { -0.008 };
+        let offset = if layer % 2 == 0 { 0.008 } else { -0.008 };
         for (x, z) in [(-0.025, -0.025), (-0.025, 0.025), (0.025, -0.025), (0.025, 0.025)] {
-            let place = Vec3::new(x + askew, 0.022 + 0.042 * layer as f32, z - askew);
-            let mesh = moved(mesh.clone(), place);
+            let position = Vec3::new(x + offset, 0.022 + 0.042 * layer as f32, z - offset);
+            let mesh = moved(mesh.clone(), position);
             let definition = BodyDefinition {
                 node_dampings: Values::Uniform(4e-2),
                 contact: BodyContact {
@@ -289,14 +292,14 @@ fn blocks_that_lie_across_each_others_edges_do_not_tremble() {
     for step in 0..105 {
         world.step(1.0 / 60.0).expect("a step");
         if step >= 90 {
-            let of_body = |&id: &BodyId| {
+            let fastest_node = |&id: &BodyId| {
                 body(&world, id)
                     .velocities()
                     .iter()
                     .map(|speed| speed.length())
                     .fold(0.0, f32::max)
             };
-            fastest = fastest.max(blocks.iter().map(of_body).sum::<f32>() / blocks.len() as f32);
+            fastest = fastest.max(blocks.iter().map(fastest_node).sum::<f32>() / blocks.len() as f32);
         }
     }
     assert!(fastest < TREMBLE, "{fastest} m/s");

@@ -1,4 +1,4 @@
-//! A tool that goes fast and stops short of tissue has not touched it.
+//! A fast tool that stops short of tissue does not touch it.
 
 use crate::support::solid::ball;
 use crate::support::tissue::square;
@@ -8,19 +8,19 @@ use sinew::{
     BodyContact, BodyDefinition, Detection, Pose, Shape, Solver, ToolDefinition, Values, World, WorldDefinition,
 };
 
-/// A tool above y = 0 whose lowest point is at y = 0 where it stands at `height`.
+/// A tool whose lowest point is at y = 0 when its position is at `height`.
 #[derive(Clone, Debug)]
 struct Tip<'a> {
     shape: Shape<'a>,
     detection: Detection,
     height: f32,
     orientation: Quat,
-    /// How exactly it is found where it is, m.
+    /// The accuracy of its detection (m).
     grain: f32,
 }
 
-/// What comes to rest at `gap` from tissue in the plane y = 0, having come from 5 cm further up in one step: the largest speed that it
-/// gave, and the size of the force that it felt.
+/// Moves a tool 5 cm down in one step, so that it stops at `gap` from tissue in the plane y = 0. Returns the largest
+/// speed of the tissue and the force on the tool.
 fn stop(tip: &Tip, solver: Solver, tissue: &Mesh, thickness: f32, gap: f32, substeps: u32, dt: f32) -> [f32; 2] {
     let mut world = World::new(WorldDefinition {
         gravity: Vec3::ZERO,
@@ -58,23 +58,23 @@ fn stop(tip: &Tip, solver: Solver, tissue: &Mesh, thickness: f32, gap: f32, subs
     world.set_pose(tool, end, None).expect("a pose");
     world.step(dt).expect("a step");
     let velocities = world.body(body).expect("the body").velocities();
-    // Springs lie in the plane, where rounding makes them pull.
+    // Springs lie in the plane, and rounding makes them pull within it.
     let fastest = velocities.iter().map(|velocity| velocity.y.abs()).fold(0.0, f32::max);
     [fastest, world.wrench(tool).expect("a tool").0.length()]
 }
 
 #[test]
-fn what_a_tool_stops_short_of_stays_at_rest() {
-    what_a_tool_stops_short_of_stays_at_rest_of(|tip, solver| (tip % 2 == 0) == (solver == Solver::Verlet));
+fn tissue_short_of_which_a_tool_stops_stays_at_rest() {
+    check_tissue_short_of_which_a_tool_stops_stays_at_rest(|tip, solver| (tip % 2 == 0) == (solver == Solver::Verlet));
 }
 
 #[test]
 #[ignore = "long"]
-fn what_a_tool_stops_short_of_stays_at_rest_in_the_other_cases() {
-    what_a_tool_stops_short_of_stays_at_rest_of(|tip, solver| (tip % 2 == 0) != (solver == Solver::Verlet));
+fn tissue_short_of_which_a_tool_stops_stays_at_rest_in_the_other_cases() {
+    check_tissue_short_of_which_a_tool_stops_stays_at_rest(|tip, solver| (tip % 2 == 0) != (solver == Solver::Verlet));
 }
 
-fn what_a_tool_stops_short_of_stays_at_rest_of(is_tried: fn(usize, Solver) -> bool) {
+fn check_tissue_short_of_which_a_tool_stops_stays_at_rest(is_selected: fn(usize, Solver) -> bool) {
     let round = ball(0.02, 2);
     let lowest = round.positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
     let block = Mesh::block([0.03, 0.02, 0.04], [1, 1, 1]).expect("a block");
@@ -91,7 +91,7 @@ fn what_a_tool_stops_short_of_stays_at_rest_of(is_tried: fn(usize, Solver) -> bo
         orientation: Quat::IDENTITY,
         grain: 0.0,
     };
-    // Solid above.
+    // The solid half-space is above.
     let plane = Tip {
         orientation: Quat::from_xyzw(1.0, 0.0, 0.0, 0.0),
         ..exact(Shape::Plane, 0.0)
@@ -126,29 +126,29 @@ fn what_a_tool_stops_short_of_stays_at_rest_of(is_tried: fn(usize, Solver) -> bo
     };
     let cloth = square(0.25, 4);
     let mut failures = Vec::new();
-    for (number, tip) in tips.iter().enumerate() {
+    for (index, tip) in tips.iter().enumerate() {
         for solver in [Solver::Verlet, Solver::Implicit]
             .into_iter()
-            .filter(|&solver| is_tried(number, solver))
+            .filter(|&solver| is_selected(index, solver))
         {
             for (substeps, dt) in [(1, 1e-3), (7, 1e-3), (1, 1.0 / 60.0), (0, 1.0 / 60.0)] {
-                for (what, tissue) in [("node", &node), ("cloth", &cloth)] {
+                for (tissue_name, tissue) in [("node", &node), ("cloth", &cloth)] {
                     for thickness in [0.0, 1e-3] {
                         for above in [1e-5, 1e-3] {
                             let gap = thickness + tip.grain + above;
                             let case = format!(
-                                "{:?} {:?} {solver:?} {substeps} of {dt}, {what}, {thickness}, {above}",
+                                "{:?} {:?} {solver:?} {substeps} of {dt}, {tissue_name}, {thickness}, {above}",
                                 tip.detection, tip.height
                             );
-                            let given = stop(tip, solver, tissue, thickness, gap, substeps, dt);
-                            if given != [0.0; 2] {
-                                failures.push(format!("{case}: {given:?}"));
+                            let speed_and_force = stop(tip, solver, tissue, thickness, gap, substeps, dt);
+                            if speed_and_force != [0.0; 2] {
+                                failures.push(format!("{case}: {speed_and_force:?}"));
                             }
                         }
-                        // What it reaches it throws.
-                        let given = stop(tip, solver, tissue, thickness, thickness - 2e-3, substeps, dt);
-                        if !(given[0] > 0.05 && given[1] > 0.0) {
-                            failures.push(format!("{}: {what} not met: {given:?}", tip.height));
+                        // Tissue that the tool reaches is pushed away.
+                        let speed_and_force = stop(tip, solver, tissue, thickness, thickness - 2e-3, substeps, dt);
+                        if !(speed_and_force[0] > 0.05 && speed_and_force[1] > 0.0) {
+                            failures.push(format!("{}: {tissue_name} not hit: {speed_and_force:?}", tip.height));
                         }
                     }
                 }

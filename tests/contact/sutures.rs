@@ -1,4 +1,4 @@
-//! Sutures: what a thread between two points holds, draws together and lets go.
+//! Sutures: threads between two points hold, pull together and break.
 
 use crate::support::hanging::*;
 use crate::support::tissue::*;
@@ -8,7 +8,7 @@ use sinew::{
     World, WorldDefinition,
 };
 
-/// The first two are tried in each test, the others in a long one.
+/// Each test uses the first two; a long test uses the others.
 const SOLVERS: [[Solver; 2]; 5] = [
     [Solver::Verlet; 2],
     [Solver::Verlet, Solver::Implicit],
@@ -17,10 +17,10 @@ const SOLVERS: [[Solver; 2]; 5] = [
     [Solver::Newton, Solver::Verlet],
 ];
 
-/// Soft, hard, and beyond what any substep would stand.
+/// Soft, hard, and stiffer than any explicit substep could integrate.
 const STIFFNESSES: [f32; 4] = [50.0, 3000.0, 1e9, f32::INFINITY];
 
-/// Of few nodes.
+/// A damped block of few nodes.
 const CALM: Block = Block {
     cells: [2, 1, 2],
     ..Block::CALM
@@ -29,25 +29,25 @@ const CALM: Block = Block {
 /// The same without damping.
 const FREE: Block = Block { drag: 0.0, ..CALM };
 
-/// How far apart the blocks are, m.
+/// The distance between the blocks (m).
 const GAP: f32 = 0.01;
 
-/// A block and one below it, sutured between them at points within triangles of their faces.
+/// Two blocks, one above the other, with anchors for a suture between them in triangles of the facing sides.
 struct Sutured {
     world: World,
     above: BodyId,
     below: BodyId,
-    /// Of the face below of the one, and of the face above of the other.
+    /// The point on the lower side of the upper block, and the point on the upper side of the lower block.
     anchors: [Anchor; 2],
     top: Vec<u32>,
 }
 
 impl Sutured {
     fn new(mut world: World, above: Block, below: Block) -> Self {
-        let places = [1.0, -1.0].map(|side| Vec3::Y * (side * (HEIGHT + GAP) / 2.0));
+        let centers = [1.0, -1.0].map(|side| Vec3::Y * (side * (HEIGHT + GAP) / 2.0));
         let blocks = [above, below].map(|block| block);
         let blocks = [0, 1].map(|index| Block {
-            at: places[index],
+            at: centers[index],
             ..blocks[index]
         });
         let ids = blocks.map(|block| block.put(&mut world));
@@ -56,7 +56,7 @@ impl Sutured {
             let face = [0.5, -0.5][index] * GAP;
             Anchor::Point(point_of_face(surface, &blocks[index].mesh().positions, face))
         });
-        let top = nodes_at(&blocks[0].mesh(), |place| place.y > HEIGHT + GAP / 2.0 - 1e-4);
+        let top = nodes_at(&blocks[0].mesh(), |position| position.y > HEIGHT + GAP / 2.0 - 1e-4);
         Self {
             world,
             above: ids[0],
@@ -66,7 +66,7 @@ impl Sutured {
         }
     }
 
-    /// With the upper face of the upper one pinned.
+    /// Creates the blocks with the top of the upper block pinned.
     fn pinned(world: World, above: Block, below: Block) -> Self {
         let mut sutured = Self::new(world, above, below);
         pin_all(&mut sutured.world, sutured.above, &sutured.top);
@@ -75,11 +75,11 @@ impl Sutured {
 
     fn suture(&mut self, definition: SutureDefinition) -> AttachmentId {
         let [up, down] = self.anchors;
-        let made = self.world.suture(self.below, &down, self.above, &up, &definition);
-        made.expect("a suture")
+        let created = self.world.suture(self.below, &down, self.above, &up, &definition);
+        created.expect("a suture")
     }
 
-    /// From the point below to that above.
+    /// Returns the vector from the lower point to the upper point.
     fn across(&self) -> DVec3 {
         let [up, down] = [(self.above, 0), (self.below, 1)].map(|(id, index)| {
             let Anchor::Point(SurfacePoint { triangle, weights }) = self.anchors[index] else {
@@ -87,8 +87,10 @@ impl Sutured {
             };
             let body = body(&self.world, id);
             let corners = body.surface()[triangle as usize].map(|node| body.positions()[node as usize].as_dvec3());
-            let parts = corners.iter().zip(weights);
-            parts.map(|(&corner, weight)| corner * f64::from(weight)).sum::<DVec3>()
+            let weighted_corners = corners.iter().zip(weights);
+            weighted_corners
+                .map(|(&corner, weight)| corner * f64::from(weight))
+                .sum::<DVec3>()
         });
         up - down
     }
@@ -109,51 +111,53 @@ impl Sutured {
     }
 
     fn angular(&self, mass: f32) -> DVec3 {
-        let of = |id| {
+        let angular_momentum_of = |id| {
             let body = body(&self.world, id);
             angular_momentum(body, mass / body.node_count() as f32, DVec3::ZERO)
         };
-        of(self.above) + of(self.below)
+        angular_momentum_of(self.above) + angular_momentum_of(self.below)
     }
 
     fn throw(&mut self, id: BodyId, velocity: impl Fn(Vec3) -> Vec3) {
         let body = self.world.body_mut(id).expect("a body");
-        let velocities: Vec<Vec3> = body.positions().iter().map(|&place| velocity(place)).collect();
+        let velocities: Vec<Vec3> = body.positions().iter().map(|&position| velocity(position)).collect();
         body.set_velocities(&velocities).expect("velocities");
     }
 }
 
-/// A point within a triangle of the face of a block at this height, near its middle.
+/// Returns a point in a triangle of the block face at this height, near its middle.
 fn point_of_face(surface: &[[u32; 3]], positions: &[Vec3], height: f32) -> SurfacePoint {
     let weights = [0.5, 0.3, 0.2];
     let middle = |corners: &[u32; 3]| {
-        let parts = corners.iter().zip(weights);
-        parts
+        let weighted_corners = corners.iter().zip(weights);
+        weighted_corners
             .map(|(&node, weight)| positions[node as usize] * weight)
             .sum::<Vec3>()
     };
-    let far = |corners: &[u32; 3]| (middle(corners) - Vec3::Y * height).length();
-    let nearest = (0..).zip(surface).min_by(|a, b| far(a.1).total_cmp(&far(b.1)));
+    let distance = |corners: &[u32; 3]| (middle(corners) - Vec3::Y * height).length();
+    let nearest = (0..)
+        .zip(surface)
+        .min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)));
     let (triangle, corners) = nearest.expect("a triangle");
-    assert!((middle(corners).y - height).abs() < 1e-6 && far(corners) < 0.015);
+    assert!((middle(corners).y - height).abs() < 1e-6 && distance(corners) < 0.015);
     SurfacePoint { triangle, weights }
 }
 
 #[test]
-fn it_holds_the_weight_and_is_longer_by_the_load_over_its_stiffness() {
-    it_holds_the_weight_and_is_longer_by_the_load_over_its_stiffness_of(|case| case % 4 == 0);
+fn a_suture_holds_the_weight_and_extends_by_load_over_stiffness() {
+    check_a_suture_holds_the_weight_and_extends_by_load_over_stiffness(|case| case % 4 == 0);
 }
 
 #[test]
 #[ignore = "long"]
-fn it_holds_the_weight_and_is_longer_by_the_load_over_its_stiffness_in_the_other_cases() {
-    it_holds_the_weight_and_is_longer_by_the_load_over_its_stiffness_of(|case| case % 4 != 0);
+fn a_suture_holds_the_weight_and_extends_by_load_over_stiffness_in_the_other_cases() {
+    check_a_suture_holds_the_weight_and_extends_by_load_over_stiffness(|case| case % 4 != 0);
 }
 
-fn it_holds_the_weight_and_is_longer_by_the_load_over_its_stiffness_of(is_tried: fn(usize) -> bool) {
+fn check_a_suture_holds_the_weight_and_extends_by_load_over_stiffness(is_selected: fn(usize) -> bool) {
     let mut cases = Vec::new();
     for solvers in SOLVERS {
-        // The reference takes long.
+        // The reference solver is slow.
         let stiffnesses = if solvers.contains(&Solver::Newton) {
             &STIFFNESSES[1..2]
         } else {
@@ -170,7 +174,7 @@ fn it_holds_the_weight_and_is_longer_by_the_load_over_its_stiffness_of(is_tried:
         cases.push(([Solver::Verlet; 2], storage, 1e9, 1e-3));
         cases.push(([Solver::Implicit; 2], storage, 50.0, 1e-3));
     }
-    for (_, (solvers, storage, stiffness, dt)) in (0..).zip(cases).filter(|case| is_tried(case.0)) {
+    for (_, (solvers, storage, stiffness, dt)) in (0..).zip(cases).filter(|case| is_selected(case.0)) {
         let case = format!("{solvers:?}, {storage:?}, {stiffness} N/m, {dt} s");
         let [above, below] = solvers.map(|solver| Block {
             solver,
@@ -192,8 +196,8 @@ fn it_holds_the_weight_and_is_longer_by_the_load_over_its_stiffness_of(is_tried:
         }
         let weight = 9.81 * f64::from(below.mass);
         let force = sutured.force(suture);
-        let off = (force - DVec3::Y * weight).length() / weight;
-        assert!(off < 1e-3, "{case}: the force is off by {off:e}");
+        let error = (force - DVec3::Y * weight).length() / weight;
+        assert!(error < 1e-3, "{case}: the force is off by {error:e}");
         let longer = sutured.across().length() - first;
         let expected = weight / f64::from(stiffness);
         assert!(
@@ -217,17 +221,17 @@ fn it_holds_the_weight_and_is_longer_by_the_load_over_its_stiffness_of(is_tried:
 }
 
 #[test]
-fn a_slack_thread_does_nothing_and_a_taut_one_never_pushes() {
-    a_slack_thread_does_nothing_and_a_taut_one_never_pushes_of(&SOLVERS[..2]);
+fn a_slack_thread_has_no_force_and_a_taut_one_never_pushes() {
+    check_a_slack_thread_has_no_force_and_a_taut_one_never_pushes(&SOLVERS[..2]);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_slack_thread_does_nothing_and_a_taut_one_never_pushes_with_other_solvers() {
-    a_slack_thread_does_nothing_and_a_taut_one_never_pushes_of(&SOLVERS[2..]);
+fn a_slack_thread_has_no_force_and_a_taut_one_never_pushes_with_other_solvers() {
+    check_a_slack_thread_has_no_force_and_a_taut_one_never_pushes(&SOLVERS[2..]);
 }
 
-fn a_slack_thread_does_nothing_and_a_taut_one_never_pushes_of(pairs: &[[Solver; 2]]) {
+fn check_a_slack_thread_has_no_force_and_a_taut_one_never_pushes(pairs: &[[Solver; 2]]) {
     for &solvers in pairs {
         for stiffness in STIFFNESSES {
             let case = format!("{solvers:?}, {stiffness} N/m");
@@ -251,35 +255,35 @@ fn a_slack_thread_does_nothing_and_a_taut_one_never_pushes_of(pairs: &[[Solver; 
                 }];
                 let force = sutured.force(suture);
                 let along = force.dot(sutured.across().normalize());
-                let got = (sutured.momenta(mass)[1] - before[1]) / 2e-3;
-                // The nodes of a body of VERLET beside another solver show half a kick too little.
+                let mean_force = (sutured.momenta(mass)[1] - before[1]) / 2e-3;
+                // Velocities of a VERLET body coupled to another solver lack half a kick.
                 let is_even = solvers[0] == solvers[1];
-                assert!(along >= 0.0, "{case}, step {step}: it pushes by {along} N");
+                assert!(along >= 0.0, "{case}, step {step}: the suture pushes by {along} N");
                 assert!(
-                    !is_even || (got - force).length() < 1e-4 + 1e-3 * force.length(),
-                    "{case}, step {step}: {got} of {force}"
+                    !is_even || (mean_force - force).length() < 1e-4 + 1e-3 * force.length(),
+                    "{case}, step {step}: {mean_force} of {force}"
                 );
-                // Well within its length in all of the step.
+                // Well within its length during the whole step.
                 if distances.iter().all(|&distance| distance < f64::from(length) - 1e-3) {
                     assert_eq!(force, DVec3::ZERO, "{case}, step {step}");
                     was_slack = true;
                 }
                 pulled[usize::from(step >= 75)] += along * 2e-3;
                 if step == 74 {
-                    // Now it comes back.
+                    // Now the lower block comes back.
                     sutured.throw(sutured.below, |_| Vec3::Y * 0.1);
                     sutured.throw(sutured.above, |_| Vec3::ZERO);
                 }
             }
             assert!(was_slack, "{case}");
-            // The first catch of what flies away.
+            // The impulse of the first catch, when the block flies away.
             assert!(pulled[0] > 0.3 * 0.5 * f64::from(mass) * 0.3, "{case}: {pulled:?} N s");
         }
     }
 }
 
 #[test]
-fn tightening_draws_points_together_and_makes_no_momentum() {
+fn tightening_pulls_points_together_and_conserves_momentum() {
     let bodies = [
         [Solver::Verlet; 2],
         [Solver::Implicit; 2],
@@ -302,15 +306,15 @@ fn tightening_draws_points_together_and_makes_no_momentum() {
                 ..Default::default()
             });
             let mass = above.mass;
-            // They turn about each other, slowly.
+            // The blocks rotate slowly about each other.
             let [up, down] = [sutured.above, sutured.below];
             for id in [up, down] {
-                sutured.throw(id, |place| Vec3::X * place.y);
+                sutured.throw(id, |position| Vec3::X * position.y);
             }
             let (first, spin) = (sutured.momenta(mass), sutured.angular(mass));
             let first = first[0] + first[1];
             let mut length = sutured.report(suture).length;
-            let (mut off, mut turned, mut handed) = (0.0_f64, 0.0_f64, 0.0);
+            let (mut error, mut spin_error, mut impulse) = (0.0_f64, 0.0_f64, 0.0);
             let mut nearest = f64::INFINITY;
             sutured.world.set_suture_length(suture, target).expect("a length");
             for step in 0..100 {
@@ -323,9 +327,9 @@ fn tightening_draws_points_together_and_makes_no_momentum() {
                 );
                 length = report.length;
                 let sum = sutured.momenta(mass);
-                off = off.max((sum[0] + sum[1] - first).length());
-                turned = turned.max((sutured.angular(mass) - spin).length());
-                handed += sutured.force(suture).length() * 1e-3;
+                error = error.max((sum[0] + sum[1] - first).length());
+                spin_error = spin_error.max((sutured.angular(mass) - spin).length());
+                impulse += sutured.force(suture).length() * 1e-3;
                 nearest = nearest.min(sutured.across().length());
                 if stiffness > 1e6 {
                     let distance = sutured.across().length();
@@ -336,16 +340,20 @@ fn tightening_draws_points_together_and_makes_no_momentum() {
                 }
             }
             assert_eq!(length, target, "{case}");
-            // So fast they were drawn: a tenth of 0.25 m/s at least.
-            assert!(handed > f64::from(mass) * 0.025, "{case}: {handed} N s");
-            assert!(off < 1e-6 * handed, "{case}: momentum is off by {off} of {handed}");
-            // Implicit solvers turn a little less by themselves; and points of a thread next to no length long pass each other.
+            // The momentum of the pull: at least a tenth of 0.25 m/s.
+            assert!(impulse > f64::from(mass) * 0.025, "{case}: {impulse} N s");
+            assert!(
+                error < 1e-6 * impulse,
+                "{case}: momentum is off by {error} of {impulse}"
+            );
+            // Implicit solvers lose some rotation, and the points of a thread of nearly zero length swing past each
+            // other.
             let is_exact = solvers == [Solver::Verlet; 2] && target > 0.0;
-            let arm = handed * 0.015;
+            let arm = impulse * 0.015;
             let allowed = if is_exact { 1e-5 } else { 1e-2 };
             assert!(
-                turned < allowed * arm,
-                "{case}: angular momentum is off by {turned} of {arm}"
+                spin_error < allowed * arm,
+                "{case}: angular momentum is off by {spin_error} of {arm}"
             );
             assert!(nearest < f64::from(target) + 1e-3, "{case}: {nearest} m");
         }
@@ -353,17 +361,17 @@ fn tightening_draws_points_together_and_makes_no_momentum() {
 }
 
 #[test]
-fn it_is_pulled_through_at_its_limit() {
-    it_is_pulled_through_at_its_limit_of(&SOLVERS[..2]);
+fn a_suture_breaks_at_its_force_limit() {
+    check_a_suture_breaks_at_its_force_limit(&SOLVERS[..2]);
 }
 
 #[test]
 #[ignore = "long"]
-fn it_is_pulled_through_at_its_limit_with_other_solvers() {
-    it_is_pulled_through_at_its_limit_of(&SOLVERS[2..]);
+fn a_suture_breaks_at_its_force_limit_with_other_solvers() {
+    check_a_suture_breaks_at_its_force_limit(&SOLVERS[2..]);
 }
 
-fn it_is_pulled_through_at_its_limit_of(pairs: &[[Solver; 2]]) {
+fn check_a_suture_breaks_at_its_force_limit(pairs: &[[Solver; 2]]) {
     let limit = 0.8_f32;
     for &solvers in pairs {
         for stiffness in [300.0, f32::INFINITY] {
@@ -377,7 +385,7 @@ fn it_is_pulled_through_at_its_limit_of(pairs: &[[Solver; 2]]) {
             });
             let count = body(&sutured.world, sutured.below).node_count();
             let nodes: Vec<u32> = (0..count as u32).collect();
-            // Slowly up to a hundredth below, then a hundredth above.
+            // The load rises slowly to one per cent below the limit, then to one per cent above.
             let mut slipped = None;
             for step in 0..700 {
                 let eased = (step as f32 / 400.0).min(1.0);
@@ -410,23 +418,23 @@ fn it_is_pulled_through_at_its_limit_of(pairs: &[[Solver; 2]]) {
                 stale.iter().all(|result| matches!(result, Err(Error::StaleId(_)))),
                 "{stale:?}"
             );
-            assert!(sutured.across().length() > 0.011, "{case}: it has not fallen");
+            assert!(sutured.across().length() > 0.011, "{case}: the block has not fallen");
         }
     }
 }
 
 #[test]
-fn no_energy_is_made() {
-    no_energy_is_made_of(&SOLVERS[..2]);
+fn sutures_add_no_energy() {
+    check_sutures_add_no_energy(&SOLVERS[..2]);
 }
 
 #[test]
 #[ignore = "long"]
-fn no_energy_is_made_with_implicit() {
-    no_energy_is_made_of(&SOLVERS[2..3]);
+fn sutures_add_no_energy_with_implicit() {
+    check_sutures_add_no_energy(&SOLVERS[2..3]);
 }
 
-fn no_energy_is_made_of(pairs: &[[Solver; 2]]) {
+fn check_sutures_add_no_energy(pairs: &[[Solver; 2]]) {
     for &solvers in pairs {
         for stiffness in STIFFNESSES {
             for gravity in [Vec3::ZERO, DOWN] {
@@ -448,13 +456,13 @@ fn no_energy_is_made_of(pairs: &[[Solver; 2]]) {
                 };
                 let thrown = kinetic(&sutured.world, sutured.below);
                 let first = energy(&sutured);
-                let (mut most, mut pulled) = (f64::NEG_INFINITY, 0.0_f64);
+                let (mut largest, mut pulled) = (f64::NEG_INFINITY, 0.0_f64);
                 for _ in 0..400 {
                     sutured.world.step(1e-3).expect("a step");
-                    most = most.max(energy(&sutured) - first);
+                    largest = largest.max(energy(&sutured) - first);
                     pulled += sutured.force(suture).length() * 1e-3;
                 }
-                assert!(most < 0.01 * thrown, "{case}: {most} J gained of {thrown}");
+                assert!(largest < 0.01 * thrown, "{case}: {largest} J gained of {thrown}");
                 assert!(pulled > 0.01, "{case}: {pulled} N s");
             }
         }
@@ -462,18 +470,18 @@ fn no_energy_is_made_of(pairs: &[[Solver; 2]]) {
 }
 
 #[test]
-fn a_weight_is_raised_by_the_work_of_tightening() {
-    a_weight_is_raised_by_the_work_of_tightening_of(&SOLVERS[..2]);
+fn the_work_of_tightening_raises_a_weight() {
+    check_the_work_of_tightening_raises_a_weight(&SOLVERS[..2]);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_weight_is_raised_by_the_work_of_tightening_with_other_solvers() {
-    a_weight_is_raised_by_the_work_of_tightening_of(&SOLVERS[2..]);
+fn the_work_of_tightening_raises_a_weight_with_other_solvers() {
+    check_the_work_of_tightening_raises_a_weight(&SOLVERS[2..]);
 }
 
-fn a_weight_is_raised_by_the_work_of_tightening_of(pairs: &[[Solver; 2]]) {
-    // Against the weight, slowly, all that is gained is height.
+fn check_the_work_of_tightening_raises_a_weight(pairs: &[[Solver; 2]]) {
+    // When it is raised slowly, all energy becomes potential energy.
     for &solvers in pairs {
         let [above, below] = solvers.map(|solver| Block { solver, ..CALM });
         let mut sutured = Sutured::pinned(world(DOWN), above, below);
@@ -489,7 +497,7 @@ fn a_weight_is_raised_by_the_work_of_tightening_of(pairs: &[[Solver; 2]]) {
             bodies[0] + bodies[1] + sutured.report(suture).energy
         };
         let (first, from) = (energy(&sutured), sutured.report(suture).length);
-        // What drag takes of a block that goes up as one.
+        // The work of drag on a block that rises as a whole.
         let (mut work, mut lost) = (0.0, 0.0);
         let mut last = centre(body(&sutured.world, sutured.below));
         for step in 1..=800 {
@@ -532,28 +540,28 @@ fn a_row_of_sutures_closes_a_cut() {
                 ..Tissue::SOFT
             };
             let cloth = tissue.put_for(solver, &mut world, &mesh);
-            let edge = |x: f32| nodes_at(&mesh, |place| (place.x - x).abs() < 1e-4);
-            let [one, other] = [edge(0.02), edge(0.023)];
-            assert_eq!([one.len(), other.len()], [5; 2]);
+            let edge = |x: f32| nodes_at(&mesh, |position| (position.x - x).abs() < 1e-4);
+            let [left_edge, other] = [edge(0.02), edge(0.023)];
+            assert_eq!([left_edge.len(), other.len()], [5; 2]);
             let definition = SutureDefinition {
                 length: Some(0.0),
                 stiffness,
                 ..Default::default()
             };
-            for (&a, &b) in one.iter().zip(&other) {
-                let made = world.suture(cloth, &Anchor::Node(a), cloth, &Anchor::Node(b), &definition);
-                made.expect("a suture");
+            for (&a, &b) in left_edge.iter().zip(&other) {
+                let created = world.suture(cloth, &Anchor::Node(a), cloth, &Anchor::Node(b), &definition);
+                created.expect("a suture");
             }
             for _ in 0..600 {
                 world.step(1e-3).expect("a step");
             }
-            let places = body(&world, cloth).positions();
-            for (&a, &b) in one.iter().zip(&other) {
-                let gap = places[a as usize].distance(places[b as usize]);
+            let positions = body(&world, cloth).positions();
+            for (&a, &b) in left_edge.iter().zip(&other) {
+                let gap = positions[a as usize].distance(positions[b as usize]);
                 assert!(gap < 1e-5, "{solver:?}, {stiffness} N/m: {gap} m apart");
             }
             let drawn = momentum(body(&world, cloth), tissue.node_mass(&mesh)).length();
-            // Of what two halves of 50 g were drawn together with.
+            // Relative to the momentum of two halves of 50 g that are pulled together.
             assert!(
                 drawn < 1e-6 * 0.05 * 0.25,
                 "{solver:?}, {stiffness} N/m: momentum {drawn}"
@@ -563,7 +571,7 @@ fn a_row_of_sutures_closes_a_cut() {
 }
 
 #[test]
-fn what_it_joins_still_touches() {
+fn sutured_bodies_still_collide() {
     let contact = BodyContact {
         thickness: 0.5e-3,
         with_bodies: true,
@@ -589,9 +597,9 @@ fn what_it_joins_still_touches() {
             let report = sutured.world.step(1e-3).expect("a step");
             assert_eq!(report.crossings, 0, "{solvers:?}, step {step}");
         }
-        let apart = sutured.across().length();
-        assert!((0.9e-3..1.3e-3).contains(&apart), "{solvers:?}: {apart} m apart");
-        let (force, expected) = (sutured.force(suture).length(), 200.0 * apart);
+        let gap = sutured.across().length();
+        assert!((0.9e-3..1.3e-3).contains(&gap), "{solvers:?}: {gap} m apart");
+        let (force, expected) = (sutured.force(suture).length(), 200.0 * gap);
         assert!(
             (force - expected).abs() < 0.01 * expected,
             "{solvers:?}: {force} N of {expected}"
@@ -600,8 +608,8 @@ fn what_it_joins_still_touches() {
 }
 
 #[test]
-fn a_thread_shorter_than_contacts_allow_does_not_pull_harder_and_harder() {
-    a_thread_shorter_than_contacts_allow_does_not_pull_harder_and_harder_of(&[(
+fn the_force_of_a_thread_too_short_for_contact_stays_bounded() {
+    check_the_force_of_a_thread_too_short_for_contact_stays_bounded(&[(
         [Solver::Implicit, Solver::Verlet],
         f32::INFINITY,
     )]);
@@ -609,15 +617,15 @@ fn a_thread_shorter_than_contacts_allow_does_not_pull_harder_and_harder() {
 
 #[test]
 #[ignore = "long"]
-fn a_thread_shorter_than_contacts_allow_does_not_pull_harder_and_harder_in_the_other_cases() {
-    a_thread_shorter_than_contacts_allow_does_not_pull_harder_and_harder_of(&[
+fn the_force_of_a_thread_too_short_for_contact_stays_bounded_in_the_other_cases() {
+    check_the_force_of_a_thread_too_short_for_contact_stays_bounded(&[
         ([Solver::Verlet; 2], 1e9),
         ([Solver::Verlet; 2], f32::INFINITY),
         ([Solver::Implicit, Solver::Verlet], 1e9),
     ]);
 }
 
-fn a_thread_shorter_than_contacts_allow_does_not_pull_harder_and_harder_of(cases: &[([Solver; 2], f32)]) {
+fn check_the_force_of_a_thread_too_short_for_contact_stays_bounded(cases: &[([Solver; 2], f32)]) {
     let contact = BodyContact {
         thickness: 0.5e-3,
         with_bodies: true,
@@ -644,12 +652,12 @@ fn a_thread_shorter_than_contacts_allow_does_not_pull_harder_and_harder_of(cases
             }
             *force = sutured.force(suture).length();
         }
-        let apart = sutured.across().length();
-        assert!((0.85e-3..1.1e-3).contains(&apart), "{case}: {apart} m apart");
+        let gap = sutured.across().length();
+        assert!((0.85e-3..1.1e-3).contains(&gap), "{case}: {gap} m apart");
         let [_, before, after] = forces;
         assert!(after > 0.0 && after < 1.01 * before, "{case}: {forces:?} N");
         let SutureReport { energy, length, .. } = sutured.report(suture);
-        let work = 0.5 * after * (apart - f64::from(length));
+        let work = 0.5 * after * (gap - f64::from(length));
         assert!((energy - work).abs() < 0.05 * work, "{case}: {energy} J of {work}");
         let kinetic: f64 = [sutured.above, sutured.below]
             .iter()
@@ -663,9 +671,9 @@ fn a_thread_shorter_than_contacts_allow_does_not_pull_harder_and_harder_of(cases
 }
 
 #[test]
-fn threads_change_nothing() {
-    // The large ones are shared by both threads.
-    threads_change_nothing_of(&[
+fn results_are_identical_for_any_number_of_threads() {
+    // Both threads share the large bodies.
+    check_results_are_identical_for_any_number_of_threads(&[
         ([Solver::Verlet; 2], [2, 1, 2], 40),
         ([Solver::Newton, Solver::Verlet], [2, 1, 2], 20),
         ([Solver::Verlet; 2], [22, 15, 22], 2),
@@ -674,11 +682,11 @@ fn threads_change_nothing() {
 
 #[test]
 #[ignore = "long"]
-fn threads_change_nothing_with_implicit() {
-    threads_change_nothing_of(&[([Solver::Implicit; 2], [22, 15, 22], 1)]);
+fn results_are_identical_for_any_number_of_threads_with_implicit() {
+    check_results_are_identical_for_any_number_of_threads(&[([Solver::Implicit; 2], [22, 15, 22], 1)]);
 }
 
-fn threads_change_nothing_of(cases: &[([Solver; 2], [u32; 3], u32)]) {
+fn check_results_are_identical_for_any_number_of_threads(cases: &[([Solver; 2], [u32; 3], u32)]) {
     let hashes = [1, 2].map(|thread_count| {
         let mut hashes = Vec::new();
         for &(solvers, cells, steps) in cases {
@@ -704,8 +712,8 @@ fn threads_change_nothing_of(cases: &[([Solver; 2], [u32; 3], u32)]) {
 }
 
 #[test]
-fn the_hash_knows_of_it() {
-    // Alike but for what the thread is like.
+fn the_state_hash_covers_sutures() {
+    // The definitions differ only in the thread.
     let definitions = [
         SutureDefinition::default(),
         SutureDefinition {
@@ -732,14 +740,14 @@ fn the_hash_knows_of_it() {
 }
 
 #[test]
-fn a_step_that_is_refused_leaves_it_as_it_was() {
-    // Before it is tried, and as it is.
+fn a_refused_step_leaves_sutures_unchanged() {
+    // The step is refused before it starts, or after it was tried.
     for (solvers, [substeps, max_substeps]) in [
         ([Solver::Verlet; 2], [0, 40]),
         ([Solver::Implicit, Solver::Verlet], [0, 40]),
         ([Solver::Verlet; 2], [4, 1000]),
     ] {
-        let ways = [false, true].map(|is_refused| {
+        let runs = [false, true].map(|is_refused| {
             let world = World::new(WorldDefinition {
                 substeps,
                 max_substeps,
@@ -776,12 +784,12 @@ fn a_step_that_is_refused_leaves_it_as_it_was() {
             }
             hashes
         });
-        assert_eq!(ways[0], ways[1], "{solvers:?}");
+        assert_eq!(runs[0], runs[1], "{solvers:?}");
     }
 }
 
 #[test]
-fn what_is_refused_changes_nothing() {
+fn refused_calls_change_nothing() {
     let mut sutured = Sutured::pinned(world(DOWN), CALM, CALM);
     let suture = sutured.suture(SutureDefinition::default());
     for _ in 0..5 {
@@ -798,8 +806,8 @@ fn what_is_refused_changes_nothing() {
     let attached = world
         .attach_to_body(above, &node, below, &node, 0.0)
         .expect("an attachment")[0];
-    let gone = CALM.put(&mut world);
-    world.destroy_body(gone).expect("destroyed");
+    let destroyed = CALM.put(&mut world);
+    world.destroy_body(destroyed).expect("destroyed");
     let before = world.state_hash();
     let usual = SutureDefinition::default();
     let point = |triangle: u32, weights: [f32; 3]| Anchor::Point(SurfacePoint { triangle, weights });
@@ -865,7 +873,7 @@ fn what_is_refused_changes_nothing() {
         "suture is an attachment",
         &world,
     );
-    for [first, second] in [[gone, below], [above, gone]] {
+    for [first, second] in [[destroyed, below], [above, destroyed]] {
         let refused = world.suture(first, &up, second, &down, &usual);
         assert!(matches!(refused, Err(Error::StaleId(_))), "{refused:?}");
     }
@@ -873,7 +881,7 @@ fn what_is_refused_changes_nothing() {
 }
 
 #[test]
-fn it_ends_with_either_body() {
+fn sutures_end_with_either_body() {
     for solver in [Solver::Verlet, Solver::Newton] {
         for is_first in [true, false] {
             let block = Block { solver, ..CALM };
@@ -888,27 +896,27 @@ fn it_ends_with_either_body() {
                 below,
                 ..
             } = sutured;
-            let [gone, left] = if is_first { [above, below] } else { [below, above] };
-            world.destroy_body(gone).expect("destroyed");
+            let [destroyed, remaining] = if is_first { [above, below] } else { [below, above] };
+            world.destroy_body(destroyed).expect("destroyed");
             assert!(matches!(world.suture_report(suture), Err(Error::StaleId(_))));
             assert!(matches!(world.set_suture_length(suture, 0.0), Err(Error::StaleId(_))));
-            // A body in the same place in the world is not sutured, far away as it is.
+            // A new distant body in the slot of the destroyed body is not sutured.
             let other = Block {
                 at: Vec3::X * 0.1,
                 ..block
             };
             let other = other.put(&mut world);
-            let from = centre(body(&world, left)).y;
+            let from = centre(body(&world, remaining)).y;
             for _ in 0..50 {
                 world.step(1e-3).expect("a step");
             }
             let free = -0.5 * 9.81 * 0.05_f64.powi(2);
             assert!(centre(body(&world, other)).y < 0.5 * free, "{solver:?}");
-            assert!(all_finite(body(&world, left)));
-            let aside = centre(body(&world, other)).x - 0.1;
-            assert!(aside.abs() < 1e-6, "{solver:?}: {aside} m aside");
+            assert!(all_finite(body(&world, remaining)));
+            let lateral = centre(body(&world, other)).x - 0.1;
+            assert!(lateral.abs() < 1e-6, "{solver:?}: {lateral} m aside");
             if is_first {
-                assert!(centre(body(&world, left)).y < from + 0.5 * free, "{solver:?}");
+                assert!(centre(body(&world, remaining)).y < from + 0.5 * free, "{solver:?}");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Tools that move far in one step, and bodies that do: nothing passes through.
+//! Tools that move far in one step, and fast bodies: nothing passes through.
 
 use crate::support::tissue::*;
 use glam::{Quat, Vec3};
@@ -13,7 +13,7 @@ const TISSUE: Tissue = Tissue {
     spring_damping: 0.01,
 };
 
-/// Where a tip may be aimed at a cloth of cells of 1: a node, edges along and across, the middle of a face, elsewhere.
+/// Target points on a cloth with cells of size 1: a node, edges along and across, the middle of a face, other points.
 const AIMS: [Vec3; 6] = [
     Vec3::new(0.0, 0.0, 0.0),
     Vec3::new(0.5, 0.0, 0.0),
@@ -23,20 +23,20 @@ const AIMS: [Vec3; 6] = [
     Vec3::new(1.62, 0.0, -2.17),
 ];
 
-/// Puts a tip on the other side of a cloth in one step; how it went wrong, if it did.
+/// Moves a tip to the other side of a cloth in one step. Returns an error message on failure.
 fn put_through(
     substeps: u32,
     dt: f32,
     cells: u32,
     shape: Shape,
     (from, to): (Vec3, Vec3),
-    turned: Quat,
+    orientation: Quat,
 ) -> Result<(), String> {
     let mesh = square(SIZE, cells);
     let mut world = world_of(Vec3::ZERO, substeps);
     let cloth = TISSUE.put(&mut world, &mesh);
     pin_all(&mut world, cloth, &rim(cells));
-    let tip = tool(&mut world, shape, 0.0, from, turned);
+    let tip = tool(&mut world, shape, 0.0, from, orientation);
     world.step(dt).map_err(|error| error.to_string())?;
     world.set_pose(tip, to, None).expect("a pose");
     for step in 0..16 {
@@ -45,15 +45,16 @@ fn put_through(
             return Err(format!("step {step}: restored"));
         }
         let beyond = winding(body(&world, cloth), &mesh, to.as_dvec3());
-        let deep = if step % 5 == 0 {
+        let depth = if step % 5 == 0 {
             penetration_of(&world, cloth, shape, tip)
         } else {
             0.0
         };
         if (beyond.abs() - 1.0).abs() > 0.01 {
-            return Err(format!("step {step}: passed through, winding {beyond}, {deep} m deep"));
+            return Err(format!("step {step}: passed through, winding {beyond}, {depth} m deep"));
         }
-        // Half the tip is the bound for a jump, a millimetre once there was time; the edge of a box cuts a little deeper in (1.08 mm once).
+        // Half the tip is the limit for a jump, and a millimeter afterwards. The edge of a box cuts slightly deeper (at
+        // most 1.08 mm).
         let settled = if matches!(shape, Shape::Box { .. }) {
             0.0015
         } else {
@@ -64,8 +65,8 @@ fn put_through(
         } else {
             settled
         };
-        if deep > allowed {
-            return Err(format!("step {step}: {deep} m deep"));
+        if depth > allowed {
+            return Err(format!("step {step}: {depth} m deep"));
         }
     }
     Ok(())
@@ -75,11 +76,11 @@ fn put_through_everywhere(
     cases: &[(u32, f32)],
     substeps: impl Fn(f32, u32) -> u32,
     shape: Shape,
-    turned: Quat,
+    orientation: Quat,
     reach: f32,
 ) {
     let mut failures = Vec::new();
-    let mut tried = 0;
+    let mut count = 0;
     let mut random = Random::new(5);
     for &(cells, dt) in cases {
         let spacing = SIZE / cells as f32;
@@ -89,13 +90,13 @@ fn put_through_everywhere(
                 (0.06, 0.04, Vec3::ZERO),
                 (0.03, 0.03, random.vector() * Vec3::new(0.8, 0.0, 0.8)),
             ] {
-                // As high over the cloth as said, however slanted the way.
-                let away = Vec3::Y + slant;
-                let from = aim * spacing + away * (RADIUS + above) + Vec3::Y * reach;
-                let to = aim * spacing - away * (RADIUS + below) - Vec3::Y * reach;
-                tried += 1;
+                // The height above the cloth is exact for any slant of the path.
+                let direction = Vec3::Y + slant;
+                let from = aim * spacing + direction * (RADIUS + above) + Vec3::Y * reach;
+                let to = aim * spacing - direction * (RADIUS + below) - Vec3::Y * reach;
+                count += 1;
                 let substeps = substeps(dt, cells);
-                if let Err(how) = put_through(substeps, dt, cells, shape, (from, to), turned) {
+                if let Err(how) = put_through(substeps, dt, cells, shape, (from, to), orientation) {
                     failures.push(format!(
                         "{substeps} substeps, dt {dt}, {cells} cells, {from} to {to}: {how}"
                     ));
@@ -105,7 +106,7 @@ fn put_through_everywhere(
     }
     assert!(
         failures.is_empty(),
-        "{} of {tried}:\n{}",
+        "{} of {count}:\n{}",
         failures.len(),
         failures.join("\n")
     );
@@ -113,28 +114,28 @@ fn put_through_everywhere(
 
 #[test]
 fn a_tip_carries_the_cloth_with_it() {
-    a_tip_carries_the_cloth_with_it_of(&[(8, 1.0 / 60.0), (16, 1.0 / 30.0)]);
+    check_a_tip_carries_the_cloth_with_it(&[(8, 1.0 / 60.0), (16, 1.0 / 30.0)]);
 }
 
 #[test]
 #[ignore = "long"]
 fn a_tip_carries_the_cloth_with_it_in_the_other_cases() {
-    a_tip_carries_the_cloth_with_it_of(&[(8, 0.002), (8, 1.0 / 30.0), (16, 0.002), (16, 1.0 / 60.0)]);
+    check_a_tip_carries_the_cloth_with_it(&[(8, 0.002), (8, 1.0 / 30.0), (16, 0.002), (16, 1.0 / 60.0)]);
 }
 
-fn a_tip_carries_the_cloth_with_it_of(cases: &[(u32, f32)]) {
+fn check_a_tip_carries_the_cloth_with_it(cases: &[(u32, f32)]) {
     put_through_everywhere(cases, |_, _| 0, Shape::Sphere { radius: RADIUS }, Quat::IDENTITY, 0.0);
 }
 
 #[test]
 fn a_tip_carries_the_cloth_with_it_in_few_substeps() {
-    a_tip_carries_the_cloth_with_it_in_few_substeps_of(&[(8, 1.0 / 60.0)]);
+    check_a_tip_carries_the_cloth_with_it_in_few_substeps(&[(8, 1.0 / 60.0)]);
 }
 
 #[test]
 #[ignore = "long"]
 fn a_tip_carries_the_cloth_with_it_in_few_substeps_in_the_other_cases() {
-    a_tip_carries_the_cloth_with_it_in_few_substeps_of(&[
+    check_a_tip_carries_the_cloth_with_it_in_few_substeps(&[
         (8, 0.002),
         (8, 1.0 / 30.0),
         (16, 0.002),
@@ -143,24 +144,24 @@ fn a_tip_carries_the_cloth_with_it_in_few_substeps_in_the_other_cases() {
     ]);
 }
 
-fn a_tip_carries_the_cloth_with_it_in_few_substeps_of(cases: &[(u32, f32)]) {
-    // No more than the springs need.
+fn check_a_tip_carries_the_cloth_with_it_in_few_substeps(cases: &[(u32, f32)]) {
+    // As few substeps as the springs allow.
     let substeps = |dt: f32, cells: u32| (dt * cells as f32 / 0.0064).ceil() as u32;
     put_through_everywhere(cases, substeps, Shape::Sphere { radius: RADIUS }, Quat::IDENTITY, 0.0);
 }
 
 #[test]
 fn an_instrument_carries_the_cloth_with_it() {
-    an_instrument_carries_the_cloth_with_it_of(&[(8, 1.0 / 60.0)]);
+    check_an_instrument_carries_the_cloth_with_it(&[(8, 1.0 / 60.0)]);
 }
 
 #[test]
 #[ignore = "long"]
 fn an_instrument_carries_the_cloth_with_it_in_the_other_cases() {
-    an_instrument_carries_the_cloth_with_it_of(&[(8, 0.002), (8, 1.0 / 30.0)]);
+    check_an_instrument_carries_the_cloth_with_it(&[(8, 0.002), (8, 1.0 / 30.0)]);
 }
 
-fn an_instrument_carries_the_cloth_with_it_of(cases: &[(u32, f32)]) {
+fn check_an_instrument_carries_the_cloth_with_it(cases: &[(u32, f32)]) {
     let shape = Shape::Capsule {
         radius: RADIUS,
         half_length: 0.03,
@@ -172,10 +173,10 @@ fn an_instrument_carries_the_cloth_with_it_of(cases: &[(u32, f32)]) {
 
 #[test]
 fn a_resting_tip_jumps_aside_and_down() {
-    // It touches a node, an edge or a face already when it goes.
+    // The tip already touches a node, an edge or a face when it moves.
     let mut failures = Vec::new();
     let mut random = Random::new(9);
-    let mut tried = 0;
+    let mut count = 0;
     for substeps in [0, 20] {
         for aim in AIMS {
             for _ in 0..6 {
@@ -186,7 +187,7 @@ fn a_resting_tip_jumps_aside_and_down() {
                         random.between(-0.06, -0.02),
                         random.between(-0.03, 0.03),
                     );
-                tried += 1;
+                count += 1;
                 let shape = Shape::Sphere { radius: RADIUS };
                 if let Err(how) = put_through(substeps, 0.01, 10, shape, (from, to), Quat::IDENTITY) {
                     failures.push(format!("{substeps} substeps, {from} to {to}: {how}"));
@@ -196,13 +197,13 @@ fn a_resting_tip_jumps_aside_and_down() {
     }
     assert!(
         failures.is_empty(),
-        "{} of {tried}:\n{}",
+        "{} of {count}:\n{}",
         failures.len(),
         failures.join("\n")
     );
 }
 
-/// A body of one node, and its velocity.
+/// Creates a body of one node with a velocity.
 fn bullet(world: &mut World, position: Vec3, velocity: Vec3) -> sinew::BodyId {
     let id = world
         .create_body(&BodyDefinition {
@@ -233,7 +234,7 @@ fn a_fast_node_does_not_pass_a_thin_capsule() {
         let along = random.direction();
         let lying = Quat::from_rotation_arc(Vec3::Y, along);
         let needle = tool(&mut world, shape, 0.0, Vec3::ZERO, lying);
-        // Towards a point of the axis, across it, by less than 0.7 of the radius off.
+        // Aimed at a point of the axis, across it, with an offset of less than 0.7 of the radius.
         let side = along.any_orthonormal_vector();
         let across = along.cross(side);
         let target = along * random.between(-0.09, 0.09) + across * random.between(-0.0007, 0.0007);
@@ -245,12 +246,12 @@ fn a_fast_node_does_not_pass_a_thin_capsule() {
             world.step(dt).expect("a step");
             let position = body(&world, node).positions()[0];
             touched |= world.wrench(needle).expect("a tool").0 != Vec3::ZERO;
-            let deep = penetration_of(&world, node, shape, needle);
+            let depth = penetration_of(&world, node, shape, needle);
             assert!(
-                deep < 1e-5,
-                "{deep} m deep, dt {dt}, step {step}, {speed} m/s from {start}"
+                depth < 1e-5,
+                "{depth} m deep, dt {dt}, step {step}, {speed} m/s from {start}"
             );
-            // It may slide round and away, never straight through.
+            // The node may slide around the capsule, but never pass straight through.
             if position.dot(side) < 0.0 {
                 assert!(touched, "through at step {step}, dt {dt}, {speed} m/s from {start}");
             }
@@ -264,10 +265,10 @@ fn a_fast_node_does_not_pass_a_thin_capsule() {
 }
 
 #[test]
-fn a_turning_capsule_sweeps_what_is_in_its_way() {
-    // Nodes at rest in the quarter or half that a capsule turns through are carried to its other side.
+fn a_rotating_capsule_sweeps_nodes_in_its_path() {
+    // Nodes at rest in the sector that a capsule sweeps are carried to its other side.
     let mut failures = Vec::new();
-    let mut tried = 0;
+    let mut count = 0;
     for substeps in [0, 1, 4, 30] {
         for turn in [0.1_f32, 1.0, 1.57, 3.1] {
             for (radius, half_length) in [(0.005, 0.1), (0.002, 0.2)] {
@@ -279,7 +280,7 @@ fn a_turning_capsule_sweeps_what_is_in_its_way() {
                         let arm = tool(&mut world, shape, 0.0, Vec3::ZERO, lying(0.0));
                         let angle = turn * part;
                         let start = Quat::from_rotation_z(angle) * (Vec3::X * half_length * distance);
-                        // Out of its way at the beginning, and in it then.
+                        // Outside the capsule at the beginning, and inside the swept sector.
                         if start.y < 2.0 * radius {
                             continue;
                         }
@@ -287,11 +288,11 @@ fn a_turning_capsule_sweeps_what_is_in_its_way() {
                         world.set_pose(arm, Vec3::ZERO, Some(lying(turn))).expect("a pose");
                         world.step(1.0 / 60.0).expect("a step");
                         let force = world.wrench(arm).expect("a tool").0;
-                        tried += 1;
-                        let deep = penetration_of(&world, node, shape, arm);
-                        if force == Vec3::ZERO || deep > 0.001 {
+                        count += 1;
+                        let depth = penetration_of(&world, node, shape, arm);
+                        if force == Vec3::ZERO || depth > 0.001 {
                             failures.push(format!(
-                                "{substeps} substeps, {turn} rad, {shape:?}, at {distance}, {part}: {deep} m deep, {force}"
+                                "{substeps} substeps, {turn} rad, {shape:?}, at {distance}, {part}: {depth} m deep, {force}"
                             ));
                         }
                     }
@@ -301,7 +302,7 @@ fn a_turning_capsule_sweeps_what_is_in_its_way() {
     }
     assert!(
         failures.is_empty(),
-        "{} of {tried}:\n{}",
+        "{} of {count}:\n{}",
         failures.len(),
         failures.join("\n")
     );
@@ -321,10 +322,10 @@ fn a_box_carries_the_cloth_with_it_in_the_other_cases() {
 
 fn a_box_carries_the_cloth_with_it(cases: &[(u32, f32)], on_a_corner: bool) {
     let half_extents = Vec3::new(0.01, 0.005, 0.015);
-    let (turned, reach) = if on_a_corner {
+    let (orientation, reach) = if on_a_corner {
         (Quat::from_rotation_x(0.7) * Quat::from_rotation_z(0.6), 0.015)
     } else {
         (Quat::IDENTITY, 0.0)
     };
-    put_through_everywhere(cases, |_, _| 0, Shape::Box { half_extents }, turned, reach);
+    put_through_everywhere(cases, |_, _| 0, Shape::Box { half_extents }, orientation, reach);
 }

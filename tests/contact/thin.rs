@@ -1,4 +1,5 @@
-//! Tools that are much thinner than the edges of the tissue that they press: they feel what the tissue has stored, no more.
+//! Tools much thinner than the edges of the tissue that they press: their force matches the energy that the tissue
+//! stores.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -7,11 +8,11 @@ use crate::support::tissue::*;
 use glam::{DVec3, Quat, Vec3};
 use sinew::{BodyId, Detection, Pose, Shape, ToolDefinition, ToolId, World};
 
-/// Of a cloth, m.
+/// The side of a cloth (m).
 const SIZE: f32 = 0.1;
 const DT: f32 = 1e-3;
 
-/// Boxes between corners, mm, as one mesh.
+/// Returns boxes between corners (mm) as one mesh.
 fn boxes(parts: &[[Vec3; 2]]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     for &[low, high] in parts {
@@ -23,14 +24,14 @@ fn boxes(parts: &[[Vec3; 2]]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (positions, triangles)
 }
 
-/// A box of this width along x and z, mm, upright on its end.
+/// Returns an upright box with these widths along x and z (mm).
 fn upright(width: f32, length: f32, z: f32) -> [Vec3; 2] {
     let half = Vec3::new(0.5 * width, 0.0, 0.5 * length);
     let middle = Vec3::Z * z;
     [middle - half, middle + half + Vec3::Y * 30.0]
 }
 
-/// A cloth pinned all round, and a tool above it.
+/// A cloth with a pinned border, and a tool above it.
 struct Press {
     world: World,
     cloth: BodyId,
@@ -39,7 +40,7 @@ struct Press {
 }
 
 impl Press {
-    /// The lowest point of the tool touches the cloth in this pose.
+    /// Creates the scene. At `pose` the lowest point of the tool touches the cloth.
     fn new(tissue: Tissue, cells: u32, shape: Shape, detection: Detection, pose: Pose) -> Self {
         let mut world = world(Vec3::ZERO);
         let cloth = tissue.put(&mut world, &square(SIZE, cells));
@@ -73,20 +74,20 @@ impl Press {
         sum / f64::from(steps)
     }
 
-    /// Presses it down to a depth, m, in so many steps; the largest force along y on the way.
+    /// Presses the tool down to a depth (m) in `steps` steps. Returns the largest force along y.
     fn press(&mut self, depth: f32, steps: u32) -> f64 {
         let from = self.world.pose(self.tool).expect("a tool").position;
         let to = self.pose.position - Vec3::Y * depth;
-        let mut most = 0.0_f64;
+        let mut largest = 0.0_f64;
         for step in 1..=steps {
-            let way = from.lerp(to, step as f32 / steps as f32);
-            self.world.set_pose(self.tool, way, None).expect("a pose");
-            most = most.max(self.step(1).y);
+            let target = from.lerp(to, step as f32 / steps as f32);
+            self.world.set_pose(self.tool, target, None).expect("a pose");
+            largest = largest.max(self.step(1).y);
         }
-        most
+        largest
     }
 
-    /// The force on the tool and the energy within the cloth, at rest.
+    /// Returns the force on the tool and the energy of the cloth, at rest.
     fn rest(&mut self) -> (DVec3, f64) {
         self.step(350);
         let force = self.step(50);
@@ -94,8 +95,15 @@ impl Press {
     }
 }
 
-/// At rest and without friction the force is the slope of what the cloth has stored: compared over 2 mm by Simpson's rule.
-fn feels_what_is_stored(name: &str, parts: &[[Vec3; 2]], at: [f32; 2], turned: Quat, detection: Detection) {
+/// Checks that the force is the derivative of the stored energy: at rest and without friction, over 2 mm by Simpson's
+/// rule.
+fn assert_force_matches_stored_energy(
+    name: &str,
+    parts: &[[Vec3; 2]],
+    at: [f32; 2],
+    turned: Quat,
+    detection: Detection,
+) {
     let tissue = Tissue {
         mass: 0.02,
         stiffness: 100.0,
@@ -122,63 +130,66 @@ fn feels_what_is_stored(name: &str, parts: &[[Vec3; 2]], at: [f32; 2], turned: Q
     });
     let work = 2e-3 / 6.0 * (first.0.y + 4.0 * middle.0.y + last.0.y);
     let stored = last.1 - first.1;
-    let what = format!("{name} {detection:?} at {at:?}, {turned}");
+    let case = format!("{name} {detection:?} at {at:?}, {turned}");
     assert!(
         (work / stored - 1.0).abs() < 0.02,
-        "{what}: work {work} J, stored {stored} J, forces {} {} {}",
+        "{case}: work {work} J, stored {stored} J, forces {} {} {}",
         first.0,
         middle.0,
         last.0
     );
-    let aside = last.0.with_y(0.0).length();
-    assert!(aside < 0.3 * last.0.y, "{what}: {} N", last.0);
+    let lateral = last.0.with_y(0.0).length();
+    assert!(lateral < 0.3 * last.0.y, "{case}: {} N", last.0);
 }
 
 fn fork() -> [[Vec3; 2]; 3] {
     [-3.0, 0.0, 3.0].map(|z| upright(0.4, 0.4, z))
 }
 
-/// A turn about y, x and z.
+/// Returns a rotation about y, x and z.
 fn turned(yaw: f32, tilt: f32, roll: f32) -> Quat {
     Quat::from_rotation_y(yaw) * Quat::from_rotation_x(tilt) * Quat::from_rotation_z(roll)
 }
 
 #[test]
-fn needles_and_forks_feel_what_the_cloth_has_stored() {
+fn the_force_on_needles_and_forks_matches_the_stored_energy() {
     let exact = Detection::Exact;
-    feels_what_is_stored("fork", &fork(), [0.8, 1.1], turned(0.2, 0.1, 0.15), exact);
+    assert_force_matches_stored_energy("fork", &fork(), [0.8, 1.1], turned(0.2, 0.1, 0.15), exact);
     let needle = [upright(0.4, 0.4, 0.0)];
-    feels_what_is_stored("needle", &needle, [1.2, -2.2], turned(-0.4, 0.1, 0.0), exact);
+    assert_force_matches_stored_energy("needle", &needle, [1.2, -2.2], turned(-0.4, 0.1, 0.0), exact);
 }
 
 #[test]
 #[ignore = "long"]
-fn blades_and_forks_feel_what_the_cloth_has_stored_in_the_other_cases() {
+fn the_force_on_blades_and_forks_matches_the_stored_energy_in_the_other_cases() {
     let (at, askew) = ([-0.04072666, 2.733_957], turned(1.2197274, 0.0, 0.0));
     for detection in [Detection::Exact, Detection::DistanceField] {
-        feels_what_is_stored("fork", &fork(), at, askew, detection);
+        assert_force_matches_stored_energy("fork", &fork(), at, askew, detection);
     }
     let (at, askew) = ([1.2576871, -0.47673368], turned(0.1774326, 0.0, 0.0));
-    feels_what_is_stored("fork", &fork(), at, askew, Detection::Exact);
+    assert_force_matches_stored_energy("fork", &fork(), at, askew, Detection::Exact);
     let blade = [upright(0.5, 10.0, 0.0)];
-    feels_what_is_stored("blade", &blade, [0.0, 0.0], Quat::IDENTITY, Detection::Exact);
-    feels_what_is_stored("blade", &blade, [0.7, 2.1], turned(0.5, 0.1, 0.1), Detection::Exact);
+    assert_force_matches_stored_energy("blade", &blade, [0.0, 0.0], Quat::IDENTITY, Detection::Exact);
+    assert_force_matches_stored_energy("blade", &blade, [0.7, 2.1], turned(0.5, 0.1, 0.1), Detection::Exact);
 }
 
-/// Where a tool reaches over what is pinned, tissue there cannot give way, and lets it by; what can be beside or below it is. So a thin
-/// blade feels what a tall one does, and a thin rod what a capsule does.
+/// Tissue below a tool that reaches over pinned nodes cannot yield and lets the tool pass, but free tissue beside or
+/// below it yields. So a thin blade has the force of a tall one, and a thin rod that of a capsule.
 #[test]
-fn a_thin_tool_over_pinned_tissue_feels_what_others_do() {
-    a_thin_tool_over_pinned_tissue_feels_what_others_do_of(&[Detection::Exact]);
+fn a_thin_tool_over_pinned_tissue_has_the_force_of_a_thick_one() {
+    check_a_thin_tool_over_pinned_tissue_has_the_force_of_a_thick_one(&[Detection::Exact]);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_thin_tool_over_pinned_tissue_feels_what_others_do_found_in_other_ways() {
-    a_thin_tool_over_pinned_tissue_feels_what_others_do_of(&[Detection::DistanceField, Detection::ImageSpace]);
+fn a_thin_tool_over_pinned_tissue_has_the_force_of_a_thick_one_with_other_detections() {
+    check_a_thin_tool_over_pinned_tissue_has_the_force_of_a_thick_one(&[
+        Detection::DistanceField,
+        Detection::ImageSpace,
+    ]);
 }
 
-fn a_thin_tool_over_pinned_tissue_feels_what_others_do_of(detections: &[Detection]) {
+fn check_a_thin_tool_over_pinned_tissue_has_the_force_of_a_thick_one(detections: &[Detection]) {
     let tissue = Tissue {
         mass: 0.02,
         stiffness: 30.0,
@@ -188,9 +199,9 @@ fn a_thin_tool_over_pinned_tissue_feels_what_others_do_of(detections: &[Detectio
     let force = |shape: Shape, orientation: Quat, low: f32, detection: Detection| {
         let position = Vec3::new(1.3e-3, -low, 1.7e-3);
         let mut press = Press::new(tissue, 5, shape, detection, Pose { position, orientation });
-        let most = press.press(0.004, 200);
+        let largest = press.press(0.004, 200);
         let (force, _) = press.rest();
-        (most, force.y)
+        (largest, force.y)
     };
     let lying = |height: f32, width: f32, detection: Detection| {
         let half = Vec3::new(100.0, 0.5 * height, 0.5 * width);
@@ -199,12 +210,13 @@ fn a_thin_tool_over_pinned_tissue_feels_what_others_do_of(detections: &[Detectio
             positions: &positions,
             triangles: &triangles,
         };
-        let (most, force) = force(shape, Quat::IDENTITY, -0.5e-3 * height, detection);
-        // Slowly pressed it never feels much more than in the end; a pixel or a cell is a part of a thin one.
+        let (largest, force) = force(shape, Quat::IDENTITY, -0.5e-3 * height, detection);
+        // During slow pressing the force never exceeds the final force by much. A pixel or a cell is a large fraction
+        // of a thin tool.
         let more = if detection == Detection::Exact { 1.2 } else { 5.0 };
         assert!(
-            most < more * force,
-            "{height} x {width} mm {detection:?}: {most} N, then {force} N"
+            largest < more * force,
+            "{height} x {width} mm {detection:?}: {largest} N, then {force} N"
         );
         force
     };

@@ -27,7 +27,7 @@ fn world_with_plane(friction: f32) -> (World, ToolId) {
     (world, plane)
 }
 
-/// A soft cube of finite elements, 0.36 m wide, that other tissue and itself may meet.
+/// Creates a soft cube of finite elements, 0.36 m wide, that collides with other bodies.
 fn cube(world: &mut World, at: Vec3, solver: Solver, thickness: f32) -> BodyId {
     let mesh = moved(Mesh::block([0.36; 3], [3; 3]).expect("a block"), at);
     let body = BodyDefinition {
@@ -48,34 +48,35 @@ fn lowest(world: &World, bodies: &[BodyId]) -> f32 {
     let lows = all.map(|body| {
         body.positions()
             .iter()
-            .map(|place| place.y)
+            .map(|position| position.y)
             .fold(f32::INFINITY, f32::min)
     });
     lows.fold(f32::INFINITY, f32::min)
 }
 
 fn momentum(world: &World, bodies: &[BodyId]) -> DVec3 {
-    let of_body = |&id: &BodyId| {
+    let body_momentum = |&id: &BodyId| {
         let body = world.body(id).expect("a body");
         let nodes = (0..).zip(body.velocities());
         let momenta =
             nodes.map(|(node, velocity)| velocity.as_dvec3() * f64::from(body.node_mass(node).expect("a mass")));
         momenta.sum::<DVec3>()
     };
-    bodies.iter().map(of_body).sum()
+    bodies.iter().map(body_momentum).sum()
 }
 
-/// Three cubes that fall onto each other press the lowest one with many times its weight. Tissue contacts that acted after those of tools pushed it
-/// 0.1 m through the plane. What the plane reports is what changes the momentum of all.
+/// Three cubes that fall onto each other press the lowest one with many times its weight. Tissue contacts that were
+/// solved after tool contacts pushed it 0.1 m through the plane. The wrench of the plane equals the change of the total
+/// momentum.
 #[test]
-fn what_falls_on_tissue_does_not_push_it_through_a_plane() {
+fn falling_tissue_does_not_push_other_tissue_through_a_plane() {
     for solver in SOLVERS {
         let (mut world, plane) = world_with_plane(0.5);
-        let places = [0, 1, 2].map(|index| {
+        let positions = [0, 1, 2].map(|index| {
             let index = index as f32;
             Vec3::new(0.03 * (index % 2.0), 0.2 + 0.45 * index, 0.02 * index)
         });
-        let bodies = places.map(|place| cube(&mut world, place, solver, 0.02));
+        let bodies = positions.map(|position| cube(&mut world, position, solver, 0.02));
         let dt = 1.0 / 60.0;
         let mass = 3.0 * 500.0 * 0.36_f64.powi(3);
         let (mut before, mut largest) = (momentum(&world, &bodies), 0.0_f64);
@@ -88,45 +89,42 @@ fn what_falls_on_tissue_does_not_push_it_through_a_plane() {
             );
             let after = momentum(&world, &bodies);
             let pressed = f64::from(world.wrench(plane).expect("a wrench").0.y) * f64::from(dt);
-            // The tool receives what tissue loses.
-            // IMPLICIT solves its equation to a hundredth, and momentum is part of what that leaves.
+            // The tool receives the momentum that the tissue loses. IMPLICIT solves its equation to a hundredth, and
+            // the residual contains momentum.
             let bound = if solver == Solver::Verlet { 2e-3 } else { 1e-2 };
             let change = after.y - before.y + mass * f64::from(GRAVITY * dt);
             largest = largest.max(change.abs());
             assert!(
                 (change + pressed).abs() < bound * largest + 1e-3,
-                "{solver:?}, frame {frame}: {change} N s, the plane says {pressed}"
+                "{solver:?}, frame {frame}: {change} N s, the plane reports {pressed}"
             );
             before = after;
         }
-        assert!(
-            largest > 2.0 * mass * f64::from(GRAVITY * dt),
-            "{solver:?}: nothing fell"
-        );
+        assert!(largest > 2.0 * mass * f64::from(GRAVITY * dt), "{solver:?}: no impact");
     }
 }
 
-/// A sheet on its edge crumples on a plane. It keeps its thickness off the plane whether it meets itself or not.
+/// A sheet on its edge crumples on a plane. It keeps its thickness off the plane with and without self-contact.
 #[test]
-fn a_sheet_that_meets_itself_stays_off_a_plane() {
-    a_sheet_that_meets_itself_stays_off_a_plane_of(Solver::Verlet);
+fn a_sheet_with_self_contact_stays_off_a_plane() {
+    check_a_sheet_with_self_contact_stays_off_a_plane(Solver::Verlet);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_sheet_that_meets_itself_stays_off_a_plane_with_implicit() {
-    a_sheet_that_meets_itself_stays_off_a_plane_of(Solver::Implicit);
+fn a_sheet_with_self_contact_stays_off_a_plane_with_implicit() {
+    check_a_sheet_with_self_contact_stays_off_a_plane(Solver::Implicit);
 }
 
-fn a_sheet_that_meets_itself_stays_off_a_plane_of(solver: Solver) {
+fn check_a_sheet_with_self_contact_stays_off_a_plane(solver: Solver) {
     const THICKNESS: f32 = 0.01;
     let (mut world, _) = world_with_plane(0.0);
     let mut mesh = Mesh::cloth([1.2; 2], [16; 2]).expect("a cloth");
-    for place in &mut mesh.positions {
-        *place = Vec3::new(
-            place.x,
-            place.z + 0.65,
-            0.02 * (5.0 * place.z).sin() + 0.01 * (7.0 * place.x).sin(),
+    for position in &mut mesh.positions {
+        *position = Vec3::new(
+            position.x,
+            position.z + 0.65,
+            0.02 * (5.0 * position.z).sin() + 0.01 * (7.0 * position.x).sin(),
         );
     }
     let mass = 0.6 / mesh.positions.len() as f32;
@@ -158,13 +156,13 @@ fn a_sheet_that_meets_itself_stays_off_a_plane_of(solver: Solver) {
             "{solver:?}, frame {frame}: a node is {low} m above the plane"
         );
     }
-    assert!(is_down, "{solver:?}: nothing fell");
+    assert!(is_down, "{solver:?}: no impact");
 }
 
-/// Viscous tissue that is made within what a plane keeps off is moved out. What is moved out faster the shorter substeps are looks like a strain
-/// rate, which asks for shorter substeps: every step was refused.
+/// Viscous tissue that is created within the thickness of a plane is moved out. The speed of push-out grew with shorter
+/// substeps, which looked like a strain rate that requires shorter substeps, so every step was refused.
 #[test]
-fn viscous_tissue_is_moved_out_of_a_tools_reach() {
+fn viscous_tissue_is_pushed_out_of_a_tools_thickness() {
     const THICKNESS: f32 = 0.03;
     let (mut world, _) = world_with_plane(0.0);
     let mesh = moved(Mesh::block([1.0; 3], [3; 3]).expect("a block"), Vec3::Y * 0.5);

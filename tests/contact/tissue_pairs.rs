@@ -1,4 +1,4 @@
-//! Tissue against tissue, and against itself.
+//! Contact between bodies, and self-contact.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use sinew::{
     BodyContact, BodyDefinition, BodyId, CollisionFilter, Detection, Solver, StepReport, Values, World, WorldDefinition,
 };
 
-/// What each surface keeps off, m.
+/// The contact thickness of each surface (m).
 const THICKNESS: f32 = 0.5e-3;
 
 const CONTACT: BodyContact = BodyContact {
@@ -24,24 +24,24 @@ const ROUGH: BodyContact = BodyContact {
     ..CONTACT
 };
 
-/// The side of a pixel where nothing else is said, m.
+/// The size of a pixel in image-space detection (m).
 const PIXEL: f32 = 2e-3;
 
-/// How bodies find each other.
-const WAYS: [Detection; 2] = [Detection::Exact, Detection::ImageSpace];
+/// The kinds of detection between bodies.
+const DETECTIONS: [Detection; 2] = [Detection::Exact, Detection::ImageSpace];
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
-/// What a body is made of.
+/// The parameters of a body.
 #[derive(Clone, Copy)]
 struct Matter {
-    /// Of the whole body, kg.
+    /// The mass of the whole body (kg).
     mass: f32,
-    /// Of each spring, N/m.
+    /// The stiffness of each spring (N/m).
     stiffness: f32,
-    /// Along springs, N s/m.
+    /// Damping along springs (N s/m).
     damping: f32,
-    /// Against the world, 1/s.
+    /// Damping against the world (1/s).
     drag: f32,
 }
 
@@ -94,13 +94,13 @@ fn step(world: &mut World, dt: f32) -> StepReport {
     report
 }
 
-/// How many nodes of one body lie in tetrahedra of another.
+/// Counts the nodes of body `of` that lie in tetrahedra of body `other`.
 fn inside(world: &World, of: BodyId, mesh: &Mesh, other: BodyId) -> usize {
-    let places = body(world, other).positions();
+    let positions = body(world, other).positions();
     let corners = mesh
         .tetrahedra
         .iter()
-        .map(|nodes| nodes.map(|node| places[node as usize].as_dvec3()));
+        .map(|nodes| nodes.map(|node| positions[node as usize].as_dvec3()));
     let tetrahedra: Vec<_> = corners
         .map(|[a, b, c, d]| (a, DMat3::from_cols(b - a, c - a, d - a).inverse()))
         .collect();
@@ -115,8 +115,8 @@ fn inside(world: &World, of: BodyId, mesh: &Mesh, other: BodyId) -> usize {
 }
 
 #[test]
-fn two_blocks_that_meet_keep_their_momentum_and_part_again() {
-    two_blocks_that_meet_keep_their_momentum_and_part_again_of(&[
+fn two_colliding_blocks_conserve_momentum_and_separate() {
+    check_two_colliding_blocks_conserve_momentum_and_separate(&[
         (Solver::Verlet, Solver::Verlet, Detection::Exact),
         (Solver::Implicit, Solver::Verlet, Detection::ImageSpace),
     ]);
@@ -124,17 +124,17 @@ fn two_blocks_that_meet_keep_their_momentum_and_part_again() {
 
 #[test]
 #[ignore = "long"]
-fn two_blocks_that_meet_keep_their_momentum_and_part_again_in_the_other_cases() {
-    two_blocks_that_meet_keep_their_momentum_and_part_again_of(&[
+fn two_colliding_blocks_conserve_momentum_and_separate_in_the_other_cases() {
+    check_two_colliding_blocks_conserve_momentum_and_separate(&[
         (Solver::Implicit, Solver::Implicit, Detection::Exact),
         (Solver::Verlet, Solver::Implicit, Detection::Exact),
         (Solver::Verlet, Solver::Verlet, Detection::ImageSpace),
     ]);
 }
 
-fn two_blocks_that_meet_keep_their_momentum_and_part_again_of(cases: &[(Solver, Solver, Detection)]) {
+fn check_two_colliding_blocks_conserve_momentum_and_separate(cases: &[(Solver, Solver, Detection)]) {
     for &(left_solver, right_solver, detection) in cases {
-        // One of two asks for it.
+        // Only one of the two requests this detection.
         let contacts = [CONTACT, BodyContact { detection, ..CONTACT }];
         let mut world = world(Vec3::ZERO);
         let meshes = [
@@ -159,50 +159,50 @@ fn two_blocks_that_meet_keep_their_momentum_and_part_again_of(cases: &[(Solver, 
         };
         let energy = |world: &World| ids.iter().map(|&id| total_energy(world, id)).sum::<f64>();
         let (before, energy_before) = (total(&world), energy(&world));
-        let what = format!("{left_solver:?}, {right_solver:?}, {detection:?}");
-        let mut met = false;
+        let case = format!("{left_solver:?}, {right_solver:?}, {detection:?}");
+        let mut collided = false;
         for index in 0..300 {
             let report = step(&mut world, 1e-3);
-            assert_eq!(report.crossings, 0, "{what}, step {index}");
+            assert_eq!(report.crossings, 0, "{case}, step {index}");
             let deep = inside(&world, ids[0], &meshes[1], ids[1]) + inside(&world, ids[1], &meshes[0], ids[0]);
-            assert_eq!(deep, 0, "{what}, step {index}: nodes within the other");
+            assert_eq!(deep, 0, "{case}, step {index}: nodes within the other");
             assert!(
                 energy(&world) < energy_before * 1.001,
-                "{what}, step {index}: energy {} of {energy_before}",
+                "{case}, step {index}: energy {} of {energy_before}",
                 energy(&world)
             );
-            met |= (momentum(body(&world, ids[0]), masses[0]).x - 0.025).abs() > 0.01;
+            collided |= (momentum(body(&world, ids[0]), masses[0]).x - 0.025).abs() > 0.01;
         }
-        assert!(met, "{what}: they never met");
+        assert!(collided, "{case}: they never collided");
         let after = total(&world);
-        // An impulse acts where both sides are within a substep, not where they are as it begins: a little angular momentum is made.
-        // An equation that is solved to a hundredth leaves some momentum.
-        let allowed = if what.contains("Implicit") { 1e-2 } else { 1e-6 };
+        // An impulse acts at positions within the substep, not at those at its start, which adds a little angular
+        // momentum. An equation solved to a hundredth leaves a momentum error.
+        let allowed = if case.contains("Implicit") { 1e-2 } else { 1e-6 };
         assert!(
             (after[0] - before[0]).length() < allowed * 0.05,
-            "{what}: {after:?} after {before:?}"
+            "{case}: {after:?} after {before:?}"
         );
         assert!(
             (after[1] - before[1]).length() < (100.0 * allowed).min(1e-2) * 0.05 * 0.03,
-            "{what}: {after:?} after {before:?}"
+            "{case}: {after:?} after {before:?}"
         );
         let [left, right] = [0, 1].map(|side| momentum(body(&world, ids[side]), masses[side]).x);
-        assert!(left < 0.0 && right > 0.0, "{what}: {left} and {right} kg m/s");
+        assert!(left < 0.0 && right > 0.0, "{case}: {left} and {right} kg m/s");
     }
 }
 
 #[test]
 fn a_block_rests_on_another() {
-    a_block_rests_on_another_of(0..1);
+    check_a_block_rests_on_another(0..1);
 }
 
 #[test]
 #[ignore = "long"]
 fn a_block_rests_on_another_in_the_other_cases() {
-    a_block_rests_on_another_of(1..4);
+    check_a_block_rests_on_another(1..4);
 }
 
-fn a_block_rests_on_another_of(cases: Range<usize>) {
+fn check_a_block_rests_on_another(cases: Range<usize>) {
     for (solver, detection, steps) in [
         (Solver::Verlet, Detection::Exact, &[1e-3_f32, 1.0 / 60.0][..]),
         (Solver::Implicit, Detection::Exact, &[1e-3, 1.0 / 60.0]),
@@ -229,24 +229,24 @@ fn a_block_rests_on_another_of(cases: Range<usize>) {
             for _ in 0..(1.2 / dt) as u32 {
                 step(&mut world, dt);
             }
-            let what = format!("{solver:?}, {detection:?}, {dt} s");
+            let case = format!("{solver:?}, {detection:?}, {dt} s");
             let weight = 2.0 * 0.05 * 9.81;
-            // A contact that is lost and made again gives one step a jerk.
+            // A contact that is lost and made again causes a jerk in one step.
             let mut fastest = f32::INFINITY;
             for _ in 0..3 {
                 let report = step(&mut world, dt);
                 let speeds = body(&world, high).velocities().iter().map(|v| v.length());
                 fastest = fastest.min(speeds.fold(0.0, f32::max));
-                assert_eq!(report.crossings, 0, "{what}");
+                assert_eq!(report.crossings, 0, "{case}");
                 let held = pin_forces(&world, low, &floor);
                 assert!(
                     (held.y - weight).abs() < 0.01 * weight,
-                    "{what}: pins hold {held} of {weight}"
+                    "{case}: pins hold {held} of {weight}"
                 );
             }
-            assert!(fastest < 5e-3, "{what}: still {fastest} m/s");
-            assert_eq!(inside(&world, high, &below, low), 0, "{what}");
-            // It lies on what keeps off both, within a tenth of it.
+            assert!(fastest < 5e-3, "{case}: still {fastest} m/s");
+            assert_eq!(inside(&world, high, &below, low), 0, "{case}");
+            // The gap is the sum of both thicknesses, to a tenth.
             let top = body(&world, low)
                 .positions()
                 .iter()
@@ -257,7 +257,7 @@ fn a_block_rests_on_another_of(cases: Range<usize>) {
                 .iter()
                 .map(|p| p.y)
                 .fold(f32::INFINITY, f32::min);
-            assert!(bottom < top + 2.2 * THICKNESS, "{what}: from {bottom} to {top}");
+            assert!(bottom < top + 2.2 * THICKNESS, "{case}: from {bottom} to {top}");
             let lower = body(&world, low);
             let triangles = lower.surface().iter().map(|&triangle| corners(lower, triangle));
             let triangles: Vec<_> = triangles.collect();
@@ -268,17 +268,17 @@ fn a_block_rests_on_another_of(cases: Range<usize>) {
                 distances.fold(f64::INFINITY, f64::min)
             });
             let gap = gaps.fold(f64::INFINITY, f64::min) as f32;
-            assert!((gap - 2.0 * THICKNESS).abs() < 0.1 * THICKNESS, "{what}: {gap} m apart");
+            assert!((gap - 2.0 * THICKNESS).abs() < 0.1 * THICKNESS, "{case}: {gap} m apart");
         }
     }
 }
 
-/// Two sheets, the lower held at its rim, in one body or in two.
+/// Creates two sheets, the lower one pinned at its border, in one body or in two.
 fn sheets(world: &mut World, solver: Solver, as_one: bool, contact: BodyContact) -> Vec<BodyId> {
     lay(world, solver, as_one, contact, (square(0.08, 8), &rim(8)))
 }
 
-/// The upper of two sheets above this one, which is held at these nodes.
+/// Creates the upper sheet above this lower one, which is pinned at these nodes.
 fn lay(
     world: &mut World,
     solver: Solver,
@@ -309,17 +309,17 @@ fn lay(
 }
 
 #[test]
-fn a_sheet_falls_on_another_and_on_one_of_its_own_body() {
-    a_sheet_falls_on_another_and_on_one_of_its_own_body_of(0..1);
+fn a_sheet_falls_on_another_body_and_on_its_own_body() {
+    check_a_sheet_falls_on_another_body_and_on_its_own_body(0..1);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_sheet_falls_on_another_and_on_one_of_its_own_body_in_the_other_cases() {
-    a_sheet_falls_on_another_and_on_one_of_its_own_body_of(1..4);
+fn a_sheet_falls_on_another_body_and_on_its_own_body_in_the_other_cases() {
+    check_a_sheet_falls_on_another_body_and_on_its_own_body(1..4);
 }
 
-fn a_sheet_falls_on_another_and_on_one_of_its_own_body_of(cases: Range<usize>) {
+fn check_a_sheet_falls_on_another_body_and_on_its_own_body(cases: Range<usize>) {
     for (solver, as_one, detection, resolution) in [
         (Solver::Verlet, false, Detection::Exact, 0.0),
         // A pixel is as large as three triangles.
@@ -331,7 +331,7 @@ fn a_sheet_falls_on_another_and_on_one_of_its_own_body_of(cases: Range<usize>) {
     .take(cases.end)
     .skip(cases.start)
     {
-        let what = format!("{solver:?}, {detection:?} at {resolution} m, one body: {as_one}");
+        let case = format!("{solver:?}, {detection:?} at {resolution} m, one body: {as_one}");
         let contact = BodyContact {
             detection,
             resolution,
@@ -340,13 +340,14 @@ fn a_sheet_falls_on_another_and_on_one_of_its_own_body_of(cases: Range<usize>) {
         let mut world = world(DOWN);
         let ids = sheets(&mut world, solver, as_one, contact);
         for _ in 0..600 {
-            assert_eq!(step(&mut world, 1e-3).crossings, 0, "{what}");
+            assert_eq!(step(&mut world, 1e-3).crossings, 0, "{case}");
         }
         let upper = body(&world, ids[ids.len() - 1]).positions();
         let upper = &upper[upper.len() - 64..];
         let lowest = upper.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
-        assert!(lowest > -0.04, "{what}: the upper sheet is at {lowest}");
-        // As wide apart as both keep off, where it lies: the upper's nodes above the lower's triangles.
+        assert!(lowest > -0.04, "{case}: the upper sheet is at {lowest}");
+        // Where the sheets touch, the gap between the upper nodes and the lower triangles is the sum of both
+        // thicknesses.
         let lower = body(&world, ids[0]);
         let triangles: Vec<_> = lower.surface()[..128]
             .iter()
@@ -361,14 +362,14 @@ fn a_sheet_falls_on_another_and_on_one_of_its_own_body_of(cases: Range<usize>) {
         let gaps: Vec<f64> = upper.iter().map(gap).collect();
         let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
         let resting = gaps.iter().filter(|gap| **gap < 1.2e-3).count();
-        assert!(least > 0.9e-3, "{what}: {least} m apart");
-        assert!(resting > 12, "{what}: {resting} nodes lie on it");
+        assert!(least > 0.9e-3, "{case}: {least} m apart");
+        assert!(resting > 12, "{case}: {resting} nodes rest on the lower sheet");
     }
 }
 
 #[test]
-fn a_seam_takes_nothing_from_contact() {
-    // Meshes of files have corners twice in one place: here an edge without length, in a triangle without area.
+fn a_seam_does_not_weaken_contact() {
+    // Meshes from files can duplicate corners: here an edge without length, in a triangle without area.
     for as_one in [true, false] {
         let [plain, seamed] = [false, true].map(|has_seam| {
             let (mut lower, mut held) = (square(0.08, 8), rim(8));
@@ -405,10 +406,10 @@ fn a_seam_takes_nothing_from_contact() {
 }
 
 #[test]
-fn what_is_thrown_does_not_pass() {
+fn thrown_bodies_do_not_pass_through() {
     for (speed, dt, detection) in [(5.0, 1e-3), (20.0, 1e-3), (5.0, 1.0 / 60.0)]
         .into_iter()
-        .flat_map(|(speed, dt)| WAYS.map(|way| (speed, dt, way)))
+        .flat_map(|(speed, dt)| DETECTIONS.map(|kind| (speed, dt, kind)))
     {
         let contact = BodyContact { detection, ..CONTACT };
         let mut world = world(Vec3::ZERO);
@@ -433,18 +434,19 @@ fn what_is_thrown_does_not_pass() {
         for index in 0..40 {
             let report = step(&mut world, dt);
             crossings = report.crossings;
-            // What is as fast as that crushes itself flat, and then some of it passes: that is told.
+            // A body this fast crushes itself flat, and a part of it passes through, which the report states.
             assert!(
                 report.crossings == 0 || speed > 10.0,
                 "{detection:?}, {speed} m/s, step {index}"
             );
         }
-        // The net, which is free, goes ahead of what hit it.
+        // The free net moves ahead of the stone that hit it.
         let [stone, below] = [
             centre(body(&world, stone)).y,
             f64::from(body(&world, low).positions()[60].y),
         ];
-        // What has passed comes back slowly, so that no energy is made: what is fastest may still be on its way, and that is told.
+        // Parts that have passed come back slowly, so that no energy is added. The fastest can still be on their way,
+        // which the report states.
         let is_ahead = stone > below || speed > 10.0 && crossings > 0;
         assert!(
             is_ahead && below < -0.01,
@@ -454,8 +456,8 @@ fn what_is_thrown_does_not_pass() {
 }
 
 #[test]
-fn what_began_within_another_comes_out() {
-    for detection in WAYS {
+fn bodies_created_inside_each_other_separate() {
+    for detection in DETECTIONS {
         let mut world = world(Vec3::ZERO);
         let meshes = [
             block(0.04, 4, Vec3::ZERO),
@@ -471,7 +473,7 @@ fn what_began_within_another_comes_out() {
             )
         });
         let first = step(&mut world, 1e-3).crossings;
-        assert!(first > 0, "they were to begin within each other");
+        assert!(first > 0, "the bodies must start inside each other");
         for _ in 0..400 {
             step(&mut world, 1e-3);
         }
@@ -486,7 +488,7 @@ fn what_began_within_another_comes_out() {
 }
 
 #[test]
-fn thicknesses_that_overlap_part_nothing() {
+fn overlapping_thicknesses_push_nothing_apart() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let contact = BodyContact {
             thickness: 0.01,
@@ -505,10 +507,12 @@ fn thicknesses_that_overlap_part_nothing() {
     }
 }
 
-/// A contact gives an impulse that closes the next gap within the same substep: it has to be found although nothing went there when it began.
+/// The impulse of one contact closes the next gap within the same substep. That contact must be detected although
+/// nothing moved there when the substep began.
 #[test]
-fn what_is_pushed_on_meets_the_next_in_the_same_substep() {
-    let meshes = [0, 1, 2, 3].map(|place| block(0.04, 3, Vec3::new(0.0411 * place as f32, 0.001 * place as f32, 0.0)));
+fn impulses_propagate_to_the_next_body_in_the_same_substep() {
+    let meshes =
+        [0, 1, 2, 3].map(|number| block(0.04, 3, Vec3::new(0.0411 * number as f32, 0.001 * number as f32, 0.0)));
     for speed in [0.5, 1.0] {
         let mut world = world(Vec3::ZERO);
         let ids = meshes
@@ -519,21 +523,21 @@ fn what_is_pushed_on_meets_the_next_in_the_same_substep() {
         let energy = |world: &World| ids.iter().map(|&id| total_energy(world, id)).sum::<f64>();
         let start = energy(&world);
         for index in 0..100 {
-            let what = format!("{speed} m/s, step {index}");
-            assert_eq!(step(&mut world, 1e-3).crossings, 0, "{what}");
-            for place in 0..3 {
-                let [left, right] = [place, place + 1];
+            let case = format!("{speed} m/s, step {index}");
+            assert_eq!(step(&mut world, 1e-3).crossings, 0, "{case}");
+            for number in 0..3 {
+                let [left, right] = [number, number + 1];
                 let deep = inside(&world, ids[left], &meshes[right], ids[right])
                     + inside(&world, ids[right], &meshes[left], ids[left]);
-                assert_eq!(deep, 0, "{what}, blocks {left} and {right}");
+                assert_eq!(deep, 0, "{case}, blocks {left} and {right}");
             }
             let now = energy(&world);
-            assert!(now <= start * (1.0 + 1e-3), "{what}: {now} J of {start}");
+            assert!(now <= start * (1.0 + 1e-3), "{case}: {now} J of {start}");
             let momentum = ids.iter().map(|&id| momentum(body(&world, id), mass)).sum::<DVec3>();
             let given = f64::from(BLOCK.mass * speed);
             assert!(
                 (momentum.x / given - 1.0).abs() < 1e-6,
-                "{what}: {momentum} of {given} kg m/s"
+                "{case}: {momentum} of {given} kg m/s"
             );
         }
         let last = momentum(body(&world, ids[3]), mass).x;
@@ -545,17 +549,17 @@ fn what_is_pushed_on_meets_the_next_in_the_same_substep() {
 }
 
 #[test]
-fn blocks_that_are_thrown_at_each_other_gain_no_energy() {
-    blocks_that_are_thrown_at_each_other_gain_no_energy_of(&[3.0]);
+fn blocks_thrown_at_each_other_gain_no_energy() {
+    check_blocks_thrown_at_each_other_gain_no_energy(&[3.0]);
 }
 
 #[test]
 #[ignore = "long"]
-fn blocks_that_are_thrown_at_each_other_gain_no_energy_at_other_speeds() {
-    blocks_that_are_thrown_at_each_other_gain_no_energy_of(&[0.3, 10.0]);
+fn blocks_thrown_at_each_other_gain_no_energy_at_other_speeds() {
+    check_blocks_thrown_at_each_other_gain_no_energy(&[0.3, 10.0]);
 }
 
-fn blocks_that_are_thrown_at_each_other_gain_no_energy_of(speeds: &[f32]) {
+fn check_blocks_thrown_at_each_other_gain_no_energy(speeds: &[f32]) {
     for (solver, speed) in [Solver::Verlet, Solver::Implicit]
         .into_iter()
         .flat_map(|solver| speeds.iter().map(move |&speed| (solver, speed)))
@@ -573,7 +577,7 @@ fn blocks_that_are_thrown_at_each_other_gain_no_energy_of(speeds: &[f32]) {
         });
         let energy = |world: &World| ids.iter().map(|&id| total_energy(world, id)).sum::<f64>();
         let start = energy(&world);
-        // They meet within 0.07 s.
+        // They collide within 0.07 s.
         for index in 0..60 {
             step(&mut world, 1.0 / 60.0);
             let now = energy(&world);
@@ -586,7 +590,7 @@ fn blocks_that_are_thrown_at_each_other_gain_no_energy_of(speeds: &[f32]) {
 }
 
 #[test]
-fn a_velocity_that_all_bodies_have_costs_nothing() {
+fn a_common_velocity_of_all_bodies_costs_no_substeps() {
     let substeps = [0.0, 20.0].map(|speed| {
         let mut world = world(Vec3::ZERO);
         for index in 0..8_u8 {
@@ -600,44 +604,48 @@ fn a_velocity_that_all_bodies_have_costs_nothing() {
 }
 
 #[test]
-fn what_is_cut_open_has_no_inside() {
-    for (detection, cut) in WAYS.into_iter().flat_map(|way| [(way, false), (way, true)]) {
+fn a_body_that_is_cut_open_has_no_inside() {
+    for (detection, cut) in DETECTIONS.into_iter().flat_map(|kind| [(kind, false), (kind, true)]) {
         let contact = BodyContact { detection, ..CONTACT };
         let mut world = world(Vec3::ZERO);
         let mesh = block(0.04, 2, Vec3::ZERO);
         let large = put(&mut world, &mesh, CALM, Solver::Verlet, contact);
-        // Two millimetres below the upper side.
+        // Two millimeters below the upper side.
         let sheet = moved(square(0.005, 1), Vec3::new(0.003, 0.018, 0.004));
         let light = Matter { mass: 1e-3, ..SHEET };
         let small = put(&mut world, &sheet, light, Solver::Verlet, contact);
         assert!(body(&world, large).is_closed() && !body(&world, small).is_closed());
         if cut {
-            let place = |x: f32, y: f32, z: f32| {
+            let node_at = |x: f32, y: f32, z: f32| {
                 let at = Vec3::new(x, y, z);
                 mesh.positions
                     .iter()
                     .position(|p| p.distance(at) < 1e-6)
                     .expect("a node") as u32
             };
-            let [middle, top, above] = [place(0.0, 0.0, 0.0), place(0.0, 0.02, 0.0), place(0.0, 0.02, 0.02)];
+            let [middle, top, above] = [
+                node_at(0.0, 0.0, 0.0),
+                node_at(0.0, 0.02, 0.0),
+                node_at(0.0, 0.02, 0.02),
+            ];
             let body = world.body_mut(large).expect("a body");
             body.remove_spring(middle, top).expect("a spring");
             assert!(body.is_closed(), "what is cut within stays closed");
             body.remove_spring(top, above).expect("a spring");
             assert!(!body.is_closed());
         }
-        // It is led out at a bounded speed.
+        // The sheet is pushed out at a bounded speed.
         for _ in 0..3000 {
             step(&mut world, 1e-3);
         }
         let height = centre(body(&world, small)).y;
-        let what = format!("{detection:?}, cut: {cut}: the sheet is at {height}");
-        assert!(if cut { height < 0.0185 } else { height > 0.0205 }, "{what}");
+        let case = format!("{detection:?}, cut: {cut}: the sheet is at {height}");
+        assert!(if cut { height < 0.0185 } else { height > 0.0205 }, "{case}");
     }
 }
 
 #[test]
-fn what_cannot_be_seen_is_refused_and_nothing_changes() {
+fn invalid_detection_is_refused_and_nothing_changes() {
     let mut world = world(Vec3::ZERO);
     let _ = put(&mut world, &block(0.04, 2, Vec3::ZERO), BLOCK, Solver::Verlet, CONTACT);
     let before = world.state_hash();
@@ -655,8 +663,8 @@ fn what_cannot_be_seen_is_refused_and_nothing_changes() {
             },
             ..Default::default()
         };
-        let told = world.create_body(&definition).expect_err("refused").to_string();
-        assert!(words.iter().all(|word| told.contains(word)), "{told}");
+        let message = world.create_body(&definition).expect_err("refused").to_string();
+        assert!(words.iter().all(|word| message.contains(word)), "{message}");
         assert_eq!(world.state_hash(), before);
     };
     refused(Detection::DistanceField, 0.0, &["contact_detection", "rigid"]);
@@ -667,7 +675,7 @@ fn what_cannot_be_seen_is_refused_and_nothing_changes() {
 }
 
 #[test]
-fn only_what_is_to_meet_meets() {
+fn collision_filters_select_which_bodies_collide() {
     let pass = |left: BodyContact, right: BodyContact| {
         let mut world = world(Vec3::ZERO);
         let ids = [(-0.025, left), (0.025, right)].map(|(x, contact)| {
@@ -697,7 +705,7 @@ fn only_what_is_to_meet_meets() {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_bits() {
+fn results_are_bitwise_identical_for_any_number_of_threads() {
     let hashes = [1, 2, 3].map(|thread_count| {
         let mut world = World::new(WorldDefinition {
             thread_count,

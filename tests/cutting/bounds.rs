@@ -1,4 +1,4 @@
-//! What a body may have after all cuts is told when it is made: no sequence of cuts gives it more.
+//! The upper bounds of a cuttable body are known when it is created: no sequence of cuts exceeds them.
 
 use std::ops::Range;
 
@@ -38,18 +38,18 @@ fn end(random: &mut Random, reach: f32) -> Vec3 {
     random.point(-reach, reach)
 }
 
-/// A short cut or a long one, of an edge that may reach through the body or end in it, also along faces and through nodes.
+/// A short or long cut of an edge that may pass through the body or end in it, also along faces and through nodes.
 fn sweep(random: &mut Random) -> Sweep {
     let reach = random.between(0.02, 0.2);
     let mut ends = [(); 4].map(|()| end(random, reach));
     if random.next() < 0.3 {
-        for place in &mut ends {
-            *place = (*place / 0.01).round() * 0.01;
+        for position in &mut ends {
+            *position = (*position / 0.01).round() * 0.01;
         }
     }
     let [a, b, c, d] = ends;
     if random.next() < 0.5 {
-        // Right through, as upright strokes go.
+        // All the way through, as upright strokes do.
         let (below, above) = (vec3(0.0, -0.3, 0.0), vec3(0.0, 0.3, 0.0));
         return Sweep {
             start: [a + below, a + above],
@@ -63,17 +63,17 @@ fn sweep(random: &mut Random) -> Sweep {
 }
 
 #[test]
-fn no_cuts_give_a_body_more_than_its_bounds() {
-    no_cuts_give_a_body_more_than_its_bounds_of(0..4);
+fn no_cuts_exceed_the_bounds_of_a_body() {
+    no_cuts_exceed_the_bounds_of_a_body_of(0..4);
 }
 
 #[test]
 #[ignore = "long"]
-fn no_cuts_give_a_body_more_than_its_bounds_with_other_seeds() {
-    no_cuts_give_a_body_more_than_its_bounds_of(4..12);
+fn no_cuts_exceed_the_bounds_of_a_body_with_other_seeds() {
+    no_cuts_exceed_the_bounds_of_a_body_of(4..12);
 }
 
-fn no_cuts_give_a_body_more_than_its_bounds_of(seeds: Range<u64>) {
+fn no_cuts_exceed_the_bounds_of_a_body_of(seeds: Range<u64>) {
     let sheet = Mesh::cloth([0.1; 2], [10, 10]).unwrap();
     let block = Mesh::block([0.04; 3], [4; 3]).unwrap();
     for (mesh, per_node) in [(&sheet, 2), (&block, 6)] {
@@ -92,7 +92,7 @@ fn no_cuts_give_a_body_more_than_its_bounds_of(seeds: Range<u64>) {
             for _ in 0..60 {
                 match world.cut(body, &sweep(&mut random)) {
                     Ok(_) => {}
-                    // It is nodes that run out.
+                    // The nodes run out first.
                     Err(Error::Capacity(message)) if message.contains("nodes") => refused += 1,
                     Err(other) => panic!("seed {seed}: {other}"),
                 }
@@ -117,7 +117,7 @@ fn no_cuts_give_a_body_more_than_its_bounds_of(seeds: Range<u64>) {
 }
 
 #[test]
-fn a_body_that_is_not_to_be_cut_has_what_it_has() {
+fn the_bounds_of_an_uncuttable_body_are_its_sizes() {
     let mesh = Mesh::cloth([0.1; 2], [3, 3]).unwrap();
     let (world, body) = world(&mesh, 0);
     let it = world.body(body).unwrap();

@@ -37,7 +37,7 @@ fn a_blade_through_a_sphere_halves_it() {
 }
 
 #[test]
-fn a_blade_half_way_into_a_sphere_leaves_it_whole() {
+fn a_blade_halfway_into_a_sphere_leaves_it_whole() {
     let mut body = Body::new(octahedral_ball(4), flat);
     cut(
         &mut body,
@@ -68,11 +68,11 @@ fn blades_in_any_position_break_nothing() {
     let mut rim = 0;
     for round in 0..400 {
         let start = point(1.2);
-        let (way, edge, turned) = (point(0.4), point(0.6), point(0.2));
+        let (displacement, edge, turned) = (point(0.4), point(0.6), point(0.2));
         rim += cut(
             &mut body,
             [start, start + edge],
-            [start + way, start + way + edge + turned],
+            [start + displacement, start + displacement + edge + turned],
         );
         if round % 25 == 24 {
             body.check();

@@ -1,4 +1,4 @@
-//! Closed surfaces that are cut open: what was inside is lost, with what it took to keep it there.
+//! Closed surfaces that are cut open: the contents are lost, and so is the pressure energy.
 
 use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
@@ -9,13 +9,13 @@ use crate::support::scene::SOLVERS;
 use crate::support::solid::octahedral_ball;
 
 #[test]
-fn a_balloon_that_is_pricked_has_no_pressure() {
+fn a_pricked_balloon_has_no_pressure() {
     for solver in SOLVERS {
         for (pressure, squeezed) in [(0.0, 0.9), (50.0, 1.0)] {
             let what = format!("{solver:?}, {pressure} Pa");
             let (rest, triangles) = octahedral_ball(3);
-            let rest: Vec<Vec3> = rest.iter().map(|place| 0.05 * *place).collect();
-            let positions: Vec<Vec3> = rest.iter().map(|place| *place * squeezed).collect();
+            let rest: Vec<Vec3> = rest.iter().map(|position| 0.05 * *position).collect();
+            let positions: Vec<Vec3> = rest.iter().map(|position| *position * squeezed).collect();
             let mut world = World::new(WorldDefinition {
                 gravity: Vec3::ZERO,
                 ..Default::default()
@@ -29,7 +29,7 @@ fn a_balloon_that_is_pricked_has_no_pressure() {
                 stiffnesses: Values::Uniform(20.0),
                 enclosed_stiffness: 2000.0,
                 pressure,
-                // The last nodes are in a tile that the body had none in.
+                // The last nodes are in a tile that was empty before.
                 spare_nodes: 1000,
                 solver,
                 ..Default::default()
@@ -37,7 +37,7 @@ fn a_balloon_that_is_pricked_has_no_pressure() {
             let body = world.create_body(&definition).unwrap();
             let spin: Vec<Vec3> = positions
                 .iter()
-                .map(|&place| vec3(0.1, 0.2, 3.0).cross(place))
+                .map(|&position| vec3(0.1, 0.2, 3.0).cross(position))
                 .collect();
             world.body_mut(body).unwrap().set_velocities(&spin).unwrap();
             for _ in 0..3 {
@@ -63,21 +63,21 @@ fn a_balloon_that_is_pricked_has_no_pressure() {
             let size: f64 = spin.iter().map(|speed| 1e-4 * f64::from(speed.length())).sum();
             assert!(before.momentum.distance(after.momentum) < 1e-6 * size, "{what}");
             assert!(before.spin.distance(after.spin) < 1e-6 * before.spin.length(), "{what}");
-            // Just what the cavity had is gone.
+            // Exactly the terms of the cavity are removed.
             let (volume, rest_volume) = (enclosed.volume, enclosed.rest_volume);
-            let of_cavity = 1000.0 * rest_volume * (volume / rest_volume - 1.0).powi(2)
+            let cavity_energy = 1000.0 * rest_volume * (volume / rest_volume - 1.0).powi(2)
                 - f64::from(pressure) * (volume - rest_volume);
-            let off = before.energy - after.energy - of_cavity;
+            let error = before.energy - after.energy - cavity_energy;
             assert!(
-                off.abs() < 1e-5 * before.energy.abs().max(of_cavity.abs()),
-                "{what}: {off} J of {of_cavity}"
+                error.abs() < 1e-5 * before.energy.abs().max(cavity_energy.abs()),
+                "{what}: {error} J of {cavity_energy}"
             );
-            let at_last = after.energy;
+            let at_end = after.energy;
             for _ in 0..100 {
                 world.step(1e-3).unwrap();
             }
             let later = kept(&world, body);
-            assert!(later.energy < 1.02 * at_last, "{what}: {at_last} {}", later.energy);
+            assert!(later.energy < 1.02 * at_end, "{what}: {at_end} {}", later.energy);
             let centre: DVec3 = later.momentum / later.mass;
             assert!(centre.length() < 1e-3, "{what}: what was inside pushes it by {centre}");
         }

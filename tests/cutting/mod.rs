@@ -1,4 +1,4 @@
-//! Cuts: surfaces fall apart where the blade went.
+//! Cuts: surfaces separate along the path of the blade.
 #![allow(clippy::unwrap_used)]
 
 mod sheet;

@@ -1,4 +1,4 @@
-//! Sheets that are cut while they move: what is kept, whatever keeps their springs and moves them.
+//! Sheets that are cut in motion: conserved quantities, with every storage and solver.
 
 use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
@@ -9,12 +9,13 @@ use crate::support::kept::kept;
 use crate::support::random::Random;
 use crate::support::scene::{SOLVERS, STORAGES};
 
-/// An unstructured sheet of `n` x `n` cells of 1 cm, 1 kg/m², springs of 50 N/m, in flight without gravity, spinning and swinging.
+/// An unstructured sheet of `n` x `n` cells of 1 cm, 1 kg/m², springs of 50 N/m, in flight without gravity, spinning
+/// and swinging.
 fn in_flight(n: usize, solver: Solver, storage: Storage, damping: f32) -> (World, BodyId) {
     in_flight_with(n, solver, storage, damping, |definition| definition)
 }
 
-/// The same of a definition with more.
+/// Creates the same sheet from an extended definition.
 pub fn in_flight_with(
     n: usize,
     solver: Solver,
@@ -23,7 +24,7 @@ pub fn in_flight_with(
     with: impl for<'a> Fn(BodyDefinition<'a>) -> BodyDefinition<'a>,
 ) -> (World, BodyId) {
     let (rest, cells) = unstructured(n, 5);
-    let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * *place).collect();
+    let positions: Vec<Vec3> = rest.iter().map(|position| 0.01 * *position).collect();
     let mut random = Random(3);
     let mut masses = vec![0.0; positions.len()];
     for cell in &cells {
@@ -54,20 +55,20 @@ pub fn in_flight_with(
     let centre = positions.iter().sum::<Vec3>() / positions.len() as f32;
     let velocities: Vec<Vec3> = positions
         .iter()
-        .map(|&place| {
+        .map(|&position| {
             let shaken = vec3(
                 random.between(-0.1, 0.1),
                 random.between(-0.1, 0.1),
                 random.between(-0.1, 0.1),
             );
-            vec3(0.3, -0.2, 0.1) + vec3(1.0, 2.0, 6.0).cross(place - centre) + shaken
+            vec3(0.3, -0.2, 0.1) + vec3(1.0, 2.0, 6.0).cross(position - centre) + shaken
         })
         .collect();
     world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
     (world, body)
 }
 
-/// A blade that stands upright, from one point of the rest shape to another, where the sheet is now.
+/// An upright blade that moves between two points of the rest shape, at the sheet's current positions.
 pub fn across(body: &Body, from: Vec3, to: Vec3) -> Sweep {
     let positions = body.positions();
     let normal = (positions[20] - positions[0])
@@ -95,10 +96,10 @@ fn cuts_in_motion_keep_mass_momentum_and_energy_in_the_other_cases() {
     cuts_in_motion_keep_mass_momentum_and_energy_of(|case| case % 4 != 0);
 }
 
-fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_tried: fn(usize) -> bool) {
+fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_selected: fn(usize) -> bool) {
     for (number, solver) in (0..).zip(SOLVERS) {
-        for (way, storage) in (number..).zip(STORAGES) {
-            for (_, damping) in (way..).zip([0.0, 1e-3]).filter(|case| is_tried(case.0)) {
+        for (first_case, storage) in (number..).zip(STORAGES) {
+            for (_, damping) in (first_case..).zip([0.0, 1e-3]).filter(|case| is_selected(case.0)) {
                 if solver == Solver::Newton && storage != Storage::Packed {
                     continue;
                 }
@@ -130,27 +131,27 @@ fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_tried: fn(usize) -> bool) 
                         after.energy
                     );
                 }
-                // The last cut is within a piece.
+                // The last cut lies within a piece.
                 assert_eq!(pieces, 4, "{solver:?}, {storage:?}");
-                let at_last = kept(&world, body);
+                let at_end = kept(&world, body);
                 for _ in 0..200 {
                     world.step(1e-3).unwrap();
                 }
                 let later = kept(&world, body);
                 assert!(
-                    later.energy < 1.02 * at_last.energy,
+                    later.energy < 1.02 * at_end.energy,
                     "{solver:?}, {storage:?}: {} {}",
-                    at_last.energy,
+                    at_end.energy,
                     later.energy
                 );
-                assert!(later.momentum.distance(at_last.momentum) < 1e-4 * at_last.momentum.length());
+                assert!(later.momentum.distance(at_end.momentum) < 1e-4 * at_end.momentum.length());
                 assert!(
                     world
                         .body(body)
                         .unwrap()
                         .positions()
                         .iter()
-                        .all(|place| place.is_finite())
+                        .all(|position| position.is_finite())
                 );
             }
         }
@@ -158,11 +159,14 @@ fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_tried: fn(usize) -> bool) 
 }
 
 #[test]
-fn what_is_cut_off_falls_and_what_is_held_stays() {
+fn cut_off_tissue_falls_and_held_tissue_stays() {
     for solver in SOLVERS {
         for pinned_for_good in [false, true] {
             let (rest, cells) = super::sheet::grid(12);
-            let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * vec3(place.x, 0.0, place.y)).collect();
+            let positions: Vec<Vec3> = rest
+                .iter()
+                .map(|position| 0.01 * vec3(position.x, 0.0, position.y))
+                .collect();
             let is_held = |node: usize| rest[node].y == 0.0;
             let masses: Vec<f32> = (0..positions.len())
                 .map(|node| if pinned_for_good && is_held(node) { 0.0 } else { 1e-4 })
@@ -211,11 +215,11 @@ fn what_is_cut_off_falls_and_what_is_held_stays() {
             let centre = |world: &World| {
                 let it = world.body(body).unwrap();
                 let (mut sum, mut mass) = (DVec3::ZERO, 0.0);
-                for (node, place) in (0..).zip(it.positions()) {
+                for (node, position) in (0..).zip(it.positions()) {
                     if pieces.of_nodes[node as usize] == pieces.of_nodes[30] {
-                        let of_node = f64::from(it.node_mass(node).unwrap());
-                        sum += of_node * place.as_dvec3();
-                        mass += of_node;
+                        let node_mass = f64::from(it.node_mass(node).unwrap());
+                        sum += node_mass * position.as_dvec3();
+                        mass += node_mass;
                     }
                 }
                 (sum / mass, mass)
@@ -227,7 +231,7 @@ fn what_is_cut_off_falls_and_what_is_held_stays() {
             for _ in 0..50 {
                 world.step(2e-3).unwrap();
             }
-            // Free fall with the damping of its nodes: gamma of a copy goes with its mass.
+            // Free fall with nodal damping: the damping of a copy is proportional to its mass.
             let (after, _) = centre(&world);
             let it = world.body(body).unwrap();
             let fallen = before.y - after.y;
@@ -250,7 +254,7 @@ fn refused_cuts_change_nothing() {
         end: [vec3(0.3, 0.12, -1.0), vec3(0.3, 0.12, 1.0)],
     };
     let (rest, cells) = unstructured(20, 5);
-    let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * *place).collect();
+    let positions: Vec<Vec3> = rest.iter().map(|position| 0.01 * *position).collect();
     let definition = BodyDefinition {
         positions: &positions,
         masses: Values::Uniform(1e-4),
@@ -284,7 +288,7 @@ fn refused_cuts_change_nothing() {
     );
     assert!(matches!(error, sinew::Error::Capacity(_)), "{error}");
     let (rest, cells) = super::sheet::grid(20);
-    let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * *place).collect();
+    let positions: Vec<Vec3> = rest.iter().map(|position| 0.01 * *position).collect();
     let full = BodyDefinition {
         positions: &positions,
         triangles: &cells,
@@ -295,15 +299,15 @@ fn refused_cuts_change_nothing() {
     };
     let mut sweeps = 0;
     for shift in 0..20 {
-        // Where a cut ends, the node ahead hangs on to both copies of one beside it: by one spring more than before.
+        // Where a cut ends, the node ahead is connected to both copies of a neighbor: by one spring more than before.
         let mut world = World::new(WorldDefinition::default()).unwrap();
         let body = world.create_body(&full).unwrap();
-        let way = 0.007 * shift as f32 * Vec3::Y;
+        let offset = 0.007 * shift as f32 * Vec3::Y;
         let shifted = Sweep {
-            start: sweep.start.map(|end| end + way),
+            start: sweep.start.map(|end| end + offset),
             end: sweep
                 .start
-                .map(|end| end + way + (0.1 + 0.003 * shift as f32) * Vec3::X),
+                .map(|end| end + offset + (0.1 + 0.003 * shift as f32) * Vec3::X),
         };
         if world.cut(body, &shifted).is_err() {
             let error = refused(&full, &shifted);
@@ -330,16 +334,20 @@ fn refused_cuts_change_nothing() {
 }
 
 #[test]
-fn a_stroke_goes_on_in_tissue_that_gapes() {
+fn a_stroke_continues_in_opening_tissue() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let (rest, cells) = super::sheet::grid(24);
-        let at_rest: Vec<Vec3> = rest.iter().map(|place| 0.005 * *place).collect();
-        // Stretched across the cut by a fifth, and held on all sides: it gapes as fast as it is cut.
-        let positions: Vec<Vec3> = at_rest.iter().map(|place| *place * vec3(1.0, 1.2, 1.0)).collect();
-        let is_rim = |place: &Vec3| [place.x, place.y].iter().any(|&along| along == 0.0 || along == 24.0);
+        let at_rest: Vec<Vec3> = rest.iter().map(|position| 0.005 * *position).collect();
+        // Stretched across the cut by a fifth, and held on all sides: it opens as fast as it is cut.
+        let positions: Vec<Vec3> = at_rest.iter().map(|position| *position * vec3(1.0, 1.2, 1.0)).collect();
+        let is_rim = |position: &Vec3| {
+            [position.x, position.y]
+                .iter()
+                .any(|&along| along == 0.0 || along == 24.0)
+        };
         let masses: Vec<f32> = rest
             .iter()
-            .map(|place| if is_rim(place) { 0.0 } else { 2.5e-5 })
+            .map(|position| if is_rim(position) { 0.0 } else { 2.5e-5 })
             .collect();
         let mut world = World::new(WorldDefinition {
             gravity: Vec3::ZERO,
@@ -359,17 +367,18 @@ fn a_stroke_goes_on_in_tissue_that_gapes() {
         };
         let body = world.create_body(&definition).unwrap();
         let edge = |x: f32, y: f32| [vec3(x, y, -0.05), vec3(x, y, 0.05)];
-        // In small steps from within to within, with a pause, aslant so that what gapes carries the end aside.
-        let place = |step: u32| (0.02 + 0.0021 * step as f32, 0.062 + 0.0006 * step as f32);
+        // In small steps within the sheet, with a pause, at an angle, so that the opening wound moves the blade's end
+        // sideways.
+        let position = |step: u32| (0.02 + 0.0021 * step as f32, 0.062 + 0.0006 * step as f32);
         let mut length = 0.0;
         for step in 0..40 {
-            let ((x, y), (u, v)) = (place(step), place(step + 1));
+            let ((x, y), (u, v)) = (position(step), position(step + 1));
             let (start, end) = (edge(x, y), edge(u, v));
             length += world.cut(body, &Sweep { start, end }).unwrap().length;
             world.step(2e-3).unwrap();
             if step == 20 {
                 for _ in 0..50 {
-                    // The tissue goes on over a blade that stands still.
+                    // The tissue moves across a stationary blade.
                     let still = Sweep { start: end, end };
                     length += world.cut(body, &still).unwrap().length;
                     world.step(2e-3).unwrap();
@@ -377,7 +386,7 @@ fn a_stroke_goes_on_in_tissue_that_gapes() {
             }
         }
         assert!(length > 0.07, "{length} m were cut");
-        // One rim: from any of its edges to any other it goes on, with no bridge between.
+        // One cut boundary: it connects any two of its edges, without a bridge.
         let it = world.body(body).unwrap();
         let surface = it.surface();
         let mut next = std::collections::BTreeMap::new();
@@ -402,15 +411,15 @@ fn a_stroke_goes_on_in_tissue_that_gapes() {
                 break;
             }
         }
-        assert_eq!(count, next.len(), "{solver:?}: the rim is in several parts");
+        assert_eq!(count, next.len(), "{solver:?}: the cut boundary has several components");
     }
 }
 
 #[test]
-fn no_spring_along_no_edge_stays_across_a_cut() {
+fn no_spring_off_the_edges_stays_across_a_cut() {
     for is_given in [true, false] {
         let (rest, cells) = super::sheet::grid(12);
-        let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * *place).collect();
+        let positions: Vec<Vec3> = rest.iter().map(|position| 0.01 * *position).collect();
         let at = |x: u32, y: u32| y * 13 + x;
         let mut edges: Vec<[u32; 2]> = cells
             .iter()
@@ -418,7 +427,7 @@ fn no_spring_along_no_edge_stays_across_a_cut() {
             .collect();
         edges.sort_unstable();
         edges.dedup();
-        // Over two cells each: they keep the sheet from folding.
+        // Springs that span two cells keep the sheet from folding.
         let over: Vec<[u32; 2]> = (0..13)
             .flat_map(|a| (0..11).flat_map(move |b| [[at(b, a), at(b + 2, a)], [at(a, b), at(a, b + 2)]]))
             .collect();
@@ -444,7 +453,10 @@ fn no_spring_along_no_edge_stays_across_a_cut() {
                 world.body_mut(body).unwrap().add_spring(a, b, 50.0, None).unwrap();
             }
         }
-        let stretched: Vec<Vec3> = positions.iter().map(|place| *place * vec3(1.1, 1.05, 1.0)).collect();
+        let stretched: Vec<Vec3> = positions
+            .iter()
+            .map(|position| *position * vec3(1.1, 1.05, 1.0))
+            .collect();
         world.body_mut(body).unwrap().set_positions(&stretched).unwrap();
         world.step(1e-3).unwrap();
         let before = kept(&world, body);
@@ -454,14 +466,14 @@ fn no_spring_along_no_edge_stays_across_a_cut() {
             end: edge(0.15, 0.067),
         };
         assert_eq!(world.cut(body, &sweep).unwrap().pieces_parted, 1);
-        // Springs count here, too.
+        // Springs also connect pieces.
         assert_eq!(
             world.body(body).unwrap().pieces().unwrap().count,
             2,
             "given at first: {is_given}"
         );
         let after = kept(&world, body);
-        assert!(after.energy < before.energy, "springs that are gone pulled");
+        assert!(after.energy < before.energy, "removed springs stored energy");
         assert!(after.momentum.distance(before.momentum) < 1e-9);
     }
 }

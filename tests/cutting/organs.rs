@@ -1,4 +1,4 @@
-//! Surfaces of real organs, uneven and bent: planes part them where they went.
+//! Surfaces of real organs, uneven and curved: planes separate them along the path of the blade.
 
 use std::f32::consts::TAU;
 use std::path::Path;
@@ -10,7 +10,7 @@ use sinew::mesh::MeshFormat;
 use super::sheet::{Body, flat, snap};
 use crate::support::random::Random;
 
-/// Real surfaces, 10 long about the origin; said aloud where they are missing.
+/// Real surfaces, scaled to length 10 about the origin; missing files are reported.
 type Surface = (Vec<Vec3>, Vec<[u32; 3]>);
 
 fn organs() -> Vec<(&'static str, Surface)> {
@@ -30,8 +30,11 @@ fn organs() -> Vec<(&'static str, Surface)> {
         let low = mesh.positions.iter().copied().reduce(Vec3::min).unwrap();
         let high = mesh.positions.iter().copied().reduce(Vec3::max).unwrap();
         let scale = 10.0 / (high - low).max_element();
-        let places = mesh.positions.iter().map(|&place| scale * (place - 0.5 * (low + high)));
-        all.push((name, (places.collect(), mesh.triangles)));
+        let positions = mesh
+            .positions
+            .iter()
+            .map(|&position| scale * (position - 0.5 * (low + high)));
+        all.push((name, (positions.collect(), mesh.triangles)));
     }
     all
 }
@@ -46,14 +49,15 @@ fn cut(body: &mut Body, start: [Vec3; 2], end: [Vec3; 2]) {
     body.apply(&changes);
 }
 
-/// No triangle has corners farther than the snapping distance on both sides of where the blade went; every edge of the rim is along it.
+/// Checks that no triangle has corners farther than the snapping distance on both sides of the blade's path, and that
+/// every cut-boundary edge lies along it.
 fn assert_parted(what: &str, body: &Body, side: impl Fn(DVec3) -> f64) {
     let far = 1.01 * snap(body);
     for triangle in body.surface.triangles() {
-        let off = triangle.corners.map(|corner| side(body.surface.rest_place(corner)));
+        let distance = triangle.corners.map(|corner| side(body.surface.rest_place(corner)));
         assert!(
-            off.iter().all(|&off| off < far) || off.iter().all(|&off| off > -far),
-            "{what}: {off:?}"
+            distance.iter().all(|&distance| distance < far) || distance.iter().all(|&distance| distance > -far),
+            "{what}: {distance:?}"
         );
     }
     for edge in body.rim() {
@@ -62,14 +66,14 @@ fn assert_parted(what: &str, body: &Body, side: impl Fn(DVec3) -> f64) {
 }
 
 #[test]
-fn planes_and_loops_part_surfaces_of_organs() {
+fn planes_and_loops_separate_surfaces_of_organs() {
     for (name, mesh) in organs() {
         let mut random = Random(41);
         for round in 0..6 {
             let mut turned = || Quat::from_rotation_y(random.between(0.0, TAU));
             let turn = turned() * Quat::from_rotation_x(1.3) * turned();
-            let mut off = || random.between(-0.8, 0.8);
-            let through = vec3(off(), off(), off());
+            let mut offset = || random.between(-0.8, 0.8);
+            let through = vec3(offset(), offset(), offset());
             let mut body = Body::new(mesh.clone(), flat);
             let whole = body.check();
             let steps = [1, 7, 40][round % 3];
@@ -87,7 +91,7 @@ fn planes_and_loops_part_surfaces_of_organs() {
             let pieces = body.check();
             assert!(pieces > whole, "{what}: {pieces} pieces of {whole}");
             let normal = (turn * Vec3::Y).as_dvec3();
-            assert_parted(&what, &body, |place| (place - through.as_dvec3()).dot(normal));
+            assert_parted(&what, &body, |position| (position - through.as_dvec3()).dot(normal));
             // Across it, again all the way.
             let at = |x: f32, z: f32| through + turn * vec3(0.0, x, z);
             cut(

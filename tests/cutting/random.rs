@@ -1,25 +1,25 @@
-//! Many cuts at random: nothing breaks, cuts that close part what they should, and what is simulated stays well shaped.
+//! Many random cuts: nothing breaks, closed cuts separate pieces, and simulation elements stay well shaped.
 
 use super::sheet::{Body, far, flat, grid, snap, unstructured, wavy};
 use crate::support::change_lists::Follower;
 use crate::support::random::Random;
 use glam::{Vec2, Vec3, vec2, vec3};
 
-/// Rounds in which what seldom matters does.
+/// Rounds with rare cases.
 const RARE: [usize; 1] = [1237];
 
 #[test]
-fn loops_of_any_size_and_pace_cut_a_piece_out() {
-    loops_of_any_size_and_pace_cut_a_piece_out_of(0..70);
+fn loops_of_any_size_and_speed_cut_a_piece_out() {
+    loops_of_any_size_and_speed_cut_a_piece_out_of(0..70);
 }
 
 #[test]
 #[ignore = "long"]
-fn loops_of_any_size_and_pace_cut_a_piece_out_in_more_rounds() {
-    loops_of_any_size_and_pace_cut_a_piece_out_of((70..200).chain(RARE));
+fn loops_of_any_size_and_speed_cut_a_piece_out_in_more_rounds() {
+    loops_of_any_size_and_speed_cut_a_piece_out_of((70..200).chain(RARE));
 }
 
-fn loops_of_any_size_and_pace_cut_a_piece_out_of(rounds: impl Iterator<Item = usize>) {
+fn loops_of_any_size_and_speed_cut_a_piece_out_of(rounds: impl Iterator<Item = usize>) {
     let sheets = [grid(12), unstructured(12, 6), unstructured(12, 7)];
     for round in rounds {
         let mut random = Random(100_000 + round as u64);
@@ -38,27 +38,27 @@ fn loops_of_any_size_and_pace_cut_a_piece_out_of(rounds: impl Iterator<Item = us
             2,
             "round {round}: {steps} steps about {center}, {wide} x {high}: {areas:?}"
         );
-        let (rim, way) = body.off_the_way(&ellipse);
+        let (rim, path) = body.distance_from_path(&ellipse);
         assert!(
-            rim.max(way) < 1.002 * snap(&body),
-            "round {round}: rim {rim}, way {way}, snap {}",
+            rim.max(path) < 1.002 * snap(&body),
+            "round {round}: rim {rim}, path {path}, snap {}",
             snap(&body)
         );
     }
 }
 
 #[test]
-fn wild_lines_from_border_to_border_part_a_sheet() {
-    wild_lines_from_border_to_border_part_a_sheet_of(0..70);
+fn random_lines_from_border_to_border_separate_a_sheet() {
+    random_lines_from_border_to_border_separate_a_sheet_of(0..70);
 }
 
 #[test]
 #[ignore = "long"]
-fn wild_lines_from_border_to_border_part_a_sheet_in_more_rounds() {
-    wild_lines_from_border_to_border_part_a_sheet_of((70..200).chain(RARE));
+fn random_lines_from_border_to_border_separate_a_sheet_in_more_rounds() {
+    random_lines_from_border_to_border_separate_a_sheet_of((70..200).chain(RARE));
 }
 
-fn wild_lines_from_border_to_border_part_a_sheet_of(rounds: impl Iterator<Item = usize>) {
+fn random_lines_from_border_to_border_separate_a_sheet_of(rounds: impl Iterator<Item = usize>) {
     let sheets = [grid(12), unstructured(12, 8), unstructured(12, 9)];
     for round in rounds {
         let mut random = Random(200_000 + round as u64);
@@ -76,19 +76,19 @@ fn wild_lines_from_border_to_border_part_a_sheet_of(rounds: impl Iterator<Item =
 }
 
 #[test]
-fn three_hundred_cuts_in_a_row() {
-    cuts_in_a_row(unstructured(30, 2), 300, 1);
+fn three_hundred_cuts_in_sequence() {
+    cuts_in_sequence(unstructured(30, 2), 300, 1);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_thousand_cuts_in_a_row() {
-    cuts_in_a_row(unstructured(30, 2), 1000, 1);
-    cuts_in_a_row(unstructured(99, 5), 1000, 2);
+fn a_thousand_cuts_in_sequence() {
+    cuts_in_sequence(unstructured(30, 2), 1000, 1);
+    cuts_in_sequence(unstructured(99, 5), 1000, 2);
 }
 
-fn cuts_in_a_row(sheet: (Vec<Vec3>, Vec<[u32; 3]>), cuts: usize, seed: u64) {
-    let side = sheet.0.last().map_or(0.0, |place| place.x);
+fn cuts_in_sequence(sheet: (Vec<Vec3>, Vec<[u32; 3]>), cuts: usize, seed: u64) {
+    let side = sheet.0.last().map_or(0.0, |position| position.x);
     let mut body = Body::new(sheet, wavy);
     let (nodes, triangles) = (body.positions.len(), body.triangles.len());
     let before = body.worst_ratio();
@@ -96,13 +96,13 @@ fn cuts_in_a_row(sheet: (Vec<Vec3>, Vec<[u32; 3]>), cuts: usize, seed: u64) {
     let mut worst = 0.0f64;
     for cut in 0..cuts {
         let from = vec2(random.between(-1.0, side + 1.0), random.between(-1.0, side + 1.0));
-        let way = Vec2::from_angle(random.between(0.0, 7.0)) * random.between(0.01, 8.0);
-        // The wounds gape, and nodes go where they like.
+        let displacement = Vec2::from_angle(random.between(0.0, 7.0)) * random.between(0.01, 8.0);
+        // The wounds open, and nodes move at random.
         let Follower { positions, rest, .. } = &mut body.follower;
-        for (place, &rest) in positions.iter_mut().zip(&*rest) {
-            *place = wavy(rest) + 0.1 * vec3(random.between(-1.0, 1.0), random.between(-1.0, 1.0), 0.0);
+        for (position, &rest) in positions.iter_mut().zip(&*rest) {
+            *position = wavy(rest) + 0.1 * vec3(random.between(-1.0, 1.0), random.between(-1.0, 1.0), 0.0);
         }
-        body.cut(from, from + way);
+        body.cut(from, from + displacement);
         if cut % 100 == 99 {
             body.check();
             worst = worst.max(body.worst_ratio() / before);
@@ -114,7 +114,8 @@ fn cuts_in_a_row(sheet: (Vec<Vec3>, Vec<[u32; 3]>), cuts: usize, seed: u64) {
         body.surface.vertices().len(),
     ];
     assert!(worst < 2.0, "stiffness by mass {worst} times what it was");
-    // A cut is 4 long in the mean: it crosses some 15 edges at most, each of which adds a vertex, a copy of it and three triangles.
+    // A cut has a mean length of 4: it crosses at most about 15 edges. Each adds a vertex, a copy of it and three
+    // triangles.
     assert!(
         counts[0] < nodes + 18 * cuts && counts[1] < triangles + 50 * cuts && counts[2] < nodes + 55 * cuts,
         "{nodes} nodes and {triangles} triangles, then nodes, triangles, vertices {counts:?}"

@@ -1,12 +1,12 @@
-//! What is refused changes nothing, and a cut can be taken back.
+//! Refused cuts change nothing, and a cut can be undone.
 
 use super::sheet::{Body, flat, grid, unstructured, wavy};
 use glam::{Vec3, vec2};
 use sinew::Error;
 use sinew::cutting::{CutSurface, Limits, Sweep};
 
-/// All that can be seen of a surface.
-fn seen(surface: &CutSurface) -> String {
+/// Returns the full state of a surface as text.
+fn state_text(surface: &CutSurface) -> String {
     format!("{surface:?}")
         .split("before")
         .next()
@@ -30,7 +30,7 @@ fn cut_twice() -> Body {
 #[test]
 fn a_cut_beyond_the_limits_changes_nothing() {
     let mut body = cut_twice();
-    let before = seen(&body.surface);
+    let before = state_text(&body.surface);
     let (from, to) = (vec2(2.0, 6.6), vec2(5.1, -1.0));
     let room = |surface: &CutSurface| {
         [
@@ -58,7 +58,7 @@ fn a_cut_beyond_the_limits_changes_nothing() {
                 },
             );
             assert!(matches!(answer, Err(Error::Capacity(_))), "{answer:?}");
-            assert_eq!(seen(&body.surface), before);
+            assert_eq!(state_text(&body.surface), before);
         }
     }
     let [nodes, vertices, triangles] = needed;
@@ -78,27 +78,27 @@ fn a_cut_beyond_the_limits_changes_nothing() {
 }
 
 #[test]
-fn a_cut_that_is_taken_back_leaves_no_trace() {
+fn an_undone_cut_leaves_no_trace() {
     let mut body = cut_twice();
-    let before = seen(&body.surface);
+    let before = state_text(&body.surface);
     let sweep = body.sweep(vec2(2.0, 6.6), vec2(5.1, -1.0));
     let near = body.surface.near(&sweep, &body.positions).unwrap();
     let first = body
         .surface
         .cut(&sweep, &body.follower.positions, &near, Limits::NONE)
         .unwrap();
-    assert_ne!(seen(&body.surface), before);
+    assert_ne!(state_text(&body.surface), before);
     body.surface.undo();
-    assert_eq!(seen(&body.surface), before);
+    assert_eq!(state_text(&body.surface), before);
     body.surface.undo();
-    assert_eq!(seen(&body.surface), before);
+    assert_eq!(state_text(&body.surface), before);
     let mut turned = near.clone();
     turned.reverse();
     let again = body
         .surface
         .cut(&sweep, &body.follower.positions, &turned, Limits::NONE)
         .unwrap();
-    assert_eq!(first, again, "whatever the order of the candidates");
+    assert_eq!(first, again, "for any order of the candidates");
     body.apply(&again);
     body.check();
 }
@@ -106,17 +106,17 @@ fn a_cut_that_is_taken_back_leaves_no_trace() {
 #[test]
 fn arguments_are_checked() {
     let mut body = cut_twice();
-    let before = seen(&body.surface);
+    let before = state_text(&body.surface);
     let sweep = body.sweep(vec2(2.0, 6.6), vec2(5.1, -1.0));
     let near = body.surface.near(&sweep, &body.positions).unwrap();
-    let refused = |body: &mut Body, sweep: &Sweep, positions: &[Vec3], near: &[u32], told: &str| {
+    let refused = |body: &mut Body, sweep: &Sweep, positions: &[Vec3], near: &[u32], expected_message: &str| {
         let message = body
             .surface
             .cut(sweep, positions, near, Limits::NONE)
             .unwrap_err()
             .to_string();
-        assert!(message.contains(told), "{message}");
-        assert_eq!(seen(&body.surface), before);
+        assert!(message.contains(expected_message), "{message}");
+        assert_eq!(state_text(&body.surface), before);
     };
     let positions = body.positions.clone();
     refused(&mut body, &sweep, &positions[1..], &near, "positions for");
@@ -135,9 +135,9 @@ fn arguments_are_checked() {
 #[test]
 fn surfaces_that_are_not_manifold_are_refused() {
     let (rest, cells) = grid(2);
-    let refused = |rest: &[Vec3], cells: &[[u32; 3]], told: &str| {
+    let refused = |rest: &[Vec3], cells: &[[u32; 3]], expected_message: &str| {
         let message = CutSurface::new(rest, cells).unwrap_err().to_string();
-        assert!(message.contains(told), "{message}");
+        assert!(message.contains(expected_message), "{message}");
     };
     let mut turned = cells.clone();
     turned[3].swap(0, 1);
@@ -159,24 +159,30 @@ fn surfaces_that_are_not_manifold_are_refused() {
 fn a_blade_that_does_not_meet_the_surface_changes_nothing() {
     let mut body = Body::new(grid(6), flat);
     let all: Vec<u32> = (0..body.triangles.len() as u32).collect();
-    let before = seen(&body.surface);
-    let place = Vec3::new(2.3, 2.4, 0.0);
+    let before = state_text(&body.surface);
+    let position = Vec3::new(2.3, 2.4, 0.0);
     for (start, end) in [
-        // Beside it, above it, at rest in it, along itself, in its plane, of no length.
+        // Beside it, above it, at rest in it, along itself, in its plane, of zero length.
         (
-            [place - 9.0 * Vec3::X, place - 9.0 * Vec3::X + Vec3::Z],
-            [place - 5.0 * Vec3::X, place - 4.0 * Vec3::X + Vec3::Z],
+            [position - 9.0 * Vec3::X, position - 9.0 * Vec3::X + Vec3::Z],
+            [position - 5.0 * Vec3::X, position - 4.0 * Vec3::X + Vec3::Z],
         ),
         (
-            [place + Vec3::Z, place + 2.0 * Vec3::Z],
-            [place + Vec3::new(2.0, 2.0, 0.1), place + Vec3::new(2.0, 2.0, 3.0)],
+            [position + Vec3::Z, position + 2.0 * Vec3::Z],
+            [position + Vec3::new(2.0, 2.0, 0.1), position + Vec3::new(2.0, 2.0, 3.0)],
         ),
-        ([place - Vec3::Z, place + Vec3::Z], [place - Vec3::Z, place + Vec3::Z]),
         (
-            [place - Vec3::Z, place + Vec3::Z],
-            [place - 2.0 * Vec3::Z, place + 2.0 * Vec3::Z],
+            [position - Vec3::Z, position + Vec3::Z],
+            [position - Vec3::Z, position + Vec3::Z],
         ),
-        ([place - Vec3::Z, place - Vec3::Z], [place + Vec3::Z, place + Vec3::Z]),
+        (
+            [position - Vec3::Z, position + Vec3::Z],
+            [position - 2.0 * Vec3::Z, position + 2.0 * Vec3::Z],
+        ),
+        (
+            [position - Vec3::Z, position - Vec3::Z],
+            [position + Vec3::Z, position + Vec3::Z],
+        ),
     ] {
         let changes = body
             .surface
@@ -188,6 +194,6 @@ fn a_blade_that_does_not_meet_the_surface_changes_nothing() {
             start = start[1],
             end = end[1]
         );
-        assert_eq!(seen(&body.surface), before);
+        assert_eq!(state_text(&body.surface), before);
     }
 }

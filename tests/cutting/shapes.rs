@@ -1,9 +1,9 @@
-//! Cuts of all shapes, on sheets of all kinds: what has to be kept is kept, and pieces count as expected.
+//! Cuts of all shapes, on sheets of all kinds: conserved quantities and the expected number of pieces.
 
 use super::sheet::{Body, far, flat, grid, snap, unstructured, wavy};
 use glam::{Vec2, vec2};
 
-/// Each sheet has a side of 12 and spans 0 to 12.
+/// Each sheet has sides of 12 and spans 0 to 12.
 fn sheets() -> Vec<Body> {
     let mut bodies = Vec::new();
     for deformation in [flat, wavy, far] {
@@ -14,7 +14,7 @@ fn sheets() -> Vec<Body> {
     bodies
 }
 
-/// Cuts along lines; checks everything after each, and where the rim lies. Returns the number of pieces.
+/// Cuts along lines; checks everything after each, and the position of the cut boundary. Returns the number of pieces.
 fn cut(body: &mut Body, lines: &[&[Vec2]]) -> usize {
     let mut pieces = 0;
     let uncut = body.rim().is_empty();
@@ -23,21 +23,21 @@ fn cut(body: &mut Body, lines: &[&[Vec2]]) -> usize {
         pieces = body.check();
         if at == 0 && uncut {
             let inside = inside(line);
-            let (rim, way) = body.off_the_way(&inside);
+            let (rim, path) = body.distance_from_path(&inside);
             let snap = snap(body) * 1.002;
-            assert!(rim <= snap && way <= snap, "rim {rim}, way {way}, snap {snap}");
+            assert!(rim <= snap && path <= snap, "rim {rim}, path {path}, snap {snap}");
         }
     }
     pieces
 }
 
-/// What of a line lies on the sheet, if its ends alone are off it.
+/// Returns the part of a line on the sheet, if only its ends are off the sheet.
 fn inside(line: &[Vec2]) -> Vec<Vec2> {
     let is_inside = |point: Vec2| point.cmpge(Vec2::ZERO).all() && point.cmple(Vec2::splat(12.0)).all();
     let mut points = Vec::new();
-    for way in line.windows(2) {
+    for segment in line.windows(2) {
         let inside = (0..=1000)
-            .map(|step| way[0].lerp(way[1], step as f32 / 1000.0))
+            .map(|step| segment[0].lerp(segment[1], step as f32 / 1000.0))
             .filter(|&point| is_inside(point));
         points.extend(inside.clone().next());
         points.extend({
@@ -49,7 +49,7 @@ fn inside(line: &[Vec2]) -> Vec<Vec2> {
 }
 
 #[test]
-fn a_straight_cut_parts_a_sheet_in_two() {
+fn a_straight_cut_separates_a_sheet_in_two() {
     for mut body in sheets() {
         assert_eq!(cut(&mut body, &[&[vec2(-1.0, 5.3), vec2(13.0, 6.9)]]), 2);
         let pieces = body.pieces();
@@ -71,7 +71,7 @@ fn a_straight_cut_parts_a_sheet_in_two() {
 }
 
 #[test]
-fn a_cut_through_nodes_and_along_edges_parts_too() {
+fn a_cut_through_nodes_and_along_edges_separates_too() {
     for ends in [
         [vec2(-1.0, 6.0), vec2(13.0, 6.0)],
         [vec2(6.0, 13.0), vec2(6.0, -1.0)],
@@ -87,7 +87,7 @@ fn a_cut_through_nodes_and_along_edges_parts_too() {
 }
 
 #[test]
-fn a_cut_that_pauses_and_turns_goes_on() {
+fn a_cut_that_pauses_and_turns_continues() {
     let curve: Vec<Vec2> = (0..=70)
         .map(|at| at as f32 * 0.2 - 1.0)
         .map(|x| vec2(x, 6.0 + 2.5 * (0.8 * x).sin()))
@@ -95,7 +95,7 @@ fn a_cut_that_pauses_and_turns_goes_on() {
     for mut body in sheets() {
         assert_eq!(cut(&mut body, &[&curve]), 2);
     }
-    // As slow as a hundredth of an edge in a step, and not through the sheet.
+    // As slow as a hundredth of an edge per step, and not through the sheet.
     let slow: Vec<Vec2> = (0..=300)
         .map(|at| vec2(3.3 + 0.01 * at as f32, 4.2 + 0.004 * at as f32))
         .collect();
@@ -115,7 +115,8 @@ fn a_t_and_a_crossing() {
         let (across, over) = ([vec2(-1.0, 5.8), vec2(13.0, 6.3)], [vec2(4.7, 13.0), vec2(7.2, -1.0)]);
         assert_eq!(cut(&mut body, &[&across, &over]), 4);
     }
-    // Cuts that cross inside part nothing; the last from the crossing to the border and back makes a piece.
+    // Crossing cuts in the interior separate nothing; the last one, from the crossing to the border and back, makes a
+    // piece.
     for mut body in sheets() {
         let (one, other) = ([vec2(3.1, 5.8), vec2(9.2, 6.3)], [vec2(5.7, 3.1), vec2(6.4, 9.2)]);
         assert_eq!(cut(&mut body, &[&one, &other]), 1);
@@ -155,7 +156,7 @@ fn a_small_loop_within_one_cell() {
 }
 
 #[test]
-fn a_cut_tells_where_it_ends() {
+fn a_cut_reports_where_it_ends() {
     for mut body in sheets() {
         assert_eq!(body.cut(vec2(-1.0, 5.3), vec2(7.21, 6.9)).ends.len(), 1);
         assert_eq!(

@@ -1,4 +1,4 @@
-//! Sheets, a body that follows the change list alone, and what has to hold after each cut.
+//! Sheets, a body that follows change lists only, and the invariants after each cut.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,14 +31,14 @@ pub fn grid(n: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (rest, cells)
 }
 
-/// A grid of which inner nodes are shaken, and of which edges are turned at random where that leaves no thin triangle.
+/// A grid whose inner nodes are moved at random, with edges flipped at random where that leaves no thin triangle.
 pub fn unstructured(n: usize, seed: u64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let mut random = Random(seed);
     let (mut rest, mut cells) = grid(n);
-    for place in &mut rest {
+    for position in &mut rest {
         let is_inside = |x: f32| x > 0.0 && x < n as f32;
-        if is_inside(place.x) && is_inside(place.y) {
-            *place += Vec3::new(random.between(-0.3, 0.3), random.between(-0.3, 0.3), 0.0);
+        if is_inside(position.x) && is_inside(position.y) {
+            *position += Vec3::new(random.between(-0.3, 0.3), random.between(-0.3, 0.3), 0.0);
         }
     }
     for _ in 0..2 * cells.len() {
@@ -87,10 +87,10 @@ impl Body {
         Self { surface, follower }
     }
 
-    /// Where the blade's edge stands upright at a point of the rest shape.
+    /// Returns the blade's edge, upright at a point of the rest shape.
     fn blade(&self, at: Vec2) -> [Vec3; 2] {
-        let place = (self.deformation)(at.extend(0.0));
-        [place - 3.0 * Vec3::Z, place + 3.0 * Vec3::Z]
+        let position = (self.deformation)(at.extend(0.0));
+        [position - 3.0 * Vec3::Z, position + 3.0 * Vec3::Z]
     }
 
     /// Cuts straight from one point of the rest shape to another.
@@ -122,11 +122,14 @@ impl Body {
 
     /// Cuts along a line of points, stopping at each.
     pub fn cut_along(&mut self, points: &[Vec2]) {
-        for way in points.windows(2) {
-            let (changes, to) = (self.cut(way[0], way[1]), way[1]);
+        for segment in points.windows(2) {
+            let (changes, to) = (self.cut(segment[0], segment[1]), segment[1]);
             for &end in &changes.ends {
-                let off = self.surface.rest_place(end).truncate().distance(to.as_dvec2());
-                assert!(off <= 1.01 * snap(self), "the cut ends {off} from where the blade does");
+                let distance = self.surface.rest_place(end).truncate().distance(to.as_dvec2());
+                assert!(
+                    distance <= 1.01 * snap(self),
+                    "the cut ends {distance} from the end of the blade"
+                );
             }
         }
     }
@@ -138,13 +141,13 @@ impl Body {
         });
     }
 
-    /// Checks all that has to hold whatever was cut; returns the number of pieces.
+    /// Checks all invariants; returns the number of pieces.
     pub fn check(&self) -> usize {
-        self.check_drawn();
+        self.check_render_mesh();
         self.check_material();
         self.check_masses();
         self.check_springs(self.surface.cells().iter().map(|cell| cell.nodes), &EDGES);
-        let (drawn, simulated) = (self.drawn_pieces(), self.simulated_pieces());
+        let (drawn, simulated) = (self.render_pieces(), self.simulated_pieces());
         assert_eq!(
             drawn, simulated,
             "pieces that are drawn, and that nodes hang together in"
@@ -153,8 +156,8 @@ impl Body {
         drawn
     }
 
-    /// The drawn mesh is manifold, and is what the change lists made of the first.
-    fn check_drawn(&self) {
+    /// Checks that the render mesh is manifold and equals the first one updated by the change lists.
+    fn check_render_mesh(&self) {
         let triangles = self.surface.triangles();
         assert_eq!(self.triangles.len(), triangles.len());
         let mut sides = BTreeMap::new();
@@ -163,7 +166,7 @@ impl Body {
             assert_eq!(
                 self.triangles[number],
                 self.surface.corner_points(number as u32),
-                "triangle {number} as lists tell it"
+                "triangle {number} differs from the change lists"
             );
             for k in 0..3 {
                 let (from, to) = (triangle.corners[k], triangle.corners[(k + 1) % 3]);
@@ -178,7 +181,7 @@ impl Body {
         let joined = |from: u32, to: u32| match (sides.get(&(from, to)), sides.get(&(to, from))) {
             (Some(&(_, false)), Some(&(across, false))) => Some(across),
             (Some(&(_, a)), Some(&(_, b))) => {
-                assert!(a && b, "the edge of {from} and {to} is cut on one side alone");
+                assert!(a && b, "the edge of {from} and {to} is cut on one side only");
                 None
             }
             _ => None,
@@ -205,19 +208,16 @@ impl Body {
             assert_eq!(
                 seen.len(),
                 about.len(),
-                "the triangles about vertex {vertex} are one fan"
+                "the triangles around vertex {vertex} are one fan"
             );
             let point = self.surface.vertices()[vertex].point;
             assert!(points.insert(point), "point {point} is two vertices");
             let carried = self.carried[point as usize].distance(self.surface.rest_place(vertex as u32));
-            assert!(
-                carried < 1e-9,
-                "vertex {vertex} carries what its sources did, {carried} off"
-            );
+            assert!(carried < 1e-9, "vertex {vertex} differs from its sources by {carried}");
         }
     }
 
-    /// No material is lost: each cell is covered exactly, and what it was copied from too.
+    /// Checks that no material is lost: each cell is covered exactly, and so is each cell it was copied from.
     fn check_material(&self) {
         let mut covered = vec![0.0; self.surface.cells().len()];
         for (number, triangle) in self.surface.triangles().iter().enumerate() {
@@ -253,15 +253,19 @@ impl Body {
             match self.bound.get(&point) {
                 None => assert_eq!((vertex.nodes[0], vertex.weights[0]), (point, 1.0)),
                 Some((nodes, weights)) => {
-                    let told = ([nodes[0], nodes[1], nodes[2]], [weights[0], weights[1], weights[2]]);
-                    assert_eq!(told, (vertex.nodes, vertex.weights), "point {point} as lists tell it");
+                    let reported = ([nodes[0], nodes[1], nodes[2]], [weights[0], weights[1], weights[2]]);
+                    assert_eq!(
+                        reported,
+                        (vertex.nodes, vertex.weights),
+                        "point {point} differs from the change lists"
+                    );
                     assert_eq!(weights[3], 0.0);
                 }
             }
         }
     }
 
-    fn drawn_pieces(&self) -> usize {
+    fn render_pieces(&self) -> usize {
         let mut union = Union::new(self.surface.vertices().len());
         for triangle in self.surface.triangles() {
             union.unite(triangle.corners[0], triangle.corners[1]);
@@ -270,7 +274,7 @@ impl Body {
         union.count()
     }
 
-    /// The areas of the pieces that are drawn, in the rest shape, in ascending order.
+    /// Returns the areas of the pieces of the render mesh, in the rest shape, in ascending order.
     pub fn piece_areas(&self) -> Vec<f64> {
         let mut union = Union::new(self.surface.vertices().len());
         for triangle in self.surface.triangles() {
@@ -288,7 +292,7 @@ impl Body {
         areas
     }
 
-    /// Which piece each node is in.
+    /// Returns the piece of each node.
     pub fn pieces(&self) -> Vec<u32> {
         let mut union = Union::new(self.surface.node_count() as usize);
         for nodes in self.springs.keys() {
@@ -297,7 +301,7 @@ impl Body {
         (0..self.surface.node_count()).map(|node| union.root(node)).collect()
     }
 
-    /// The rim in the rest shape.
+    /// Returns the cut boundary in the rest shape.
     pub fn rim(&self) -> Vec<[DVec3; 2]> {
         let mut rim = Vec::new();
         for triangle in self.surface.triangles() {
@@ -308,32 +312,32 @@ impl Body {
         rim
     }
 
-    /// The rim lies on the way of the blade, and the way of the blade on the rim; the largest distances.
-    pub fn off_the_way(&self, points: &[Vec2]) -> (f64, f64) {
-        let way: Vec<[DVec3; 2]> = points
+    /// Returns the largest distances of the cut boundary from the blade's path, and of the path from the cut boundary.
+    pub fn distance_from_path(&self, points: &[Vec2]) -> (f64, f64) {
+        let path: Vec<[DVec3; 2]> = points
             .windows(2)
-            .map(|way| [way[0], way[1]].map(|point| point.extend(0.0).as_dvec3()))
+            .map(|ends| [ends[0], ends[1]].map(|point| point.extend(0.0).as_dvec3()))
             .collect();
         let rim = self.rim();
-        (farthest(&rim, &way), farthest(&way, &rim))
+        (farthest(&rim, &path), farthest(&path, &rim))
     }
 }
 
-/// The largest distance from points of the one set of segments to the other set.
-fn farthest(of: &[[DVec3; 2]], from: &[[DVec3; 2]]) -> f64 {
+/// Returns the largest distance from points of one set of segments to the other set.
+fn farthest(segments: &[[DVec3; 2]], others: &[[DVec3; 2]]) -> f64 {
     let mut largest = 0.0f64;
-    for [a, b] in of {
+    for [a, b] in segments {
         let steps = (a.distance(*b) / 0.02).ceil().max(1.0) as usize;
         for step in 0..=steps {
             let point = a.lerp(*b, step as f64 / steps as f64);
-            let nearest = from.iter().map(|&[a, b]| {
-                let way = b - a;
-                let along = if way == DVec3::ZERO {
+            let nearest = others.iter().map(|&[a, b]| {
+                let direction = b - a;
+                let along = if direction == DVec3::ZERO {
                     0.0
                 } else {
-                    (point - a).dot(way) / way.length_squared()
+                    (point - a).dot(direction) / direction.length_squared()
                 };
-                point.distance(a + along.clamp(0.0, 1.0) * way)
+                point.distance(a + along.clamp(0.0, 1.0) * direction)
             });
             largest = largest.max(nearest.fold(f64::INFINITY, f64::min));
         }
@@ -342,25 +346,25 @@ fn farthest(of: &[[DVec3; 2]], from: &[[DVec3; 2]]) -> f64 {
 }
 
 /// The sheet at rest.
-pub fn flat(place: Vec3) -> Vec3 {
-    place
+pub fn flat(position: Vec3) -> Vec3 {
+    position
 }
 
-/// The sheet bent and stretched, so that straight ways stay in planes that stand upright.
-pub fn wavy(place: Vec3) -> Vec3 {
+/// The sheet bent and stretched, so that straight paths stay in upright planes.
+pub fn wavy(position: Vec3) -> Vec3 {
     Vec3::new(
-        1.3 * place.x + 0.2 * place.y,
-        0.8 * place.y,
-        (0.7 * place.x).sin() * (0.5 * place.y).cos(),
+        1.3 * position.x + 0.2 * position.y,
+        0.8 * position.y,
+        (0.7 * position.x).sin() * (0.5 * position.y).cos(),
     )
 }
 
-/// The sheet 2000 edges off, where rounding of places is 1e-4 of an edge.
-pub fn far(place: Vec3) -> Vec3 {
-    wavy(place) + Vec3::new(2000.0, -1700.0, 900.0)
+/// The sheet 2000 edges away, where rounding of positions is 1e-4 of an edge.
+pub fn far(position: Vec3) -> Vec3 {
+    wavy(position) + Vec3::new(2000.0, -1700.0, 900.0)
 }
 
-/// The shortest edge's twentieth is the snapping distance of a cell; the largest of all cells.
+/// The snapping distance of a cell is a twentieth of its shortest edge; this is the largest of all cells.
 pub fn snap(body: &Body) -> f64 {
     body.surface.cells().iter().map(|cell| cell.snap).fold(0.0, f64::max)
 }

@@ -1,4 +1,4 @@
-//! Bodies of springs alone lose those that a blade passes through, and no others.
+//! Bodies of springs alone lose exactly the springs that a blade passes through.
 
 use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
@@ -8,7 +8,7 @@ use crate::support::random::Random;
 
 const SIDE: usize = 7;
 
-/// Springs from each node of a shaken lattice to those within 1.8 edges, in flight and swinging.
+/// Connects each node of an irregular lattice to all nodes within 1.8 edges, in flight and swinging.
 fn lattice(solver: Solver, storage: Storage) -> (World, BodyId, Vec<[u32; 2]>) {
     let mut random = Random(9);
     let positions: Vec<Vec3> = (0..SIDE * SIDE * SIDE)
@@ -51,16 +51,18 @@ fn lattice(solver: Solver, storage: Storage) -> (World, BodyId, Vec<[u32; 2]>) {
         .unwrap();
     let velocities: Vec<Vec3> = positions
         .iter()
-        .map(|place| {
-            vec3(0.3, 0.1, -0.2) + vec3(0.0, 1.0, 2.0).cross(*place) + 0.5 * vec3(random.between(-1.0, 1.0), 0.0, 0.0)
+        .map(|position| {
+            vec3(0.3, 0.1, -0.2)
+                + vec3(0.0, 1.0, 2.0).cross(*position)
+                + 0.5 * vec3(random.between(-1.0, 1.0), 0.0, 0.0)
         })
         .collect();
     world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
     (world, body, springs)
 }
 
-/// Whether a segment passes through the parallelogram from `corner` along two sides.
-fn passes(ends: [Vec3; 2], corner: Vec3, sides: [Vec3; 2]) -> bool {
+/// True if a segment passes through the parallelogram from `corner` along two sides.
+fn crosses(ends: [Vec3; 2], corner: Vec3, sides: [Vec3; 2]) -> bool {
     let [from, to] = ends.map(|end| end.as_dvec3() - corner.as_dvec3());
     let [u, v] = sides.map(|side| side.as_dvec3());
     let normal = u.cross(v);
@@ -74,7 +76,7 @@ fn passes(ends: [Vec3; 2], corner: Vec3, sides: [Vec3; 2]) -> bool {
 }
 
 #[test]
-fn springs_that_the_blade_passes_through_go() {
+fn springs_crossed_by_the_blade_are_removed() {
     for (solver, storage) in [
         (Solver::Verlet, Storage::Packed),
         (Solver::Verlet, Storage::Efficient),
@@ -84,7 +86,7 @@ fn springs_that_the_blade_passes_through_go() {
     ] {
         let what = format!("{solver:?}, {storage:?}");
         let (mut world, body, mut springs) = lattice(solver, storage);
-        // One that comes later, right through.
+        // A spring added later, across the lattice.
         let last = (SIDE * SIDE * SIDE) as u32 - 1;
         if storage != Storage::FastLink {
             world.body_mut(body).unwrap().add_spring(0, last, 1.0, None).unwrap();
@@ -129,18 +131,18 @@ fn springs_that_the_blade_passes_through_go() {
             let energy = |world: &World| world.body(body).unwrap().energy(Vec3::ZERO);
             let before = (momentum(&world), energy(&world), it.topology_version());
             let report = world.cut(body, &sweep).unwrap();
-            let is_cut = |spring: &[u32; 2]| passes(spring.map(|node| positions[node as usize]), corner, sides);
+            let is_cut = |spring: &[u32; 2]| crosses(spring.map(|node| positions[node as usize]), corner, sides);
             let expected: Vec<[u32; 2]> = springs.iter().copied().filter(is_cut).collect();
             springs.retain(|spring| !is_cut(spring));
             assert!(!expected.is_empty());
             assert_eq!(report.springs_removed as usize, expected.len(), "{what}, cut {cut}");
             let it = world.body(body).unwrap();
-            let mut told: Vec<[u32; 2]> = it.changes_since(before.2).unwrap().removed_springs.to_vec();
-            told.iter_mut().for_each(|spring| spring.sort_unstable());
-            told.sort_unstable();
+            let mut reported: Vec<[u32; 2]> = it.changes_since(before.2).unwrap().removed_springs.to_vec();
+            reported.iter_mut().for_each(|spring| spring.sort_unstable());
+            reported.sort_unstable();
             let mut known = expected.clone();
             known.sort_unstable();
-            assert_eq!(told, known, "{what}, cut {cut}");
+            assert_eq!(reported, known, "{what}, cut {cut}");
             assert_eq!(it.node_count(), positions.len());
             assert!(
                 momentum(&world).distance(before.0) < 1e-6 * before.0.length(),

@@ -1,4 +1,4 @@
-//! Tearing: springs beyond what they bear part the surface.
+//! Tearing: springs loaded beyond their limits separate the surface.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use sinew::{
 
 const CELL: f32 = 0.01;
 
-/// A millimetre thick, some 50 N/m a spring.
+/// A millimeter thick, about 50 N/m per spring.
 const TISSUE: Material = Material {
     model: Model::Springs,
     young_modulus: 5e4,
@@ -30,17 +30,17 @@ struct Sheet {
 }
 
 #[derive(Clone, Copy)]
-struct Made {
+struct Options {
     tearing: Tearing,
     solver: Solver,
     storage: Storage,
     spare_nodes: u32,
     threads: u32,
-    /// By how much it is longer along x than at rest.
+    /// Length along x relative to the rest length.
     stretched: f32,
 }
 
-const PLAIN: Made = Made {
+const PLAIN: Options = Options {
     tearing: Tearing {
         strain: 0.2,
         force: 0.0,
@@ -56,15 +56,15 @@ const PLAIN: Made = Made {
 
 impl Sheet {
     fn of((rest, cells): (Vec<Vec3>, Vec<[u32; 3]>)) -> Self {
-        let rest = rest.into_iter().map(|place| CELL * place).collect();
+        let rest = rest.into_iter().map(|position| CELL * position).collect();
         Self { rest, cells }
     }
 
-    /// The same, narrower towards the middle of its length.
+    /// Returns the sheet with a neck in the middle of its length.
     fn with_neck(mut self, length: f32) -> Self {
-        for place in &mut self.rest {
-            let off = (place.x - 0.5 * length) / (0.2 * length);
-            place.y *= 1.0 - 0.5 * (-off * off).exp();
+        for position in &mut self.rest {
+            let offset = (position.x - 0.5 * length) / (0.2 * length);
+            position.y *= 1.0 - 0.5 * (-offset * offset).exp();
         }
         self
     }
@@ -72,15 +72,15 @@ impl Sheet {
     fn positions(&self, stretched: f32) -> Vec<Vec3> {
         self.rest
             .iter()
-            .map(|place| Vec3::new((1.0 + stretched) * place.x, place.y, place.z))
+            .map(|position| Vec3::new((1.0 + stretched) * position.x, position.y, position.z))
             .collect()
     }
 
-    fn world(&self, made: Made) -> Result<(World, BodyId), Error> {
+    fn world(&self, made: Options) -> Result<(World, BodyId), Error> {
         self.world_with(made, 0)
     }
 
-    fn world_with(&self, made: Made, springs_per_node: u32) -> Result<(World, BodyId), Error> {
+    fn world_with(&self, made: Options, springs_per_node: u32) -> Result<(World, BodyId), Error> {
         let mut world = World::new(WorldDefinition {
             gravity: Vec3::ZERO,
             thread_count: made.threads,
@@ -108,9 +108,9 @@ impl Sheet {
         Ok((world, body))
     }
 
-    /// Nodes whose coordinate at rest is one of two.
+    /// Returns the nodes whose coordinate at rest has one of two values.
     fn nodes_at(&self, coordinate: fn(Vec3) -> f32, values: [f32; 2]) -> Vec<u32> {
-        let is_there = |place: &Vec3| values.iter().any(|value| (coordinate(*place) - value).abs() < 1e-6);
+        let is_there = |position: &Vec3| values.iter().any(|value| (coordinate(*position) - value).abs() < 1e-6);
         (0..self.rest.len() as u32)
             .filter(|&node| is_there(&self.rest[node as usize]))
             .collect()
@@ -124,7 +124,7 @@ const NEVER: Tearing = Tearing {
     smallest_piece: 0.0,
 };
 
-/// The strain and the pull, N, of each spring.
+/// Returns the strain and the force (N) of each spring.
 fn loads(body: &Body) -> Vec<([u32; 2], f64, f64)> {
     let pairs = body.spring_pairs().unwrap();
     let springs = body.springs(&pairs).unwrap();
@@ -137,19 +137,19 @@ fn loads(body: &Body) -> Vec<([u32; 2], f64, f64)> {
     pairs.iter().zip(&springs).map(load).collect()
 }
 
-/// What follows the change list alone: where each node is at rest.
+/// Returns the rest position of each node, tracked by change lists only.
 fn at_rest(sheet: &Sheet, body: &Body) -> Vec<DVec3> {
-    let mut rest: Vec<DVec3> = sheet.rest.iter().map(|place| place.as_dvec3()).collect();
+    let mut rest: Vec<DVec3> = sheet.rest.iter().map(|position| position.as_dvec3()).collect();
     for new in body.changes_since(0).unwrap().nodes {
         assert_eq!(new.node as usize, rest.len());
-        let place = (0..3).map(|k| f64::from(new.weights[k]) * rest[new.sources[k] as usize]);
-        rest.push(place.sum());
+        let position = (0..3).map(|k| f64::from(new.weights[k]) * rest[new.sources[k] as usize]);
+        rest.push(position.sum());
     }
     assert_eq!(rest.len(), body.node_count());
     rest
 }
 
-/// Where the rim of tears and cuts since a version runs at rest.
+/// Returns the nodes at rest on the boundary of tears and cuts since a version.
 fn rim(sheet: &Sheet, body: &Body, since: u64) -> Vec<DVec3> {
     let rest = at_rest(sheet, body);
     let rim = body.changes_since(since).unwrap().rim;
@@ -165,7 +165,7 @@ fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
     })
 }
 
-/// The areas at rest of the pieces of what is drawn, m².
+/// Returns the rest areas of the pieces of the render surface (m²).
 fn piece_areas(sheet: &Sheet, body: &Body) -> Vec<f64> {
     let rest = at_rest(sheet, body);
     let mut parents: Vec<usize> = (0..rest.len()).collect();
@@ -189,31 +189,31 @@ fn piece_areas(sheet: &Sheet, body: &Body) -> Vec<f64> {
     areas.into_values().collect()
 }
 
-/// Mass, momentum, angular momentum about the origin, energy.
-fn kept(world: &World, body: BodyId) -> (f64, DVec3, DVec3, f64) {
+/// Returns mass, momentum, angular momentum about the origin, and energy.
+fn conserved(world: &World, body: BodyId) -> (f64, DVec3, DVec3, f64) {
     let it = world.body(body).unwrap();
     let energy = it.energy(Vec3::ZERO);
-    let mut kept = (0.0, DVec3::ZERO, DVec3::ZERO, energy.kinetic + energy.elastic);
-    for (node, (place, velocity)) in (0..).zip(it.positions().iter().zip(it.velocities())) {
+    let mut conserved = (0.0, DVec3::ZERO, DVec3::ZERO, energy.kinetic + energy.elastic);
+    for (node, (position, velocity)) in (0..).zip(it.positions().iter().zip(it.velocities())) {
         let mass = f64::from(it.node_mass(node).unwrap());
-        let (place, velocity) = (place.as_dvec3(), velocity.as_dvec3());
-        kept.0 += mass;
-        kept.1 += mass * velocity;
-        kept.2 += mass * place.cross(velocity);
+        let (position, velocity) = (position.as_dvec3(), velocity.as_dvec3());
+        conserved.0 += mass;
+        conserved.1 += mass * velocity;
+        conserved.2 += mass * position.cross(velocity);
     }
-    kept
+    conserved
 }
 
 fn report(world: &World, body: BodyId) -> TearReport {
     world.body(body).unwrap().tear_report()
 }
 
-/// Pins nodes, and leads each a bit further from the middle with each step.
+/// Pins nodes, and moves each a bit farther from the middle with each step.
 fn pull(world: &mut World, body: BodyId, ends: &[(u32, Vec3)], step: f32) {
     let it = world.body_mut(body).unwrap();
-    for &(node, way) in ends {
-        let place = it.positions()[node as usize];
-        it.move_pin(node, place + step * way).unwrap();
+    for &(node, direction) in ends {
+        let position = it.positions()[node as usize];
+        it.move_pin(node, position + step * direction).unwrap();
     }
 }
 
@@ -232,13 +232,13 @@ fn ends(sheet: &Sheet, nodes: &[u32], middle: f32, along: Vec3) -> Vec<(u32, Vec
 fn a_strip_tears_across_at_its_limit_and_not_below() {
     let length = 24.0 * CELL;
     let (rest, cells) = grid(24);
-    let kept: Vec<[u32; 3]> = cells
+    let conserved: Vec<[u32; 3]> = cells
         .into_iter()
         .filter(|cell| cell.iter().all(|&node| rest[node as usize].y <= 6.0))
         .collect();
     let count = 25 * 7;
-    let strip = Sheet::of((rest[..count].to_vec(), kept)).with_neck(length);
-    let held = strip.nodes_at(|place| place.x, [0.0, length]);
+    let strip = Sheet::of((rest[..count].to_vec(), conserved)).with_neck(length);
+    let held = strip.nodes_at(|position| position.x, [0.0, length]);
     let ends = ends(&strip, &held, 0.5 * length, Vec3::X);
     for by_force in [false, true] {
         let limit = if by_force { 0.1 } else { 0.2 };
@@ -247,9 +247,9 @@ fn a_strip_tears_across_at_its_limit_and_not_below() {
             force: if by_force { limit } else { 0.0 },
             ..PLAIN.tearing
         };
-        let (mut torn, body) = strip.world(Made { tearing, ..PLAIN }).unwrap();
+        let (mut torn, body) = strip.world(Options { tearing, ..PLAIN }).unwrap();
         let (mut whole, twin) = strip
-            .world(Made {
+            .world(Options {
                 tearing: NEVER,
                 ..PLAIN
             })
@@ -262,7 +262,7 @@ fn a_strip_tears_across_at_its_limit_and_not_below() {
             let load = |&(_, strain, force): &(_, f64, f64)| if by_force { force } else { strain };
             loads(body).iter().map(load).fold(0.0, f64::max)
         };
-        // Slowly up to 0.99 of it, and a while there.
+        // Slowly up to 0.99 of the limit, and a while there.
         let mut steps = 0;
         while most(whole.body(twin).unwrap()) < 0.985 * f64::from(limit) {
             for (world, body) in [(&mut torn, body), (&mut whole, twin)] {
@@ -279,7 +279,7 @@ fn a_strip_tears_across_at_its_limit_and_not_below() {
             }
             assert_eq!(report(&torn, body), TearReport::default());
         }
-        // Beyond it, with the very step that goes beyond.
+        // Beyond the limit, it tears in the first step that exceeds it.
         loop {
             for (world, body) in [(&mut torn, body), (&mut whole, twin)] {
                 pull(world, body, &ends, 2e-5);
@@ -301,21 +301,21 @@ fn a_strip_tears_across_at_its_limit_and_not_below() {
         let it = torn.body(body).unwrap();
         assert_eq!(it.pieces().unwrap().count, 1 + parted);
         assert_eq!(piece_areas(&strip, it).len(), 2, "by force: {by_force}");
-        let [from, to] = extent(rim(&strip, it, 0).iter().map(|place| place.x));
+        let [from, to] = extent(rim(&strip, it, 0).iter().map(|position| position.x));
         assert!(
             to - from < 3.0 * f64::from(CELL),
             "by force: {by_force}, from {from} to {to}"
         );
-        // Where it is narrow strain is largest, and the force of a spring the same.
+        // At the neck strain is largest; the force of a spring is the same everywhere.
         if !by_force {
             assert!((0.5 * (from + to) - 0.5 * f64::from(length)).abs() < 4.0 * f64::from(CELL));
         }
-        // Nothing is left that pulls.
+        // No forces are left.
         assert!(most(it) < 0.5 * f64::from(limit));
     }
 }
 
-/// A square of `n` x `n`, of triangles that are nearly equilateral, inner nodes shaken.
+/// A square of `n` x `n` nearly equilateral triangles, with inner nodes moved at random.
 fn shaken(n: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let mut random = Random(6);
     let rows = (n as f32 / 0.75_f32.sqrt()).round() as usize;
@@ -323,7 +323,7 @@ fn shaken(n: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let (mut rest, mut starts) = (Vec::new(), Vec::new());
     for row in 0..=rows {
         starts.push(rest.len() as u32);
-        // Every second row is half a triangle further, and has one more at its ends.
+        // Every second row is shifted by half a triangle, and has an additional one at its ends.
         for x in 0..=n + row % 2 {
             let at = (x as f32 - 0.5 * (row % 2) as f32).clamp(0.0, n as f32);
             let is_inside = at > 0.0 && at < n as f32 && row > 0 && row < rows;
@@ -351,14 +351,14 @@ fn shaken(n: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 }
 
 #[test]
-fn a_crack_goes_on_from_a_notch_and_runs_straight_across() {
+fn a_crack_starts_at_a_notch_and_runs_straight_across() {
     for (name, of) in [("grid", grid(20)), ("shaken", shaken(20))] {
         let sheet = Sheet::of(of);
         let side = 20.0 * CELL;
-        let held = sheet.nodes_at(|place| place.x, [0.0, side]);
+        let held = sheet.nodes_at(|position| position.x, [0.0, side]);
         let ends = ends(&sheet, &held, 0.5 * side, Vec3::X);
         let (mut world, body) = sheet.world(PLAIN).unwrap();
-        // Across it is free, so that corners bear no more than others.
+        // The transverse axes are free, so that corners carry no more load than other nodes.
         let hold = |it: &mut Body, node| it.pin_axes(node, [true, false, false]).unwrap();
         held.iter().for_each(|&node| hold(world.body_mut(body).unwrap(), node));
         let blade = |at: Vec2| [-0.1, 0.1].map(|z| at.extend(z));
@@ -385,7 +385,7 @@ fn a_crack_goes_on_from_a_notch_and_runs_straight_across() {
         let tip_at = tip.extend(0.0).as_dvec3();
         let nearest = first
             .iter()
-            .map(|place| place.distance(tip_at))
+            .map(|position| position.distance(tip_at))
             .fold(f64::INFINITY, f64::min);
         assert!(nearest < 1e-6, "{name}: begins {nearest} m from the tip");
         let mut parted = 0;
@@ -401,19 +401,19 @@ fn a_crack_goes_on_from_a_notch_and_runs_straight_across() {
         let areas = piece_areas(&sheet, it);
         assert_eq!(areas.len(), 2, "{name}");
         let mut furthest = 0.0_f64;
-        for place in rim(&sheet, it, notched) {
-            furthest = furthest.max((place.x - tip_at.x).abs());
-            assert!(place.y > tip_at.y - 1e-6, "{name}: back at {place}");
+        for position in rim(&sheet, it, notched) {
+            furthest = furthest.max((position.x - tip_at.x).abs());
+            assert!(position.y > tip_at.y - 1e-6, "{name}: back at {position}");
         }
         assert!(furthest < 3.0 * f64::from(CELL), "{name}: {furthest} m aside");
-        assert!(it.positions().iter().all(|place| place.is_finite()));
+        assert!(it.positions().iter().all(|position| position.is_finite()));
     }
 }
 
 #[test]
-fn a_tear_keeps_mass_momentum_and_energy_and_is_the_same_wherever_springs_are_kept() {
+fn a_tear_keeps_mass_momentum_and_energy_in_every_storage() {
     let sheet = Sheet::of(unstructured(12, 8));
-    let mut places: Option<Vec<DVec3>> = None;
+    let mut slots: Option<Vec<DVec3>> = None;
     for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
         for storage in [
             Storage::Packed,
@@ -425,25 +425,25 @@ fn a_tear_keeps_mass_momentum_and_energy_and_is_the_same_wherever_springs_are_ke
                 continue;
             }
             let what = format!("{solver:?}, {storage:?}");
-            let made = Made {
+            let made = Options {
                 solver,
                 storage,
                 stretched: 0.25,
                 ..PLAIN
             };
             let (mut torn, body) = sheet.world(made).unwrap();
-            let (mut whole, twin) = sheet.world(Made { tearing: NEVER, ..made }).unwrap();
+            let (mut whole, twin) = sheet.world(Options { tearing: NEVER, ..made }).unwrap();
             for (world, body) in [(&mut torn, body), (&mut whole, twin)] {
                 let velocities: Vec<Vec3> = sheet
                     .rest
                     .iter()
-                    .map(|place| Vec3::new(0.3, -0.2, 0.1) + Vec3::new(0.5, 0.4, 2.0).cross(*place))
+                    .map(|position| Vec3::new(0.3, -0.2, 0.1) + Vec3::new(0.5, 0.4, 2.0).cross(*position))
                     .collect();
                 world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
                 world.step(2e-4).unwrap();
             }
             assert_eq!(report(&torn, body).tears, 1, "{what}");
-            let (before, after) = (kept(&whole, twin), kept(&torn, body));
+            let (before, after) = (conserved(&whole, twin), conserved(&torn, body));
             assert!((after.0 / before.0 - 1.0).abs() < 1e-6, "{what}: mass");
             assert!(
                 after.1.distance(before.1) < 1e-6 * before.1.length(),
@@ -465,16 +465,16 @@ fn a_tear_keeps_mass_momentum_and_energy_and_is_the_same_wherever_springs_are_ke
             let area: f64 = piece_areas(&sheet, it).iter().sum();
             assert!((area / 0.0144 - 1.0).abs() < 1e-6, "{what}: area {area}");
             let rim = rim(&sheet, it, 0);
-            let first = places.get_or_insert_with(|| rim.clone());
+            let first = slots.get_or_insert_with(|| rim.clone());
             assert_eq!(rim.len(), first.len(), "{what}");
             for (a, b) in rim.iter().zip(first) {
                 assert!(a.distance(*b) < 1e-4, "{what}: {a} and {b}");
             }
-            // It opens and goes on without gaining energy.
+            // It opens and continues without gaining energy.
             let mut last = after.3;
             for _ in 0..100 {
                 torn.step(2e-4).unwrap();
-                let now = kept(&torn, body).3;
+                let now = conserved(&torn, body).3;
                 assert!(now < 1.01 * last, "{what}: {last} then {now} J");
                 last = now;
             }
@@ -483,9 +483,9 @@ fn a_tear_keeps_mass_momentum_and_energy_and_is_the_same_wherever_springs_are_ke
 }
 
 #[test]
-fn the_most_loaded_tear_first_and_no_more_than_asked() {
+fn the_most_loaded_springs_tear_first_up_to_the_maximum() {
     let sheet = Sheet::of(unstructured(12, 8));
-    let made = |most_per_step| Made {
+    let made = |most_per_step| Options {
         stretched: 0.25,
         tearing: Tearing {
             most_per_step,
@@ -493,9 +493,9 @@ fn the_most_loaded_tear_first_and_no_more_than_asked() {
         },
         ..PLAIN
     };
-    // Where it would be without.
+    // The state without tearing.
     let (mut whole, twin) = sheet
-        .world(Made {
+        .world(Options {
             tearing: NEVER,
             ..made(0)
         })
@@ -513,7 +513,7 @@ fn the_most_loaded_tear_first_and_no_more_than_asked() {
         assert_eq!(world.body(body).unwrap().topology_version(), u64::from(most));
         assert!(report.waiting + most <= beyond);
         assert!(report.waiting + 8 * most >= beyond, "{report:?} of {beyond}");
-        // None is beside another.
+        // No two are adjacent.
         let it = world.body(body).unwrap();
         let rest = at_rest(&sheet, it);
         let mut seen: Vec<DVec3> = Vec::new();
@@ -522,20 +522,20 @@ fn the_most_loaded_tear_first_and_no_more_than_asked() {
                 it.changes_since(version).unwrap().rim,
                 it.changes_since(version + 1).unwrap().rim,
             );
-            let places: Vec<DVec3> = from[..from.len() - later.len()]
+            let slots: Vec<DVec3> = from[..from.len() - later.len()]
                 .iter()
                 .flat_map(|edge| edge.nodes)
                 .map(|node| rest[node as usize])
                 .collect();
-            assert!(places.iter().all(|place| !seen.contains(place)), "{most}");
-            seen.extend(places);
+            assert!(slots.iter().all(|position| !seen.contains(position)), "{most}");
+            seen.extend(slots);
         }
-        // The first runs through a node of the most loaded.
+        // The first runs through a node of the most loaded spring.
         let [a, b] = loads[0].0.map(|node| sheet.rest[node as usize].as_dvec3());
         let rim = rim(&sheet, world.body(body).unwrap(), 0);
-        assert!(rim.iter().any(|place| *place == a || *place == b), "{most}");
+        assert!(rim.iter().any(|position| *position == a || *position == b), "{most}");
     }
-    // One that bears more does not, and one that bears less does so first.
+    // A stronger spring does not tear, and a weaker one tears first.
     let (mut world, body) = sheet.world(made(1)).unwrap();
     let it = world.body_mut(body).unwrap();
     let middle = loads.iter().find(|load| load.1 < 0.15 && load.1 > 0.1).unwrap().0;
@@ -545,7 +545,7 @@ fn the_most_loaded_tear_first_and_no_more_than_asked() {
     assert_eq!(report(&world, body).tears, 1);
     let ends = middle.map(|node| sheet.rest[node as usize].as_dvec3());
     let first = rim(&sheet, world.body(body).unwrap(), 0);
-    assert!(first.iter().any(|place| ends.contains(place)));
+    assert!(first.iter().any(|position| ends.contains(position)));
     let (mut world, body) = sheet.world(made(1)).unwrap();
     let all: Vec<[u32; 2]> = loads.iter().map(|load| load.0).collect();
     let it = world.body_mut(body).unwrap();
@@ -560,14 +560,14 @@ fn the_most_loaded_tear_first_and_no_more_than_asked() {
     assert_eq!(report(&world, body).tears, 1);
     let ends = b.map(|node| sheet.rest[node as usize].as_dvec3());
     let first = rim(&sheet, world.body(body).unwrap(), 0);
-    assert!(first.iter().any(|place| ends.contains(place)));
+    assert!(first.iter().any(|position| ends.contains(position)));
 }
 
-/// A sheet pulled about at random nodes: the areas of its pieces then, and how many tears there were.
-fn pulled_about(smallest_piece: f32, threads: u32, solver: Solver) -> (Vec<f64>, u32, u64) {
+/// Pulls a sheet at random nodes; returns the areas of its pieces, the number of tears, and the hash.
+fn pull_at_random(smallest_piece: f32, threads: u32, solver: Solver) -> (Vec<f64>, u32, u64) {
     let sheet = Sheet::of(unstructured(16, 3));
     let (mut world, body) = sheet
-        .world(Made {
+        .world(Options {
             tearing: Tearing {
                 strain: 0.3,
                 most_per_step: 4,
@@ -605,7 +605,7 @@ fn pulled_about(smallest_piece: f32, threads: u32, solver: Solver) -> (Vec<f64>,
             parted += report.pieces_parted;
         }
         let it = world.body(body).unwrap();
-        assert!(it.positions().iter().all(|place| place.is_finite()));
+        assert!(it.positions().iter().all(|position| position.is_finite()));
         let changes = it.changes_since(version).unwrap();
         triangles.resize(it.surface().len(), [0; 3]);
         for &triangle in changes.triangles {
@@ -624,22 +624,22 @@ fn pulled_about(smallest_piece: f32, threads: u32, solver: Solver) -> (Vec<f64>,
 }
 
 #[test]
-fn no_piece_is_smaller_than_asked_whatever_pulls() {
-    no_piece_is_smaller_than_asked_whatever_pulls_of(Solver::Verlet);
+fn no_piece_is_below_the_minimum_fragment_size() {
+    no_piece_is_below_the_minimum_fragment_size_of(Solver::Verlet);
 }
 
 #[test]
 #[ignore = "long"]
-fn no_piece_is_smaller_than_asked_whatever_pulls_implicit() {
-    no_piece_is_smaller_than_asked_whatever_pulls_of(Solver::Implicit);
+fn no_piece_is_below_the_minimum_fragment_size_implicit() {
+    no_piece_is_below_the_minimum_fragment_size_of(Solver::Implicit);
 }
 
-fn no_piece_is_smaller_than_asked_whatever_pulls_of(solver: Solver) {
+fn no_piece_is_below_the_minimum_fragment_size_of(solver: Solver) {
     let least = |areas: &[f64]| areas.iter().copied().fold(f64::INFINITY, f64::min);
-    let (areas, tears, _) = pulled_about(0.0, 1, solver);
+    let (areas, tears, _) = pull_at_random(0.0, 1, solver);
     assert!(tears > 50 && areas.len() > 3, "{tears} tears, {areas:?}");
     assert!(least(&areas) < 4e-4, "{areas:?}");
-    let (areas, tears, _) = pulled_about(4e-4, 1, solver);
+    let (areas, tears, _) = pull_at_random(4e-4, 1, solver);
     assert!(tears > 50, "{tears} tears");
     assert!(least(&areas) > 4e-4 * (1.0 - 1e-5), "{areas:?}");
 }
@@ -650,7 +650,7 @@ fn tears_are_the_same_for_any_number_of_threads() {
     let mut hashes = Vec::new();
     for threads in [1, 2] {
         let (mut world, body) = sheet
-            .world(Made {
+            .world(Options {
                 stretched: 0.25,
                 threads,
                 tearing: Tearing {
@@ -672,14 +672,14 @@ fn tears_are_the_same_for_any_number_of_threads() {
 }
 
 #[test]
-fn without_room_the_step_goes_on_and_nothing_tears() {
+fn without_capacity_the_step_succeeds_and_nothing_tears() {
     let sheet = Sheet::of(unstructured(12, 8));
     let never = Tearing {
         strain: 0.0,
         ..PLAIN.tearing
     };
     let made = |storage, spare_nodes| {
-        [never, NEVER].map(|tearing| Made {
+        [never, NEVER].map(|tearing| Options {
             storage,
             spare_nodes,
             stretched: 0.25,
@@ -689,8 +689,8 @@ fn without_room_the_step_goes_on_and_nothing_tears() {
     };
     // An inner node is doubled, and an end of the tear is new.
     let inner = |node: &u32| {
-        let place = sheet.rest[*node as usize];
-        (place - Vec3::new(0.06, 0.06, 0.0)).length() < 0.03
+        let position = sheet.rest[*node as usize];
+        (position - Vec3::new(0.06, 0.06, 0.0)).length() < 0.03
     };
     for (made, springs_per_node) in [(made(Storage::Packed, 1), 0), (made(Storage::FastLink, 1000), 12)] {
         let [(mut torn, body), (mut whole, twin)] = made.map(|made| sheet.world_with(made, springs_per_node).unwrap());
@@ -713,7 +713,7 @@ fn without_room_the_step_goes_on_and_nothing_tears() {
             torn.step(1e-4).unwrap();
             whole.step(1e-4).unwrap();
             let report = report(&torn, body);
-            // Once tried, they are only counted.
+            // After the first attempt, refused tears are only counted.
             let what = format!("{:?} {step} {report:?}", made[0].storage);
             let withheld = TearReport {
                 no_room: 1,
@@ -727,8 +727,8 @@ fn without_room_the_step_goes_on_and_nothing_tears() {
     }
 }
 
-/// Gives inner nodes as many springs as they have places for, without stiffness.
-fn fill_rows(worlds: &mut [(&mut World, BodyId)], places: usize, inner: impl Fn(&u32) -> bool) {
+/// Gives inner nodes as many springs of zero stiffness as they have slots for.
+fn fill_rows(worlds: &mut [(&mut World, BodyId)], slots: usize, inner: impl Fn(&u32) -> bool) {
     for (world, body) in worlds {
         let it = world.body_mut(*body).unwrap();
         let pairs = it.spring_pairs().unwrap();
@@ -737,28 +737,28 @@ fn fill_rows(worlds: &mut [(&mut World, BodyId)], places: usize, inner: impl Fn(
         let nodes = 0..it.node_count() as u32;
         for node in nodes.clone().filter(&inner) {
             for other in nodes.clone().filter(|other| !inner(other)) {
-                let has_room = counts[node as usize] < places && counts[other as usize] < places;
+                let has_room = counts[node as usize] < slots && counts[other as usize] < slots;
                 if has_room && it.add_spring(node, other, 0.0, None).is_ok() {
                     counts[node as usize] += 1;
                     counts[other as usize] += 1;
                 }
             }
-            assert_eq!(counts[node as usize], places);
+            assert_eq!(counts[node as usize], slots);
         }
     }
 }
 
 #[test]
-fn what_is_sutured_stays_at_its_place_in_the_material() {
+fn sutures_stay_at_their_material_point() {
     let sheet = Sheet::of(unstructured(12, 8));
-    let made = Made {
+    let made = Options {
         stretched: 0.25,
         ..PLAIN
     };
     let (mut scout, body) = sheet.world(made).unwrap();
     scout.step(1e-4).unwrap();
     let torn_at = rim(&sheet, scout.body(body).unwrap(), 0);
-    // Points in all triangles next to the tear, each sutured to one far off.
+    // Points in all triangles next to the tear, each sutured to a distant point.
     let middle = |cell: &[u32; 3]| {
         cell.map(|node| sheet.rest[node as usize].as_dvec3())
             .into_iter()
@@ -768,16 +768,16 @@ fn what_is_sutured_stays_at_its_place_in_the_material() {
     let is_near = |cell: &[u32; 3]| {
         torn_at
             .iter()
-            .any(|place| place.distance(middle(cell)) < f64::from(CELL))
+            .any(|position| position.distance(middle(cell)) < f64::from(CELL))
     };
     let far = (0..sheet.cells.len())
         .find(|&cell| {
             torn_at
                 .iter()
-                .all(|place| place.distance(middle(&sheet.cells[cell])) > 0.05)
+                .all(|position| position.distance(middle(&sheet.cells[cell])) > 0.05)
         })
         .unwrap() as u32;
-    let mut worlds = [PLAIN.tearing, NEVER].map(|tearing| sheet.world(Made { tearing, ..made }).unwrap());
+    let mut worlds = [PLAIN.tearing, NEVER].map(|tearing| sheet.world(Options { tearing, ..made }).unwrap());
     let mut sutures = Vec::new();
     for triangle in (0..sheet.cells.len() as u32).filter(|&cell| is_near(&sheet.cells[cell as usize])) {
         for weights in [[0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]] {
@@ -791,8 +791,8 @@ fn what_is_sutured_stays_at_its_place_in_the_material() {
                 .iter_mut()
                 .map(|(world, body)| world.suture(*body, &near, *body, &far, &slack).unwrap());
             let corners = sheet.cells[triangle as usize].map(|node| sheet.rest[node as usize].as_dvec3());
-            let place: DVec3 = (0..3).map(|k| f64::from(weights[k]) * corners[k]).sum();
-            sutures.push((ids.collect::<Vec<_>>(), place));
+            let position: DVec3 = (0..3).map(|k| f64::from(weights[k]) * corners[k]).sum();
+            sutures.push((ids.collect::<Vec<_>>(), position));
         }
     }
     assert!(sutures.len() > 10);
@@ -806,18 +806,18 @@ fn what_is_sutured_stays_at_its_place_in_the_material() {
             [torn.suture_report(ids[0]), whole.suture_report(ids[1])].map(|report| report.unwrap().distance);
         assert!((distances[0] - distances[1]).abs() < 1e-6, "{distances:?}");
     }
-    // And still when it gapes.
+    // Also when the tear opens.
     let (torn, body) = &mut worlds[0];
     for _ in 0..100 {
         torn.step(1e-4).unwrap();
     }
     let it = torn.body(*body).unwrap();
     let rest = at_rest(&sheet, it);
-    let now = |place: DVec3| {
+    let now = |position: DVec3| {
         let found = it.surface().iter().find_map(|corners| {
             let [a, b, c] = corners.map(|node| rest[node as usize]);
             let whole = (b - a).cross(c - a).z;
-            let weights = [(b, c), (c, a), (a, b)].map(|(p, q)| (p - place).cross(q - place).z / whole);
+            let weights = [(b, c), (c, a), (a, b)].map(|(p, q)| (p - position).cross(q - position).z / whole);
             let at = corners.map(|node| it.positions()[node as usize].as_dvec3());
             let is_inside = weights.iter().all(|&weight| weight >= 0.0);
             is_inside.then(|| (0..3).map(|k| weights[k] * at[k]).sum::<DVec3>())
@@ -826,21 +826,24 @@ fn what_is_sutured_stays_at_its_place_in_the_material() {
     };
     let corners = sheet.cells[far as usize].map(|node| sheet.rest[node as usize].as_dvec3());
     let far = now(0.3 * corners[0] + 0.3 * corners[1] + 0.4 * corners[2]);
-    for (ids, place) in sutures {
+    for (ids, position) in sutures {
         let distance = f64::from(torn.suture_report(ids[0]).unwrap().distance);
-        let expected = now(place).distance(far);
-        assert!((distance - expected).abs() < 1e-6, "{place}: {distance} and {expected}");
+        let expected = now(position).distance(far);
+        assert!(
+            (distance - expected).abs() < 1e-6,
+            "{position}: {distance} and {expected}"
+        );
     }
 }
 
 #[test]
-fn springs_along_no_edge_tear_the_surface_and_go_where_it_has_torn() {
+fn springs_off_the_edges_tear_the_surface_and_are_removed_there() {
     let sheet = Sheet::of(grid(12));
     let at = |x: u32, y: u32| y * 13 + x;
     let over = (0..13).flat_map(|y| (0..11).map(move |x| [at(x, y), at(x + 2, y)]));
     let over: Vec<[u32; 2]> = over.collect();
     let (mut world, body) = sheet
-        .world(Made {
+        .world(Options {
             stretched: 0.1,
             ..PLAIN
         })
@@ -849,17 +852,17 @@ fn springs_along_no_edge_tear_the_surface_and_go_where_it_has_torn() {
     for &[a, b] in &over {
         it.add_spring(a, b, 20.0, Some(2.0 * CELL)).unwrap();
     }
-    // Those in the middle alone bear little.
+    // The springs in the middle alone are weak.
     let middle: Vec<[u32; 2]> = over.iter().copied().filter(|[a, _]| a % 13 == 5).collect();
     it.set_tear_limits(&middle, Some(Values::Uniform(0.05)), None).unwrap();
     let mut parted = 0;
     for _ in 0..20 {
-        // Held out by hand.
+        // Held open by pins.
         let it = world.body_mut(body).unwrap();
         let rest = at_rest(&sheet, it);
         let taut: Vec<Vec3> = rest
             .iter()
-            .map(|place| Vec3::new(1.1 * place.x as f32, place.y as f32, 0.0))
+            .map(|position| Vec3::new(1.1 * position.x as f32, position.y as f32, 0.0))
             .collect();
         it.set_positions(&taut).unwrap();
         it.set_velocities(&vec![Vec3::ZERO; taut.len()]).unwrap();
@@ -875,13 +878,13 @@ fn springs_along_no_edge_tear_the_surface_and_go_where_it_has_torn() {
 }
 
 #[test]
-fn what_is_held_does_not_tear_but_its_neighbour() {
+fn held_tissue_does_not_tear_but_its_neighbor_does() {
     let sheet = Sheet::of(unstructured(12, 8));
     let never = Tearing {
         strain: 0.0,
         ..PLAIN.tearing
     };
-    let made = Made {
+    let made = Options {
         stretched: 0.25,
         tearing: never,
         ..PLAIN
@@ -903,21 +906,21 @@ fn what_is_held_does_not_tear_but_its_neighbour() {
             assert_eq!(report(&world, body).tears, 1);
             let [held, free] = [held, free].map(|node| sheet.rest[node as usize].as_dvec3());
             let rim = rim(&sheet, world.body(body).unwrap(), 0);
-            let doubled = |at: DVec3| rim.iter().filter(|place| **place == at).count() == 4;
+            let doubled = |at: DVec3| rim.iter().filter(|position| **position == at).count() == 4;
             assert!(doubled(free) && !doubled(held), "{pair:?}");
         }
     }
 }
 
 #[test]
-fn what_a_cut_leaves_of_a_spring_bears_its_part() {
+fn a_partly_cut_spring_keeps_its_share_of_the_limit() {
     let sheet = Sheet::of(grid(12));
     let never = Tearing {
         strain: 0.0,
         ..PLAIN.tearing
     };
     let (mut world, body) = sheet
-        .world(Made {
+        .world(Options {
             tearing: never,
             ..PLAIN
         })
@@ -941,7 +944,7 @@ fn what_a_cut_leaves_of_a_spring_bears_its_part() {
         for (strain, tears) in [(0.199, 0), (0.201, u32::from(is_set_again))] {
             let it = world.body_mut(body).unwrap();
             if is_set_again {
-                // As it is: the limit is worked out anew.
+                // With the same value: this recomputes the limit.
                 it.set_springs(&[spring], Some(Values::Uniform(after.stiffness)), None)
                     .unwrap();
             } else if tears == 0 && strain > 0.2 {
@@ -949,7 +952,7 @@ fn what_a_cut_leaves_of_a_spring_bears_its_part() {
             }
             let taut: Vec<Vec3> = at_rest(&sheet, it)
                 .iter()
-                .map(|place| Vec3::new((1.0 + strain) * place.x as f32, place.y as f32, 0.0))
+                .map(|position| Vec3::new((1.0 + strain) * position.x as f32, position.y as f32, 0.0))
                 .collect();
             it.set_positions(&taut).unwrap();
             it.set_velocities(&vec![Vec3::ZERO; taut.len()]).unwrap();
@@ -960,14 +963,14 @@ fn what_a_cut_leaves_of_a_spring_bears_its_part() {
 }
 
 #[test]
-fn what_cannot_tear_is_refused() {
+fn invalid_tearing_is_refused() {
     let sheet = Sheet::of(grid(3));
-    let refused = |made: Made, words: &str| {
+    let refused = |made: Options, words: &str| {
         let error = sheet.world(made).unwrap_err();
         assert!(error.to_string().contains(words), "{error}");
         error
     };
-    let with = |tearing| Made { tearing, ..PLAIN };
+    let with = |tearing| Options { tearing, ..PLAIN };
     for bad in [-1.0, f32::NAN, f32::INFINITY] {
         refused(
             with(Tearing {
@@ -997,7 +1000,7 @@ fn what_cannot_tear_is_refused() {
     };
     refused(with(never), "most_tears is 0");
     let error = refused(
-        Made {
+        Options {
             spare_nodes: 0,
             ..PLAIN
         },
@@ -1005,7 +1008,7 @@ fn what_cannot_tear_is_refused() {
     );
     assert!(matches!(error, Error::InvalidArgument(_)));
     let (mut world, body) = sheet
-        .world(Made {
+        .world(Options {
             tearing: NEVER,
             ..PLAIN
         })

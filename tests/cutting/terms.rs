@@ -1,4 +1,4 @@
-//! Terms beside springs in sheets that are cut: copies have their share of them, and what is severed is gone.
+//! Terms beside springs in sheets that are cut: copies get their share, and severed terms are removed.
 
 use glam::{Vec3, vec3};
 use sinew::cutting::Sweep;
@@ -77,19 +77,19 @@ const CUTS: [(Vec3, Vec3); 4] = [
     (vec3(0.1, 0.04, 0.0), vec3(0.17, 0.17, 0.0)),
 ];
 
-/// Each term with one solver and storage, and each of these with a term.
+/// Each term with one solver and storage, and each solver and storage with a term.
 #[test]
-fn cuts_in_motion_keep_what_terms_have() {
-    cuts_in_motion_keep_what_terms_have_of(|case| case % 4 == 2);
+fn cuts_in_motion_keep_the_energy_of_terms() {
+    cuts_in_motion_keep_the_energy_of_terms_of(|case| case % 4 == 2);
 }
 
 #[test]
 #[ignore = "long"]
-fn cuts_in_motion_keep_what_terms_have_in_the_other_cases() {
-    cuts_in_motion_keep_what_terms_have_of(|case| case % 4 != 2);
+fn cuts_in_motion_keep_the_energy_of_terms_in_the_other_cases() {
+    cuts_in_motion_keep_the_energy_of_terms_of(|case| case % 4 != 2);
 }
 
-fn cuts_in_motion_keep_what_terms_have_of(is_tried: fn(usize) -> bool) {
+fn cuts_in_motion_keep_the_energy_of_terms_of(is_selected: fn(usize) -> bool) {
     for (number, beside) in (0..).zip(ALL) {
         for (_, (solver, storage)) in (number..)
             .zip([
@@ -98,7 +98,7 @@ fn cuts_in_motion_keep_what_terms_have_of(is_tried: fn(usize) -> bool) {
                 (Solver::Implicit, Storage::DynamicBulk),
                 (Solver::Newton, Storage::Packed),
             ])
-            .filter(|case| is_tried(case.0))
+            .filter(|case| is_selected(case.0))
         {
             let what = format!("{beside:?}, {solver:?}, {storage:?}");
             let (mut world, body) = in_flight_with(20, solver, storage, 0.0, |definition| beside.with(definition));
@@ -113,26 +113,29 @@ fn cuts_in_motion_keep_what_terms_have_of(is_tried: fn(usize) -> bool) {
                 after.check_motion(&before, &what);
                 let gained = (after.energy - before.energy) / before.energy;
                 assert!(gained < 1e-6, "{what}: {gained} of the energy comes in");
-                // Hinges across the cut are gone.
+                // Hinges across the cut are removed.
                 assert!(
                     gained > -1e-6 || beside == Beside::Bending,
                     "{what}: {gained} of the energy is lost"
                 );
             }
-            let at_last = kept(&world, body);
+            let at_end = kept(&world, body);
             for _ in 0..100 {
                 world.step(1e-3).unwrap();
             }
             let later = kept(&world, body);
             assert!(
-                later.energy < 1.02 * at_last.energy,
+                later.energy < 1.02 * at_end.energy,
                 "{what}: {} {}",
-                at_last.energy,
+                at_end.energy,
                 later.energy
             );
             if beside != Beside::Home {
-                let off = later.momentum.distance(at_last.momentum);
-                assert!(off < 1e-4 * at_last.momentum.length(), "{what}: momentum off by {off}");
+                let error = later.momentum.distance(at_end.momentum);
+                assert!(
+                    error < 1e-4 * at_end.momentum.length(),
+                    "{what}: momentum off by {error}"
+                );
             }
         }
     }
@@ -142,7 +145,7 @@ fn elastic(world: &World, body: sinew::BodyId) -> f64 {
     world.body(body).unwrap().energy(Vec3::ZERO).elastic
 }
 
-/// Terms of springs follow those, of copies too.
+/// Terms of springs follow their springs and the copies of these.
 #[test]
 fn springs_of_copies_have_their_terms() {
     for beside in [Beside::Stiffening, Beside::Limited, Beside::Bending] {
@@ -180,27 +183,30 @@ fn springs_of_copies_have_their_terms() {
     }
 }
 
-/// A blade along an edge.
+/// Returns a blade along an edge.
 fn along(body: &Body, from: u32, to: u32) -> Sweep {
     let [from, to] = [from, to].map(|node| body.positions()[node as usize]);
-    let way = (to - from).normalize();
-    let edge = |place: Vec3| [place - 0.05 * Vec3::Z, place + 0.05 * Vec3::Z];
+    let direction = (to - from).normalize();
+    let edge = |position: Vec3| [position - 0.05 * Vec3::Z, position + 0.05 * Vec3::Z];
     Sweep {
-        start: edge(from - 0.02 * way),
-        end: edge(to + 0.02 * way),
+        start: edge(from - 0.02 * direction),
+        end: edge(to + 0.02 * direction),
     }
 }
 
 #[test]
-fn a_fold_that_is_cut_through_bends_nothing() {
+fn a_severed_fold_has_no_bending_force() {
     for solver in SOLVERS {
         let (rest, cells) = grid(6);
-        let flat: Vec<Vec3> = rest.iter().map(|place| 0.01 * vec3(place.x, place.y, 0.0)).collect();
+        let flat: Vec<Vec3> = rest
+            .iter()
+            .map(|position| 0.01 * vec3(position.x, position.y, 0.0))
+            .collect();
         let folded: Vec<Vec3> = flat
             .iter()
-            .map(|place| {
-                let over = (place.y - 0.03).max(0.0);
-                vec3(place.x, place.y - 0.2 * over, 0.6 * over)
+            .map(|position| {
+                let over = (position.y - 0.03).max(0.0);
+                vec3(position.x, position.y - 0.2 * over, 0.6 * over)
             })
             .collect();
         let mut world = World::new(WorldDefinition {
@@ -221,7 +227,7 @@ fn a_fold_that_is_cut_through_bends_nothing() {
         };
         let body = world.create_body(&definition).unwrap();
         let before = elastic(&world, body);
-        // A hinge turns by asin(0.6).
+        // A hinge rotates by asin(0.6).
         let turn: f64 = 0.6_f64.asin();
         assert!(before > 1e-4 * (0.5 * turn).sin().powi(2), "{before} J");
         let sweep = along(world.body(body).unwrap(), 21, 27);
@@ -231,12 +237,15 @@ fn a_fold_that_is_cut_through_bends_nothing() {
     }
 }
 
-/// Where all nodes sink alike, their copies do.
+/// If all nodes sink alike, their copies do too.
 #[test]
-fn copies_are_drawn_home_by_their_share() {
+fn copies_get_their_share_of_anchor_springs() {
     for solver in SOLVERS {
         let (rest, cells) = super::sheet::unstructured(10, 4);
-        let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * vec3(place.x, place.y, 0.0)).collect();
+        let positions: Vec<Vec3> = rest
+            .iter()
+            .map(|position| 0.01 * vec3(position.x, position.y, 0.0))
+            .collect();
         let mut masses = vec![0.0; positions.len()];
         for cell in &cells {
             let [a, b, c] = cell.map(|node| positions[node as usize]);
@@ -257,8 +266,8 @@ fn copies_are_drawn_home_by_their_share() {
         };
         let body = world.create_body(&definition).unwrap();
         let sink = vec3(0.0, -9.81 / 2000.0, 0.0);
-        let sunk: Vec<Vec3> = positions.iter().map(|&place| place + sink).collect();
-        world.body_mut(body).unwrap().set_positions(&sunk).unwrap();
+        let lowered: Vec<Vec3> = positions.iter().map(|&position| position + sink).collect();
+        world.body_mut(body).unwrap().set_positions(&lowered).unwrap();
         let edge = |x: f32, y: f32| [vec3(x, y, -0.05), vec3(x, y, 0.05)];
         let sweep = Sweep {
             start: edge(0.033, -0.02),
@@ -270,8 +279,8 @@ fn copies_are_drawn_home_by_their_share() {
         for _ in 0..50 {
             world.step(2e-3).unwrap();
         }
-        let ways = world.body(body).unwrap().positions().iter().zip(&start);
-        let most = ways.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+        let displacements = world.body(body).unwrap().positions().iter().zip(&start);
+        let most = displacements.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
         assert!(most < 1e-6, "{solver:?}: a node goes {most} m");
     }
 }

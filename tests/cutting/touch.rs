@@ -1,4 +1,4 @@
-//! What touches and holds a sheet goes on while it is cut.
+//! Contacts and attachments of a sheet continue while it is cut.
 
 use glam::{Vec2, Vec3, vec2, vec3};
 use sinew::cutting::Sweep;
@@ -11,14 +11,21 @@ use super::sheet::unstructured;
 
 const SOLVERS: [Solver; 2] = [Solver::Verlet, Solver::Implicit];
 
-/// A level sheet of 20 x 20 cells of 1 cm, 1 g a node, held at its rim or free.
+/// A level sheet of 20 x 20 cells of 1 cm, 1 g per node, held at its border or free.
 fn level(solver: Solver, is_held: bool) -> (World, BodyId) {
     let (rest, cells) = unstructured(20, 4);
-    let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * vec3(place.x, 0.0, -place.y)).collect();
-    let is_rim = |place: &Vec3| [place.x, place.y].iter().any(|&along| along == 0.0 || along == 20.0);
+    let positions: Vec<Vec3> = rest
+        .iter()
+        .map(|position| 0.01 * vec3(position.x, 0.0, -position.y))
+        .collect();
+    let is_rim = |position: &Vec3| {
+        [position.x, position.y]
+            .iter()
+            .any(|&along| along == 0.0 || along == 20.0)
+    };
     let masses: Vec<f32> = rest
         .iter()
-        .map(|place| if is_held && is_rim(place) { 0.0 } else { 1e-4 })
+        .map(|position| if is_held && is_rim(position) { 0.0 } else { 1e-4 })
         .collect();
     let mut world = World::new(WorldDefinition::default()).unwrap();
     let body = world
@@ -44,7 +51,7 @@ fn tool(world: &mut World, shape: Shape, position: Vec3) -> ToolId {
     world.create_tool(&definition).unwrap()
 }
 
-/// A blade that stands upright, along a line of the plane that the sheet was made in.
+/// An upright blade, along a line of the plane in which the sheet was created.
 fn sweep(from: Vec2, to: Vec2) -> Sweep {
     let blade = |at: Vec2| [-0.2, 0.2].map(|y| vec3(at.x, y, -at.y));
     Sweep {
@@ -60,7 +67,7 @@ fn weight(body: &Body) -> f32 {
 }
 
 #[test]
-fn a_sphere_carries_a_sheet_that_is_cut_beneath_it_and_none_of_it_goes_through() {
+fn a_sphere_carries_a_sheet_that_is_cut_and_nothing_passes_through() {
     for solver in SOLVERS {
         let (mut world, body) = level(solver, true);
         let radius = 0.03;
@@ -106,7 +113,7 @@ fn a_sphere_carries_a_sheet_that_is_cut_beneath_it_and_none_of_it_goes_through()
 }
 
 #[test]
-fn a_plane_bears_what_was_cut_to_pieces() {
+fn a_plane_carries_the_pieces_of_a_cut_sheet() {
     let solver = Solver::Verlet;
     let (mut world, body) = level(solver, false);
     let floor = tool(&mut world, Shape::Plane, -0.005 * Vec3::Y);
@@ -145,12 +152,12 @@ fn a_plane_bears_what_was_cut_to_pieces() {
     assert!(lowest > -0.0052, "{solver:?}: {lowest}");
 }
 
-/// The triangle that is drawn at a point of the plane that the sheet was made in, by where it is.
+/// Returns the surface point at a point of the plane in which the sheet was created, by current positions.
 fn point_at(body: &Body, at: Vec2) -> SurfacePoint {
     for (number, triangle) in (0..).zip(body.surface()) {
         let [a, b, c] = triangle.map(|node| {
-            let place = body.positions()[node as usize];
-            vec2(place.x, -place.z)
+            let position = body.positions()[node as usize];
+            vec2(position.x, -position.z)
         });
         let whole = (b - a).perp_dot(c - a);
         let weights = [
@@ -169,7 +176,7 @@ fn point_at(body: &Body, at: Vec2) -> SurfacePoint {
     panic!("nothing is drawn at {at}");
 }
 
-fn place_of(body: &Body, point: &SurfacePoint) -> Vec3 {
+fn surface_position(body: &Body, point: &SurfacePoint) -> Vec3 {
     let corners = body.surface()[point.triangle as usize];
     (0..3)
         .map(|k| point.weights[k] * body.positions()[corners[k] as usize])
@@ -177,16 +184,16 @@ fn place_of(body: &Body, point: &SurfacePoint) -> Vec3 {
 }
 
 #[test]
-fn sutures_close_a_wound_and_stay_in_tissue_that_is_cut_again() {
+fn sutures_close_a_wound_and_survive_another_cut() {
     for solver in SOLVERS {
         let (mut world, body) = level(solver, true);
         world.set_gravity(Vec3::ZERO).unwrap();
-        // Stretched, so that what is cut gapes.
+        // Stretched, so that cuts open.
         let it = world.body(body).unwrap();
         let wide: Vec<Vec3> = it
             .positions()
             .iter()
-            .map(|place| *place * vec3(1.0, 1.0, 1.2))
+            .map(|position| *position * vec3(1.0, 1.0, 1.2))
             .collect();
         world.body_mut(body).unwrap().set_positions(&wide).unwrap();
         world.cut(body, &sweep(vec2(0.04, 0.121), vec2(0.16, 0.119))).unwrap();
@@ -194,7 +201,7 @@ fn sutures_close_a_wound_and_stay_in_tissue_that_is_cut_again() {
         let points = [point_at(it, vec2(0.1, 0.132)), point_at(it, vec2(0.1, 0.108))];
         let apart = |world: &World| {
             let it = world.body(body).unwrap();
-            place_of(it, &points[0]).distance(place_of(it, &points[1]))
+            surface_position(it, &points[0]).distance(surface_position(it, &points[1]))
         };
         for _ in 0..150 {
             world.step(2e-3).unwrap();
@@ -220,9 +227,9 @@ fn sutures_close_a_wound_and_stay_in_tissue_that_is_cut_again() {
         assert!((closed - 0.02).abs() < 2e-4, "{solver:?}: {closed} m");
         let force = world.attachment_force(suture).unwrap();
         assert!(force.length() > 0.01);
-        // Beside one of its points, across the triangle that it is in and the cells about it: the piece that it sits in is a copy now.
+        // A cut beside one of the points, across its triangle and the cells around it: the point is now on a copy.
         let it = world.body(body).unwrap();
-        let before = place_of(it, &points[0]);
+        let before = surface_position(it, &points[0]);
         let at = vec2(before.x, -before.z);
         world
             .cut(body, &sweep(at + vec2(-0.02, 0.0015), at + vec2(0.02, 0.0013)))
@@ -249,7 +256,7 @@ fn sutures_close_a_wound_and_stay_in_tissue_that_is_cut_again() {
                 .unwrap()
                 .positions()
                 .iter()
-                .all(|place| place.is_finite())
+                .all(|position| position.is_finite())
         );
     }
 }

@@ -1,5 +1,5 @@
-//! Sheets and blocks in flight to which anything happens in any order: cuts in any position (along faces, through nodes, of no length, there and back),
-//! blades, sutures, tears, snapshots. What must hold holds after each.
+//! Sheets and blocks in flight under random actions in random order: cuts in any position (along faces, through nodes,
+//! of zero length, back and forth), blades, sutures, tears, snapshots. The invariants hold after each action.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeSet;
@@ -17,14 +17,14 @@ use crate::support::kept::kept;
 use crate::support::random::Random;
 
 impl Random {
-    fn within(&mut self, size: f32) -> Vec3 {
+    fn random_vector(&mut self, size: f32) -> Vec3 {
         let mut one = || (self.next() as f32 * 2.0 - 1.0) * size;
         vec3(one(), one(), one())
     }
 }
 
-/// A renderer's own mesh, which sees the body once and then change lists alone.
-struct Drawn {
+/// A renderer's own mesh, which reads the body once and then change lists only.
+struct RenderMesh {
     rest: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     version: u64,
@@ -32,10 +32,10 @@ struct Drawn {
     whole: f64,
 }
 
-impl Drawn {
+impl RenderMesh {
     fn new(body: &Body, rest: &[Vec3], is_solid: bool) -> Self {
         let mut drawn = Self {
-            rest: rest.iter().map(|place| place.as_dvec3()).collect(),
+            rest: rest.iter().map(|position| position.as_dvec3()).collect(),
             triangles: body.surface().to_vec(),
             version: 0,
             is_solid,
@@ -45,7 +45,7 @@ impl Drawn {
         drawn
     }
 
-    /// Area or volume at rest.
+    /// Returns the area or volume at rest.
     fn size(&self) -> f64 {
         let of = |corners: &[u32; 3]| {
             let [a, b, c] = corners.map(|node| self.rest[node as usize]);
@@ -66,8 +66,8 @@ impl Drawn {
             assert_eq!(new.node as usize, self.rest.len(), "{what}");
             assert!(new.sources.iter().all(|&source| source < new.node), "{what}");
             assert!(new.weights.iter().all(|&weight| weight >= 0.0), "{what}: {new:?}");
-            let place = (0..3).map(|k| f64::from(new.weights[k]) * self.rest[new.sources[k] as usize]);
-            self.rest.push(place.sum());
+            let position = (0..3).map(|k| f64::from(new.weights[k]) * self.rest[new.sources[k] as usize]);
+            self.rest.push(position.sum());
         }
         assert!(body.node_count() <= body.max_nodes(), "{what}");
         assert!(body.surface().len() <= body.max_triangles(), "{what}");
@@ -89,19 +89,22 @@ impl Drawn {
         self.check_manifold(what);
     }
 
-    /// Each side has one triangle; of solids one across it, too; about each point the triangles are fans.
+    /// Each side has one triangle, and in solids one triangle across it; the triangles around each point are fans.
     fn check_manifold(&self, what: &str) {
         let mut sides = BTreeSet::new();
         for (number, corners) in self.triangles.iter().enumerate() {
             for k in 0..3 {
                 let side = (corners[k], corners[(k + 1) % 3]);
                 assert!(side.0 != side.1, "{what}: triangle {number} has no area");
-                assert!(sides.insert(side), "{what}: two triangles have the side {side:?}");
+                assert!(
+                    sides.insert(side),
+                    "{what}: two triangles share the directed side {side:?}"
+                );
             }
         }
         if self.is_solid {
             for &(a, b) in &sides {
-                assert!(sides.contains(&(b, a)), "{what}: nothing lies across {a} and {b}");
+                assert!(sides.contains(&(b, a)), "{what}: no triangle across {a} and {b}");
             }
         }
     }
@@ -113,7 +116,7 @@ struct Kind {
     has_elements: bool,
     solver: Solver,
     storage: Storage,
-    meets_itself: bool,
+    has_self_contact: bool,
     tears: bool,
     toughness: f32,
 }
@@ -125,11 +128,11 @@ fn made(kind: Kind, random: &mut Random) -> (World, BodyId, Vec<Vec3>) {
         Mesh::cloth([0.08; 2], [8; 2]).unwrap()
     };
     if random.next() < 0.7 {
-        for place in &mut mesh.positions {
-            *place += if kind.is_solid {
-                random.within(0.001)
+        for position in &mut mesh.positions {
+            *position += if kind.is_solid {
+                random.random_vector(0.001)
             } else {
-                random.within(0.0015) * vec3(1.0, 0.0, 1.0)
+                random.random_vector(0.0015) * vec3(1.0, 0.0, 1.0)
             };
         }
     }
@@ -161,7 +164,7 @@ fn made(kind: Kind, random: &mut Random) -> (World, BodyId, Vec<Vec3>) {
             toughness: kind.toughness,
             tearing: if kind.tears { tearing } else { Tearing::default() },
             contact: BodyContact {
-                with_itself: kind.meets_itself,
+                with_itself: kind.has_self_contact,
                 ..BodyContact::NOTHING
             },
             solver: kind.solver,
@@ -169,32 +172,32 @@ fn made(kind: Kind, random: &mut Random) -> (World, BodyId, Vec<Vec3>) {
             ..BodyDefinition::of(&mesh)
         })
         .unwrap();
-    let (push, turn) = (random.within(0.3), random.within(6.0));
+    let (push, turn) = (random.random_vector(0.3), random.random_vector(6.0));
     let velocities: Vec<Vec3> = mesh
         .positions
         .iter()
-        .map(|&place| push + turn.cross(place) + random.within(0.1))
+        .map(|&position| push + turn.cross(position) + random.random_vector(0.1))
         .collect();
     world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
     (world, body, mesh.positions)
 }
 
-/// A sweep in some position, often just where something degenerates.
+/// Returns a sweep in some position, often a degenerate one.
 fn sweep(body: &Body, random: &mut Random) -> (&'static str, Sweep) {
-    let (places, surface) = (body.positions(), body.surface());
+    let (positions, surface) = (body.positions(), body.surface());
     let node = |random: &mut Random| {
         let triangle = surface[random.below(surface.len())];
-        places[triangle[random.below(3)] as usize]
+        positions[triangle[random.below(3)] as usize]
     };
-    let triangle = surface[random.below(surface.len())].map(|node| places[node as usize]);
+    let triangle = surface[random.below(surface.len())].map(|node| positions[node as usize]);
     let normal = (triangle[1] - triangle[0])
         .cross(triangle[2] - triangle[0])
         .normalize_or_zero();
     match random.below(10) {
         0 | 1 => {
-            let (at, edge, way) = (node(random), random.within(0.08), random.within(0.08));
-            let turned = random.within(0.03);
-            let (start, end) = (at - 0.5 * way, at + 0.5 * way);
+            let (at, edge, displacement) = (node(random), random.random_vector(0.08), random.random_vector(0.08));
+            let turned = random.random_vector(0.03);
+            let (start, end) = (at - 0.5 * displacement, at + 0.5 * displacement);
             let sweep = Sweep {
                 start: [start - edge, start + edge],
                 end: [end - edge - turned, end + edge + turned],
@@ -230,7 +233,7 @@ fn sweep(body: &Body, random: &mut Random) -> (&'static str, Sweep) {
         }
         5 => {
             let at = node(random);
-            let edge = random.within(0.05);
+            let edge = random.random_vector(0.05);
             let sweep = Sweep {
                 start: [at - edge, at + edge],
                 end: [at - edge, at + edge],
@@ -238,16 +241,16 @@ fn sweep(body: &Body, random: &mut Random) -> (&'static str, Sweep) {
             ("of no length", sweep)
         }
         6 => {
-            let (at, way) = (node(random), random.within(0.06));
+            let (at, displacement) = (node(random), random.random_vector(0.06));
             let sweep = Sweep {
-                start: [at - way; 2],
-                end: [at + way; 2],
+                start: [at - displacement; 2],
+                end: [at + displacement; 2],
             };
             ("of no edge", sweep)
         }
         7 => {
-            // The edge turns about a node.
-            let (at, one, other) = (node(random), random.within(0.06), random.within(0.06));
+            // The edge rotates about a node.
+            let (at, one, other) = (node(random), random.random_vector(0.06), random.random_vector(0.06));
             let sweep = Sweep {
                 start: [at, at + one],
                 end: [at, at + other],
@@ -255,8 +258,8 @@ fn sweep(body: &Body, random: &mut Random) -> (&'static str, Sweep) {
             ("about a node", sweep)
         }
         8 => {
-            // Nodes of one triangle and of another, exactly.
-            let other = surface[random.below(surface.len())].map(|node| places[node as usize]);
+            // Exactly through nodes of one triangle and of another.
+            let other = surface[random.below(surface.len())].map(|node| positions[node as usize]);
             let sweep = Sweep {
                 start: [triangle[0], triangle[1]],
                 end: [other[0], other[1]],
@@ -265,7 +268,7 @@ fn sweep(body: &Body, random: &mut Random) -> (&'static str, Sweep) {
         }
         _ => {
             let (from, to) = (node(random), node(random));
-            let edge = 0.1 * Quat::from_scaled_axis(random.within(1.0)).mul_vec3(normal);
+            let edge = 0.1 * Quat::from_scaled_axis(random.random_vector(1.0)).mul_vec3(normal);
             let sweep = Sweep {
                 start: [from - edge, from + edge],
                 end: [to - edge, to + edge],
@@ -287,12 +290,12 @@ fn point(body: &Body, random: &mut Random) -> SurfacePoint {
 struct Wild {
     world: World,
     body: BodyId,
-    drawn: Drawn,
+    drawn: RenderMesh,
     random: Random,
     sutures: Vec<AttachmentId>,
     blades: Vec<BladeId>,
     what: String,
-    parted: Option<u32>,
+    separated: Option<u32>,
 }
 
 impl Wild {
@@ -308,8 +311,8 @@ impl Wild {
         let what = self.what.clone();
         match self.world.cut(self.body, sweep) {
             Ok(report) => {
-                if let Some(parted) = &mut self.parted {
-                    *parted += report.pieces_parted;
+                if let Some(separated) = &mut self.separated {
+                    *separated += report.pieces_parted;
                 }
                 assert!(report.length.is_finite() && report.area.is_finite(), "{what}");
             }
@@ -345,10 +348,10 @@ impl Wild {
         for (a, b) in sutures.iter().zip(&now) {
             assert!((a - b).abs() < 2e-5, "{what}: a suture was {a} and is {b} m long");
         }
-        // What is gone is refused.
-        let gone = it.changes_since(version).unwrap().removed_springs.to_vec();
+        // Removed springs are refused.
+        let removed = it.changes_since(version).unwrap().removed_springs.to_vec();
         let pairs = it.spring_pairs().unwrap();
-        for pair in gone {
+        for pair in removed {
             let ordered = [pair[0].min(pair[1]), pair[0].max(pair[1])];
             assert!(pairs.binary_search(&ordered).is_err(), "{what}: {pair:?} is not gone");
             assert!(it.springs(&[pair]).is_err(), "{what}");
@@ -360,11 +363,11 @@ impl Wild {
     fn steps(&mut self, count: usize) {
         for _ in 0..count {
             let report = self.world.step(1e-3).unwrap();
-            // A body that comes to numbers that are not finite is put back: not in what happens here.
+            // Bodies with non-finite values are rolled back: that does not happen here.
             assert_eq!(report.bodies_restored, 0, "{}", self.what);
             let it = self.world.body(self.body).unwrap();
-            if let Some(parted) = &mut self.parted {
-                *parted += it.tear_report().pieces_parted;
+            if let Some(separated) = &mut self.separated {
+                *separated += it.tear_report().pieces_parted;
             }
         }
     }
@@ -400,7 +403,7 @@ impl Wild {
                 }
             }
             8 => {
-                // Through the triangle that the last suture sits in.
+                // Through the triangle of the last suture.
                 self.what += " through a suture;";
                 let at = point(it, &mut self.random);
                 if self.sutures.is_empty() {
@@ -416,14 +419,14 @@ impl Wild {
                 }
                 let it = self.world.body(self.body).unwrap();
                 let corners = it.surface()[at.triangle as usize].map(|node| it.positions()[node as usize]);
-                let place: Vec3 = (0..3).map(|k| at.weights[k] * corners[k]).sum();
+                let position: Vec3 = (0..3).map(|k| at.weights[k] * corners[k]).sum();
                 let normal = (corners[1] - corners[0])
                     .cross(corners[2] - corners[0])
                     .normalize_or_zero();
-                let way = 2.0 * (corners[1] - corners[0]);
+                let displacement = 2.0 * (corners[1] - corners[0]);
                 let sweep = Sweep {
-                    start: [-0.02, 0.02].map(|along| place - way + along * normal),
-                    end: [-0.02, 0.02].map(|along| place + way + along * normal),
+                    start: [-0.02, 0.02].map(|along| position - displacement + along * normal),
+                    end: [-0.02, 0.02].map(|along| position + displacement + along * normal),
                 };
                 self.cut(&sweep);
             }
@@ -431,31 +434,35 @@ impl Wild {
                 if let Some(id) = self.sutures.pop() {
                     self.what += " released;";
                     let _ = self.world.release(id);
-                    assert!(self.world.suture_report(id).is_err(), "{}: of what is gone", self.what);
+                    assert!(
+                        self.world.suture_report(id).is_err(),
+                        "{}: a removed suture still reports",
+                        self.what
+                    );
                     assert!(self.world.release(id).is_err());
                 }
             }
             10 => {
                 self.what += " blade;";
-                let places = it.positions();
-                let middle = places.iter().sum::<Vec3>() / places.len() as f32;
-                let axis = self.random.within(0.06);
+                let positions = it.positions();
+                let middle = positions.iter().sum::<Vec3>() / positions.len() as f32;
+                let axis = self.random.random_vector(0.06);
                 let mut definition = BladeDefinition::new([-axis, axis + Vec3::X * 1e-3]);
-                definition.pose.position = middle + self.random.within(0.08);
+                definition.pose.position = middle + self.random.random_vector(0.08);
                 definition.stiffness = self.random.of(&[10.0, 1000.0]);
                 self.blades.push(self.world.create_blade(&definition).unwrap());
-                self.parted = None;
+                self.separated = None;
             }
             11 => {
                 if let Some(&blade) = self.blades.last() {
-                    let places = it.positions();
-                    let middle = places.iter().sum::<Vec3>() / places.len() as f32;
-                    let to = middle + self.random.within(0.05);
-                    let turn = Quat::from_scaled_axis(self.random.within(1.0));
+                    let positions = it.positions();
+                    let middle = positions.iter().sum::<Vec3>() / positions.len() as f32;
+                    let to = middle + self.random.random_vector(0.05);
+                    let turn = Quat::from_scaled_axis(self.random.random_vector(1.0));
                     self.what += " blade moves;";
                     for part in 1..=4 {
-                        let place = middle.lerp(to, part as f32 / 4.0);
-                        self.world.set_blade_pose(blade, place, Some(turn)).unwrap();
+                        let position = middle.lerp(to, part as f32 / 4.0);
+                        self.world.set_blade_pose(blade, position, Some(turn)).unwrap();
                         self.steps(1);
                         let report = self.world.blade_report(blade).unwrap();
                         assert!(report.work.is_finite() && report.force.is_finite());
@@ -495,29 +502,33 @@ impl Wild {
     fn check(&mut self) {
         let it = self.world.body(self.body).unwrap();
         self.drawn.follow(it, &self.what);
-        assert!(it.positions().iter().all(|place| place.is_finite()), "{}", self.what);
+        assert!(
+            it.positions().iter().all(|position| position.is_finite()),
+            "{}",
+            self.what
+        );
         assert!(
             it.velocities().iter().all(|velocity| velocity.is_finite()),
             "{}",
             self.what
         );
-        if let Some(parted) = self.parted {
-            assert_eq!(it.pieces().unwrap().count, 1 + parted, "{}: pieces", self.what);
+        if let Some(separated) = self.separated {
+            assert_eq!(it.pieces().unwrap().count, 1 + separated, "{}: pieces", self.what);
         }
     }
 }
 
 #[test]
-fn whatever_happens_in_any_order_breaks_nothing() {
+fn random_actions_break_nothing() {
     break_nothing(0..4);
 }
 
 #[test]
 #[ignore = "long"]
-fn whatever_happens_in_any_order_for_long_breaks_nothing() {
-    let told = |name, otherwise| std::env::var(name).map_or(otherwise, |number| number.parse().unwrap());
-    let from = told("WILD_FROM", 4);
-    break_nothing(from..from + told("WILD_ROUNDS", 56));
+fn many_random_actions_break_nothing() {
+    let env_number = |name, otherwise| std::env::var(name).map_or(otherwise, |number| number.parse().unwrap());
+    let from = env_number("WILD_FROM", 4);
+    break_nothing(from..from + env_number("WILD_ROUNDS", 56));
 }
 
 fn break_nothing(rounds: Range<u64>) {
@@ -535,13 +546,13 @@ fn break_nothing(rounds: Range<u64>) {
                 Storage::FastLink,
                 Storage::DynamicBulk,
             ]),
-            meets_itself: random.next() < 0.3,
+            has_self_contact: random.next() < 0.3,
             tears: random.next() < 0.3,
             toughness: random.of(&[0.0, 0.0, 0.5]),
         };
         let run = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             let (world, body, rest) = made(kind, &mut random);
-            let drawn = Drawn::new(world.body(body).unwrap(), &rest, is_solid);
+            let drawn = RenderMesh::new(world.body(body).unwrap(), &rest, is_solid);
             let mut wild = Wild {
                 world,
                 body,
@@ -550,10 +561,10 @@ fn break_nothing(rounds: Range<u64>) {
                 sutures: Vec::new(),
                 blades: Vec::new(),
                 what: format!("round {round}, {kind:?}:"),
-                parted: Some(0),
+                separated: Some(0),
             };
-            // What many cuts leave of a solid that meets itself takes seconds for a step.
-            let acts = if is_solid && kind.meets_itself { 16 } else { 40 };
+            // A step takes seconds for a solid with self-contact after many cuts.
+            let acts = if is_solid && kind.has_self_contact { 16 } else { 40 };
             for _ in 0..acts {
                 wild.act();
                 wild.check();

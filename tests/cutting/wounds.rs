@@ -1,4 +1,4 @@
-//! Many cuts in a sheet that hangs and swings.
+//! Many cuts in a hanging and swinging sheet.
 
 use glam::{Vec2, Vec3, vec2};
 use sinew::cutting::Sweep;
@@ -10,7 +10,7 @@ use crate::support::random::Random;
 /// A sheet of `n` x `n` cells that hangs by its upper side.
 fn hanging(n: usize, threads: u32, storage: Storage, solver: Solver) -> (World, sinew::BodyId) {
     let (rest, cells) = unstructured(n, 9);
-    let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * *place).collect();
+    let positions: Vec<Vec3> = rest.iter().map(|position| 0.01 * *position).collect();
     let mut world = World::new(WorldDefinition {
         thread_count: threads,
         ..Default::default()
@@ -37,23 +37,23 @@ fn hanging(n: usize, threads: u32, storage: Storage, solver: Solver) -> (World, 
     (world, body)
 }
 
-/// A blade that stands across the sheet, where that is at rest.
+/// Returns a blade across the sheet at a point of its rest shape.
 fn blade(at: Vec2) -> [Vec3; 2] {
     [-1.0, 1.0].map(|z| at.extend(z))
 }
 
 #[test]
-fn three_hundred_cuts_of_a_sheet_that_swings() {
-    cuts_of_a_sheet_that_swings(300);
+fn three_hundred_cuts_of_a_swinging_sheet() {
+    cuts_of_a_swinging_sheet(300);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_thousand_cuts_of_a_sheet_that_swings() {
-    cuts_of_a_sheet_that_swings(1000);
+fn a_thousand_cuts_of_a_swinging_sheet() {
+    cuts_of_a_swinging_sheet(1000);
 }
 
-fn cuts_of_a_sheet_that_swings(cuts: usize) {
+fn cuts_of_a_swinging_sheet(cuts: usize) {
     let (mut world, body) = hanging(100, 2, Storage::Packed, Solver::Verlet);
     let mut random = Random(7);
     let count = world.body(body).unwrap().node_count();
@@ -75,12 +75,12 @@ fn cuts_of_a_sheet_that_swings(cuts: usize) {
         }
     }
     let it = world.body(body).unwrap();
-    assert!(it.positions().iter().all(|place| place.is_finite()));
+    assert!(it.positions().iter().all(|position| position.is_finite()));
     assert_eq!(it.pieces().unwrap().count, 1 + parted);
     assert!(last > 0.5 * first, "the stable substep was {first}, and is {last} s");
     let added = it.node_count() - count;
     assert!((cuts..40 * cuts).contains(&added), "{added} nodes came");
-    // Each new node is told, with what it comes from.
+    // Each new node is reported with its sources.
     let changes = it.changes_since(0).unwrap();
     assert_eq!(changes.nodes.len(), added);
     for (new, node) in changes.nodes.iter().zip(count as u32..) {
@@ -134,7 +134,7 @@ fn cuts_are_the_same_in_any_storage() {
             end: blade(vec2(0.11, 0.094)),
         };
         world.cut(body, &sweep).unwrap();
-        // Again across the same springs, of which each has a part of its damping left.
+        // Again across the same springs, which have a part of their damping left.
         for (from, to) in [((0.03, 0.12), (0.09, 0.085)), ((0.02, 0.09), (0.1, 0.118))] {
             let sweep = Sweep {
                 start: blade(from.into()),
@@ -147,7 +147,7 @@ fn cuts_are_the_same_in_any_storage() {
         }
         ends.push(world.body(body).unwrap().positions().to_vec());
     }
-    assert!(ends[0].iter().all(|place| place.is_finite()));
+    assert!(ends[0].iter().all(|position| position.is_finite()));
     for end in &ends[1..] {
         for (node, (a, b)) in ends[0].iter().zip(end).enumerate() {
             assert!(a.distance(*b) < 2e-5, "node {node}: {a} and {b}");
@@ -156,19 +156,19 @@ fn cuts_are_the_same_in_any_storage() {
 }
 
 #[test]
-fn a_renderer_that_follows_the_list_draws_what_is_there() {
+fn a_renderer_that_follows_change_lists_has_the_surface() {
     let (mut world, body) = hanging(20, 1, Storage::Packed, Solver::Verlet);
     let mut random = Random(2);
     let it = world.body(body).unwrap();
-    // What it keeps of each node: where it is at rest; and its triangles.
+    // The renderer's data: a rest position for each node, and the triangles.
     let mut textures: Vec<Vec3> = it.positions().to_vec();
     let mut triangles = it.surface().to_vec();
     let area = |textures: &[Vec3], triangles: &[[u32; 3]]| -> f64 {
-        let of = |&[a, b, c]: &[u32; 3]| {
+        let triangle_area = |&[a, b, c]: &[u32; 3]| {
             let [a, b, c] = [a, b, c].map(|node| textures[node as usize].as_dvec3());
             0.5 * (b - a).cross(c - a).length()
         };
-        triangles.iter().map(of).sum()
+        triangles.iter().map(triangle_area).sum()
     };
     let whole = area(&textures, &triangles);
     let mut version = 0;
@@ -186,8 +186,8 @@ fn a_renderer_that_follows_the_list_draws_what_is_there() {
             let changes = it.changes_since(version).unwrap();
             for new in changes.nodes {
                 assert_eq!(new.node as usize, textures.len());
-                let place = (0..3).map(|k| new.weights[k] * textures[new.sources[k] as usize]);
-                textures.push(place.sum());
+                let position = (0..3).map(|k| new.weights[k] * textures[new.sources[k] as usize]);
+                textures.push(position.sum());
             }
             triangles.resize(it.surface().len(), [0; 3]);
             for &triangle in changes.triangles {
@@ -201,7 +201,7 @@ fn a_renderer_that_follows_the_list_draws_what_is_there() {
                 (now / whole - 1.0).abs() < 1e-5,
                 "drawn with {now} of {whole} m² of the texture"
             );
-            // Springs that are gone are gone.
+            // Removed springs no longer exist.
             let pairs = it.spring_pairs().unwrap();
             let is_there = |spring: &&[u32; 2]| {
                 pairs

@@ -1,4 +1,4 @@
-//! Blades and tissue that moves, and blades that turn far in a step.
+//! Blades against moving tissue, and blades that rotate far in a step.
 #![allow(clippy::unwrap_used)]
 
 use std::f32::consts::PI;
@@ -8,7 +8,7 @@ use crate::support::stroke::blade_at;
 use glam::{DVec3, Quat, Vec3, vec3};
 use sinew::{BodyDefinition, BodyId, Solver, Values, World, WorldDefinition};
 
-/// m: a square sheet in the plane z = 0, from the origin, in so many cells a side, of 1 kg/m².
+/// A square sheet of 1 kg/m² in the plane z = 0, from the origin, with this side (m) and this number of cells per side.
 const SIZE: f32 = 0.1;
 const CELLS: usize = 20;
 
@@ -19,12 +19,12 @@ fn sheet(toughness: f32, velocity: Vec3, solver: Solver, is_held: bool) -> (Worl
     for y in 0..=CELLS {
         for x in 0..=CELLS {
             let is_border = x == 0 || y == 0 || x == CELLS || y == CELLS;
-            let off = if is_border {
+            let offset = if is_border {
                 0.0
             } else {
                 0.15 * ((7 * x + 5 * y) as f32).sin()
             };
-            positions.push(side * vec3(x as f32 + off, y as f32 - off, 0.0));
+            positions.push(side * vec3(x as f32 + offset, y as f32 - offset, 0.0));
             masses.push(if is_held && is_border { 0.0 } else { side * side });
         }
     }
@@ -85,15 +85,15 @@ fn tissue_that_moves_onto_a_resting_blade_is_cut() {
         let after = kept(&world, body);
         let lost = before.energy - after.energy;
         let gained = after.momentum - before.momentum;
-        let spent = f64::from(toughness) * length;
-        let what = format!(
-            "{toughness} J/m, {solver:?}, {dt} s: {length} m cut; {lost:.2e} J lost, {spent:.2e} spent, {work:.1e} work; {gained:?}, {impulse:?}"
+        let cut_work = f64::from(toughness) * length;
+        let case = format!(
+            "{toughness} J/m, {solver:?}, {dt} s: {length} m cut; {lost:.2e} J lost, {cut_work:.2e} spent, {work:.1e} work; {gained:?}, {impulse:?}"
         );
-        assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 2, "{what}");
-        assert!((length / 0.1005 - 1.0).abs() < 0.04, "{what}");
-        assert!(gained.distance(impulse) <= 1e-5 * before.momentum.length(), "{what}");
-        assert!(work.abs() < 1e-9, "{what}");
-        assert!(lost >= 0.95 * spent - 1e-6 * before.energy, "{what}");
+        assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 2, "{case}");
+        assert!((length / 0.1005 - 1.0).abs() < 0.04, "{case}");
+        assert!(gained.distance(impulse) <= 1e-5 * before.momentum.length(), "{case}");
+        assert!(work.abs() < 1e-9, "{case}");
+        assert!(lost >= 0.95 * cut_work - 1e-6 * before.energy, "{case}");
     }
 }
 
@@ -104,7 +104,7 @@ fn a_sheet_that_rests_on_a_blade_is_not_cut() {
     for _ in 0..20 {
         world.step(1e-3).unwrap();
     }
-    // Along its edge tissue goes freely.
+    // Tissue slides freely along the edge.
     world.set_blade_pose(knife, vec3(0.03, 0.048, 0.0), None).unwrap();
     world.step(1e-3).unwrap();
     let cut = world.blade_report(knife).unwrap().length;
@@ -134,35 +134,35 @@ fn a_blade_that_turns_far_in_a_step_cuts_an_arc() {
             length += world.blade_report(knife).unwrap().length;
         }
         assert_eq!(world.blade_report(knife).unwrap().refused, None);
-        let way = f64::from(radius * 1.4 * PI);
-        // What resists keeps it a little behind.
+        let arc_length = f64::from(radius * 1.4 * PI);
+        // Toughness keeps the cut slightly behind the blade.
         assert!(
-            length > 0.85 * way && length < 1.03 * way,
-            "{toughness}: {length} of {way} m"
+            length > 0.85 * arc_length && length < 1.03 * arc_length,
+            "{toughness}: {length} of {arc_length} m"
         );
-        let it = world.body(body).unwrap();
-        assert!(it.surface().len() > count);
-        let changes = it.changes_since(0).unwrap();
+        let cut_body = world.body(body).unwrap();
+        assert!(cut_body.surface().len() > count);
+        let changes = cut_body.changes_since(0).unwrap();
         let rim: Vec<u32> = changes.rim.iter().flat_map(|edge| edge.nodes).collect();
         assert!(!rim.is_empty());
         if toughness == 0.0 {
             for point in rim {
-                let off = (it.positions()[point as usize].distance(centre) - radius).abs();
-                // As an arc is from the chord of half a radian, and what is snapped.
-                assert!(off < 0.0013, "{off} m off the arc");
+                let offset = (cut_body.positions()[point as usize].distance(centre) - radius).abs();
+                // The tolerance covers the deviation of an arc from the chord of half a radian, and snapping.
+                assert!(offset < 0.0013, "{offset} m off the arc");
             }
         }
     }
 }
 
 #[test]
-fn blades_that_meet_in_one_instant_leave_no_bridge() {
+fn blades_that_meet_in_the_same_step_leave_no_bridge() {
     for toughness in [0.0, 0.001] {
         for steps in [30, 100, 240] {
             for is_head_on in [false, true] {
                 let (mut world, body) = sheet(toughness, Vec3::ZERO, Solver::Verlet, true);
                 let middle = vec3(0.0512, 0.0487, 0.0);
-                let ways = if is_head_on {
+                let paths = if is_head_on {
                     // Along one line, to the middle.
                     [[vec3(-0.02, 0.0487, 0.0), middle], [vec3(0.1224, 0.0487, 0.0), middle]]
                 } else {
@@ -170,17 +170,17 @@ fn blades_that_meet_in_one_instant_leave_no_bridge() {
                         .map(|ends| ends.map(|end| end * vec3(0.065, 0.006, 0.0)))
                         .map(|ends| ends.map(|end| middle + end))
                 };
-                let ways = if is_head_on {
-                    ways
+                let paths = if is_head_on {
+                    paths
                 } else {
                     let turn = Quat::from_rotation_z(0.5 * PI);
-                    [ways[0], ways[1].map(|end| middle + turn * (end - middle))]
+                    [paths[0], paths[1].map(|end| middle + turn * (end - middle))]
                 };
-                let knives = ways.map(|[start, _]| blade_at(&mut world, 500.0, start, UPRIGHT));
+                let knives = paths.map(|[start, _]| blade_at(&mut world, 500.0, start, UPRIGHT));
                 for step in 1..=steps {
-                    for (&knife, [start, end]) in knives.iter().zip(&ways) {
-                        let place = start.lerp(*end, step as f32 / steps as f32);
-                        world.set_blade_pose(knife, place, None).unwrap();
+                    for (&knife, [start, end]) in knives.iter().zip(&paths) {
+                        let position = start.lerp(*end, step as f32 / steps as f32);
+                        world.set_blade_pose(knife, position, None).unwrap();
                     }
                     world.step(2e-3).unwrap();
                     for knife in knives {
@@ -188,11 +188,11 @@ fn blades_that_meet_in_one_instant_leave_no_bridge() {
                     }
                 }
                 let pieces = world.body(body).unwrap().pieces().unwrap().count;
-                let what = format!("{toughness} J/m, {steps} steps, head on {is_head_on}");
+                let case = format!("{toughness} J/m, {steps} steps, head on {is_head_on}");
                 if !is_head_on {
-                    assert_eq!(pieces, 4, "{what}");
+                    assert_eq!(pieces, 4, "{case}");
                 } else if toughness == 0.0 {
-                    assert_eq!(pieces, 2, "{what}");
+                    assert_eq!(pieces, 2, "{case}");
                 }
             }
         }

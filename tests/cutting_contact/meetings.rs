@@ -1,4 +1,4 @@
-//! What is cut and other tissue: it is carried, thrown back, and nothing is made or lost.
+//! Contact of cut bodies with other tissue: weight is carried, and momentum and energy are conserved.
 
 use glam::{DVec3, Vec3, Vec3Swizzles, vec3};
 use sinew::{BodyContact, BodyDefinition, Detection, Solver, Tearing, Values};
@@ -7,24 +7,25 @@ use super::scene::*;
 use crate::support::hanging::nodes_at;
 use crate::support::tissue::pin_all;
 
-/// A sheet that is held at one end above another, in two bodies or in one, is cut off there, falls and lies on the lower one.
+/// A sheet is held at one end above another sheet, in the same body or another. It is cut off there, falls, and rests
+/// on the lower sheet.
 #[test]
-fn a_sheet_that_is_cut_off_is_carried_by_what_it_falls_on() {
-    a_sheet_that_is_cut_off_is_carried_by_what_it_falls_on_of(&[(Solver::Verlet, true, Detection::Exact)]);
+fn a_cut_off_sheet_is_carried_by_the_sheet_below() {
+    check_a_cut_off_sheet_is_carried_by_the_sheet_below(&[(Solver::Verlet, true, Detection::Exact)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_sheet_that_is_cut_off_is_carried_by_what_it_falls_on_in_the_other_cases() {
-    a_sheet_that_is_cut_off_is_carried_by_what_it_falls_on_of(&[
+fn a_cut_off_sheet_is_carried_by_the_sheet_below_in_the_other_cases() {
+    check_a_cut_off_sheet_is_carried_by_the_sheet_below(&[
         (Solver::Verlet, false, Detection::ImageSpace),
         (Solver::Implicit, false, Detection::Exact),
     ]);
 }
 
-fn a_sheet_that_is_cut_off_is_carried_by_what_it_falls_on_of(cases: &[(Solver, bool, Detection)]) {
+fn check_a_cut_off_sheet_is_carried_by_the_sheet_below(cases: &[(Solver, bool, Detection)]) {
     for &(solver, as_one, detection) in cases {
-        let what = format!("{solver:?}, one body: {as_one}, {detection:?}");
+        let case = format!("{solver:?}, one body: {as_one}, {detection:?}");
         let mut world = world(DOWN, 1);
         let contact = BodyContact {
             thickness: 5e-4,
@@ -46,9 +47,9 @@ fn a_sheet_that_is_cut_off_is_carried_by_what_it_falls_on_of(cases: &[(Solver, b
         upper
             .positions
             .iter_mut()
-            .for_each(|place| *place += vec3(0.002, 0.005, 0.003));
-        let rim = nodes_at(&lower, |place| place.x.abs().max(place.z.abs()) > 0.0399);
-        let end = nodes_at(&upper, |place| place.x < -0.015);
+            .for_each(|position| *position += vec3(0.002, 0.005, 0.003));
+        let rim = nodes_at(&lower, |position| position.x.abs().max(position.z.abs()) > 0.0399);
+        let end = nodes_at(&upper, |position| position.x < -0.015);
         let count = lower.positions.len() as u32;
         let (bodies, rims) = if as_one {
             let mut both = lower.clone();
@@ -74,35 +75,35 @@ fn a_sheet_that_is_cut_off_is_carried_by_what_it_falls_on_of(cases: &[(Solver, b
         let at = vec3(-0.013, 0.005, 0.0);
         let cut = sweep(at - 0.1 * Vec3::Z, at + 0.1 * Vec3::Z, 0.003 * Vec3::Y);
         let report = world.cut(bodies[1], &cut).unwrap();
-        assert_eq!(report.pieces_parted, 1, "{what}");
+        assert_eq!(report.pieces_parted, 1, "{case}");
         for step in 0..300 {
-            assert_eq!(world.step(2e-3).unwrap().crossings, 0, "{what}, step {step}");
+            assert_eq!(world.step(2e-3).unwrap().crossings, 0, "{case}, step {step}");
         }
-        let held = [0, 1].map(|side| pin_force(&world, bodies[side], &rims[side]).y);
+        let pin_forces = [0, 1].map(|side| pin_force(&world, bodies[side], &rims[side]).y);
         let weight = 2.0 * 9.81 * f64::from(matter.mass);
         assert!(
-            ((held[0] + held[1]) / weight - 1.0).abs() < 0.01,
-            "{what}: {held:?} of {weight} N"
+            ((pin_forces[0] + pin_forces[1]) / weight - 1.0).abs() < 0.01,
+            "{case}: {pin_forces:?} of {weight} N"
         );
-        // What was cut off is most of the upper one.
-        assert!(held[1] < 0.25 * weight, "{what}: {held:?} of {weight} N");
+        // Most of the upper sheet was cut off.
+        assert!(pin_forces[1] < 0.25 * weight, "{case}: {pin_forces:?} of {weight} N");
     }
 }
 
-/// Two blocks with wounds meet.
+/// Two blocks with wounds collide.
 #[test]
-fn cut_bodies_that_meet_keep_their_momentum() {
-    cut_bodies_that_meet_keep_their_momentum_of(Solver::Verlet, Detection::ImageSpace);
+fn cut_bodies_that_collide_conserve_momentum() {
+    check_cut_bodies_that_collide_conserve_momentum(Solver::Verlet, Detection::ImageSpace);
 }
 
 #[test]
 #[ignore = "long"]
-fn cut_bodies_that_meet_keep_their_momentum_with_newton() {
-    cut_bodies_that_meet_keep_their_momentum_of(Solver::Newton, Detection::Exact);
+fn cut_bodies_that_collide_conserve_momentum_with_newton() {
+    check_cut_bodies_that_collide_conserve_momentum(Solver::Newton, Detection::Exact);
 }
 
-fn cut_bodies_that_meet_keep_their_momentum_of(solver: Solver, detection: Detection) {
-    let what = format!("{solver:?}, {detection:?}");
+fn check_cut_bodies_that_collide_conserve_momentum(solver: Solver, detection: Detection) {
+    let case = format!("{solver:?}, {detection:?}");
     let mut world = world(Vec3::ZERO, 1);
     let contact = BodyContact {
         thickness: 5e-4,
@@ -115,7 +116,7 @@ fn cut_bodies_that_meet_keep_their_momentum_of(solver: Solver, detection: Detect
         let mut mesh = block();
         mesh.positions
             .iter_mut()
-            .for_each(|place| *place += vec3(0.0215, 0.004, 0.003) * side);
+            .for_each(|position| *position += vec3(0.0215, 0.004, 0.003) * side);
         let id = Matter {
             solver,
             contact,
@@ -125,59 +126,65 @@ fn cut_bodies_that_meet_keep_their_momentum_of(solver: Solver, detection: Detect
         .put(&mut world, &mesh);
         let velocities = vec![vec3(-0.4 * side, 0.0, 0.0); mesh.positions.len()];
         world.body_mut(id).unwrap().set_velocities(&velocities).unwrap();
-        // Into the face that is to meet the other.
+        // A cut into the face that hits the other block.
         let (x, y, z) = (0.0215 * side, 0.004 * side, 0.003 * side);
         let cut = sweep(vec3(-0.02 * side, y, z), vec3(x, y, z), 0.1 * Vec3::Z);
-        assert!(world.cut(id, &cut).unwrap().area > 2e-4, "{what}");
+        assert!(world.cut(id, &cut).unwrap().area > 2e-4, "{case}");
         id
     });
     let before = kept(&world, &bodies);
-    let of_left = kept(&world, &bodies[..1]).momentum;
+    let left_momentum = kept(&world, &bodies[..1]).momentum;
     for step in 0..80 {
         let report = world.step(1e-3).unwrap();
-        assert_eq!(report.crossings, 0, "{what}, step {step}");
+        assert_eq!(report.crossings, 0, "{case}, step {step}");
         let now = kept(&world, &bodies);
         assert!(
             now.energy < 1.001 * before.energy,
-            "{what}, step {step}: {} J",
+            "{case}, step {step}: {} J",
             now.energy
         );
     }
     let after = kept(&world, &bodies);
-    let size = of_left.length();
-    let off = after.momentum.distance(before.momentum) / size;
-    assert!(off < 1e-5, "{what}: momentum off by {off}");
-    let turned = kept(&world, &bodies[..1]).momentum;
-    assert!(turned.x < -0.2 * size, "{what}: {turned} after {of_left}");
-    // No corner of one lies in the other.
+    let size = left_momentum.length();
+    let error = after.momentum.distance(before.momentum) / size;
+    assert!(error < 1e-5, "{case}: momentum off by {error}");
+    let final_momentum = kept(&world, &bodies[..1]).momentum;
+    assert!(
+        final_momentum.x < -0.2 * size,
+        "{case}: {final_momentum} after {left_momentum}"
+    );
+    // No corner of one block lies in the other.
     for [of, other] in [[0, 1], [1, 0]] {
         let around = triangles(world.body(bodies[other]).unwrap());
-        let places: Vec<DVec3> = triangles(world.body(bodies[of]).unwrap()).concat();
-        assert!(places.iter().all(|&place| winding(&around, place) < 0.5), "{what}");
+        let positions: Vec<DVec3> = triangles(world.body(bodies[of]).unwrap()).concat();
+        assert!(
+            positions.iter().all(|&position| winding(&around, position) < 0.5),
+            "{case}"
+        );
     }
 }
 
-/// A block that meets itself and turns in flight is cut through, crosswise.
+/// A block with self-contact that rotates in flight is cut through, crosswise.
 #[test]
-fn a_cut_in_motion_makes_and_loses_nothing() {
-    a_cut_in_motion_makes_and_loses_nothing_of(&[(3000.0, Solver::Verlet)]);
+fn a_cut_in_motion_conserves_mass_momentum_and_energy() {
+    check_a_cut_in_motion_conserves_mass_momentum_and_energy(&[(3000.0, Solver::Verlet)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_cut_in_motion_makes_and_loses_nothing_in_the_other_cases() {
-    a_cut_in_motion_makes_and_loses_nothing_of(&[(0.0, Solver::Verlet), (3000.0, Solver::Newton)]);
+fn a_cut_in_motion_conserves_mass_momentum_and_energy_in_the_other_cases() {
+    check_a_cut_in_motion_conserves_mass_momentum_and_energy(&[(0.0, Solver::Verlet), (3000.0, Solver::Newton)]);
 }
 
-fn a_cut_in_motion_makes_and_loses_nothing_of(cases: &[(f32, Solver)]) {
+fn check_a_cut_in_motion_conserves_mass_momentum_and_energy(cases: &[(f32, Solver)]) {
     for &(young, solver) in cases {
-        let what = format!("{young} Pa, {solver:?}");
+        let case = format!("{young} Pa, {solver:?}");
         let mut world = world(Vec3::ZERO, 1);
         let mesh = block();
         let matter = Matter {
             young,
             solver,
-            contact: MEETS_ITSELF,
+            contact: SELF_CONTACT,
             ..Matter::BLOCK
         };
         let body = matter.put(&mut world, &mesh);
@@ -185,7 +192,7 @@ fn a_cut_in_motion_makes_and_loses_nothing_of(cases: &[(f32, Solver)]) {
         let velocities: Vec<Vec3> = mesh
             .positions
             .iter()
-            .map(|&place| vec3(0.3, -0.2, 0.1) + spin.cross(place) + 40.0 * place.yzx() * place.x)
+            .map(|&position| vec3(0.3, -0.2, 0.1) + spin.cross(position) + 40.0 * position.yzx() * position.x)
             .collect();
         world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
         let first = kept(&world, &[body]);
@@ -206,47 +213,53 @@ fn a_cut_in_motion_makes_and_loses_nothing_of(cases: &[(f32, Solver)]) {
                 .sum::<Vec3>())
                 / mesh.positions.len() as f32;
             let before = kept(&world, &[body]);
-            let places = world.body(body).unwrap().positions().to_vec();
+            let positions = world.body(body).unwrap().positions().to_vec();
             let report = world.cut(body, &sweep(at + from, at + to, 0.1 * Vec3::Z)).unwrap();
-            assert!(report.pieces_parted >= 1, "{what}: {report:?}");
+            assert!(report.pieces_parted >= 1, "{case}: {report:?}");
             let after = kept(&world, &[body]);
-            assert_eq!(places, world.body(body).unwrap().positions()[..places.len()], "{what}");
-            assert!((after.mass / before.mass - 1.0).abs() < 1e-6, "{what}: mass");
+            assert_eq!(
+                positions,
+                world.body(body).unwrap().positions()[..positions.len()],
+                "{case}"
+            );
+            assert!((after.mass / before.mass - 1.0).abs() < 1e-6, "{case}: mass");
             assert!(
                 after.momentum.distance(before.momentum) < 1e-6 * size,
-                "{what}: momentum"
+                "{case}: momentum"
             );
-            let off = after.spin.distance(before.spin);
-            assert!(off < 1e-6 * before.spin.length().max(0.1 * size), "{what}: {off}");
+            let error = after.spin.distance(before.spin);
+            assert!(error < 1e-6 * before.spin.length().max(0.1 * size), "{case}: {error}");
             let gained = (after.energy / before.energy - 1.0).abs();
-            assert!(gained < 1e-6, "{what}: energy {gained}");
+            assert!(gained < 1e-6, "{case}: energy {gained}");
         }
         for step in 0..40 {
             world.step(1e-3).unwrap();
             let now = kept(&world, &[body]);
             assert!(
                 now.energy < 1.002 * first.energy,
-                "{what}, step {step}: {} J",
+                "{case}, step {step}: {} J",
                 now.energy
             );
         }
-        let off = kept(&world, &[body]).momentum.distance(first.momentum) / size;
-        assert!(off < 1e-5, "{what}: momentum off by {off}");
-        assert_eq!(overlapping(world.body(body).unwrap(), 2e-4), 0, "{what}");
+        let error = kept(&world, &[body]).momentum.distance(first.momentum) / size;
+        assert!(error < 1e-5, "{case}: momentum off by {error}");
+        assert_eq!(overlapping(world.body(body).unwrap(), 2e-4), 0, "{case}");
     }
 }
 
 #[test]
-fn threads_make_no_difference() {
+fn results_are_identical_for_any_number_of_threads() {
     let [one, three] = [1, 3].map(|threads| {
         let mut world = world(DOWN, threads);
         let contact = BodyContact {
             with_bodies: true,
-            ..MEETS_ITSELF
+            ..SELF_CONTACT
         };
         let bodies = [0.0, 0.0415].map(|height: f32| {
             let mut mesh = sinew::mesh::Mesh::block([0.08, 0.04, 0.08], [9, 5, 9]).unwrap();
-            mesh.positions.iter_mut().for_each(|place| *place += height * Vec3::Y);
+            mesh.positions
+                .iter_mut()
+                .for_each(|position| *position += height * Vec3::Y);
             Matter {
                 contact,
                 mass: 0.5,
@@ -265,7 +278,7 @@ fn threads_make_no_difference() {
         for _ in 0..8 {
             world.step(1e-3).unwrap();
         }
-        // They did meet.
+        // The blocks did collide.
         let pushed = kept(&world, &bodies[..1]).momentum.y - low;
         assert!(pushed < -1.2 * 0.5 * 9.81 * 8e-3, "{pushed}");
         world.state_hash()
@@ -273,7 +286,7 @@ fn threads_make_no_difference() {
     assert_eq!(one, three);
 }
 
-/// A sheet that meets itself is torn, in its plane, and no part of it passes through another.
+/// A sheet with self-contact is torn in its plane, and no part of it passes through another.
 #[test]
 fn a_sheet_that_tears_stays_in_its_plane() {
     let mut world = world(Vec3::ZERO, 1);
@@ -292,22 +305,22 @@ fn a_sheet_that_tears_stays_in_its_plane() {
                 most_per_step: 4,
                 ..Default::default()
             },
-            contact: MEETS_ITSELF,
+            contact: SELF_CONTACT,
             ..Default::default()
         })
         .unwrap();
-    let ends = [-1.0, 1.0].map(|end: f32| nodes_at(&mesh, |place| place.x * end > 0.0299));
+    let ends = [-1.0, 1.0].map(|end: f32| nodes_at(&mesh, |position| position.x * end > 0.0299));
     ends.iter().for_each(|nodes| pin_all(&mut world, body, nodes));
     for step in 1..=60 {
         for (nodes, end) in ends.iter().zip([-1.0, 1.0]) {
             for &node in nodes {
-                let place = mesh.positions[node as usize] + end * step as f32 * 2e-4 * Vec3::X;
-                world.body_mut(body).unwrap().move_pin(node, place).unwrap();
+                let position = mesh.positions[node as usize] + end * step as f32 * 2e-4 * Vec3::X;
+                world.body_mut(body).unwrap().move_pin(node, position).unwrap();
             }
         }
         assert_eq!(world.step(2e-3).unwrap().crossings, 0, "step {step}");
     }
-    let it = world.body(body).unwrap();
-    assert!(it.topology_version() > 5);
-    assert!(it.positions().iter().all(|place| place.y.abs() < 1e-6));
+    let cut_body = world.body(body).unwrap();
+    assert!(cut_body.topology_version() > 5);
+    assert!(cut_body.positions().iter().all(|position| position.y.abs() < 1e-6));
 }

@@ -1,4 +1,4 @@
-//! What is cut meets itself and other tissue.
+//! Contact of cut bodies with themselves and with other tissue.
 #![allow(clippy::unwrap_used)]
 
 mod blade;

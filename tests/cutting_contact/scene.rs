@@ -1,4 +1,4 @@
-//! Bodies that are cut and meet tissue, and measures of where they are in `f64` that know nothing of the library's contact.
+//! Bodies that are cut and collide, and geometric measures in `f64` that do not use the library's contact.
 
 use crate::support::kept::Kept;
 use crate::support::tissue::point_to_triangle;
@@ -9,23 +9,23 @@ use sinew::{Body, BodyContact, BodyDefinition, BodyId, Material, Model, Solver, 
 
 pub const DOWN: Vec3 = vec3(0.0, -9.81, 0.0);
 
-pub const MEETS_ITSELF: BodyContact = BodyContact {
+pub const SELF_CONTACT: BodyContact = BodyContact {
     with_itself: true,
     ..BodyContact::NOTHING
 };
 
-/// What a body is made of.
+/// The parameters of a body.
 #[derive(Clone, Copy, Debug)]
 pub struct Matter {
     /// kg.
     pub mass: f32,
-    /// Of springs, N/m, for sheets and where there are no elements.
+    /// The stiffness of springs (N/m), for sheets and for bodies without elements.
     pub stiffness: f32,
-    /// Along springs, N s/m.
+    /// Damping along springs (N s/m).
     pub damping: f32,
-    /// Against the world, 1/s.
+    /// Damping against the world (1/s).
     pub drag: f32,
-    /// Pa; 0: springs.
+    /// Young's modulus (Pa); 0 for springs.
     pub young: f32,
     pub solver: Solver,
     pub contact: BodyContact,
@@ -82,7 +82,7 @@ pub fn world(gravity: Vec3, threads: u32) -> World {
     world_of(gravity, threads, 0)
 }
 
-/// One of so many substeps; 0: as many as it takes.
+/// Creates a world that takes `substeps` substeps; 0 lets the library choose.
 pub fn world_of(gravity: Vec3, threads: u32, substeps: u32) -> World {
     World::new(WorldDefinition {
         gravity,
@@ -93,18 +93,18 @@ pub fn world_of(gravity: Vec3, threads: u32, substeps: u32) -> World {
     .unwrap()
 }
 
-/// 4 x 3 x 3 cm about the origin, in cells of 1 cm.
+/// Returns a block of 4 x 3 x 3 cm about the origin, in cells of 1 cm.
 pub fn block() -> Mesh {
     Mesh::block([0.04, 0.03, 0.03], [4, 3, 3]).unwrap()
 }
 
-/// A square in the plane y = 0 about the origin, of so many cells of 1 cm.
+/// Returns a square in the plane y = 0 about the origin, with `cells` cells of 1 cm per side.
 pub fn sheet(cells: u32) -> Mesh {
     let size = 0.01 * cells as f32;
     Mesh::cloth([size; 2], [cells; 2]).unwrap()
 }
 
-/// A blade's edge along `along` that passes from one place to another.
+/// Returns the sweep of an edge along `along` that moves from `from` to `to`.
 pub fn sweep(from: Vec3, to: Vec3, along: Vec3) -> Sweep {
     Sweep {
         start: [from - along, from + along],
@@ -112,28 +112,28 @@ pub fn sweep(from: Vec3, to: Vec3, along: Vec3) -> Sweep {
     }
 }
 
-/// Where the corners of each triangle of a surface are.
+/// Returns the corners of each triangle of a surface.
 pub fn triangles(body: &Body) -> Vec<[DVec3; 3]> {
-    let places = body.positions();
+    let positions = body.positions();
     let corners = body.surface().iter();
     corners
-        .map(|corners| corners.map(|corner| places[corner as usize].as_dvec3()))
+        .map(|corners| corners.map(|corner| positions[corner as usize].as_dvec3()))
         .collect()
 }
 
-/// How often a closed surface winds about a point (van Oosterom, Strackee 1983).
+/// Returns the winding number of a closed surface about a point (van Oosterom, Strackee 1983).
 pub fn winding(triangles: &[[DVec3; 3]], point: DVec3) -> f64 {
     let angle = |triangle: &[DVec3; 3]| {
         let [a, b, c] = triangle.map(|corner| corner - point);
         let (la, lb, lc) = (a.length(), b.length(), c.length());
-        let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-        2.0 * a.dot(b.cross(c)).atan2(below)
+        let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        2.0 * a.dot(b.cross(c)).atan2(denominator)
     };
     triangles.iter().map(angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
 }
 
-/// How many corners of a solid's surface lie within tissue other than that behind them, deeper than `depth`: twice as far behind a corner there is
-/// a place, so deep within all that is about it, that the surface winds about more than once.
+/// Counts the corners of a solid's surface that overlap other tissue by more than `depth`. For such a corner, the point
+/// at twice this depth behind it is far from the surface, and the surface winds about it more than once.
 pub fn overlapping(body: &Body, depth: f64) -> usize {
     let triangles = triangles(body);
     let mut outward = vec![DVec3::ZERO; body.positions().len()];
@@ -144,14 +144,14 @@ pub fn overlapping(body: &Body, depth: f64) -> usize {
     }
     let corners = outward.iter().zip(body.positions());
     let corners =
-        corners.filter_map(|(outward, place)| Some(place.as_dvec3() - outward.try_normalize()? * (2.0 * depth)));
-    let is_deep = |place: DVec3| {
+        corners.filter_map(|(outward, point)| Some(point.as_dvec3() - outward.try_normalize()? * (2.0 * depth)));
+    let is_deep = |point: DVec3| {
         triangles
             .iter()
-            .all(|&triangle| point_to_triangle(place, triangle) > depth)
+            .all(|&triangle| point_to_triangle(point, triangle) > depth)
     };
     corners
-        .filter(|&place| winding(&triangles, place) > 1.5 && is_deep(place))
+        .filter(|&point| winding(&triangles, point) > 1.5 && is_deep(point))
         .count()
 }
 
@@ -163,7 +163,7 @@ pub fn kept(world: &World, bodies: &[BodyId]) -> Kept {
     kept
 }
 
-/// The sum of what holds these pins, N.
+/// Returns the sum of the forces on these pins (N).
 pub fn pin_force(world: &World, body: BodyId, nodes: &[u32]) -> DVec3 {
     let force = |&node: &u32| world.body(body).unwrap().pin_force(node).unwrap().as_dvec3();
     nodes.iter().map(force).sum()

@@ -1,23 +1,24 @@
-//! The material parts where the blade went, and nowhere else.
+//! The material separates along the path of the blade, and nowhere else.
 
 use super::block::{Body, bent, block, flat, shaken, snap, volume};
 use crate::support::random::Random;
 use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::{Limits, Sweep};
 
-/// Which tetrahedron a place of the rest shape lies in.
-fn find(body: &Body, place: DVec3) -> Option<usize> {
+/// Returns the tetrahedron that contains a point of the rest shape.
+fn find(body: &Body, position: DVec3) -> Option<usize> {
     body.solid.tetrahedra().iter().position(|tetrahedron| {
         let corners = tetrahedron.corners.map(|corner| body.solid.rest_place(corner));
         (0..4).all(|k| {
             let mut with = corners;
-            with[k] = place;
+            with[k] = position;
             volume(with) >= 0.0
         })
     })
 }
 
-/// A sweep along a random plane through the middle of a block of this size, beyond its sides, and the plane's normal.
+/// Returns a sweep along a random plane through the middle of a block of this size, beyond its sides, and the plane's
+/// normal.
 fn across(random: &mut Random, size: Vec3) -> (Sweep, DVec3) {
     let middle = 0.5 * size + random.point(-0.5, 0.5);
     let normal = random.point(-1.0, 1.0).normalize();
@@ -42,14 +43,17 @@ fn the_two_sides_of_a_plane_are_different_pieces() {
         let changes = body.cut(sweep.start, sweep.end);
         assert_eq!(body.check(), 2, "round {round}");
         let snap = snap(&body);
-        let height = |place: DVec3| normal.dot(place - sweep.start[0].as_dvec3());
+        let height = |position: DVec3| normal.dot(position - sweep.start[0].as_dvec3());
         let mut area = 0.0;
         for face in &changes.faces {
             area += face.area;
             for triangle in face.triangles {
                 for corner in body.solid.triangles()[triangle as usize].corners {
-                    let off = height(body.solid.rest_place(corner)).abs();
-                    assert!(off <= 1.001 * snap, "round {round}: the cut is {off} off the blade");
+                    let distance = height(body.solid.rest_place(corner)).abs();
+                    assert!(
+                        distance <= 1.001 * snap,
+                        "round {round}: the cut is {distance} off the blade"
+                    );
                 }
             }
         }
@@ -63,24 +67,24 @@ fn the_two_sides_of_a_plane_are_different_pieces() {
                 assert!(edge.points.iter().all(|point| points.contains(point)));
             }
         }
-        // Places on the blade, and how much of it lies in the block.
+        // Points on the blade, and the fraction of the blade inside the block.
         let pieces = body.piece_of_each();
         let (mut inside, mut tried) = (0, 0);
         let [a, b, c] = [sweep.start[0], sweep.start[1], sweep.end[0]];
         let mut sides = [None; 2];
         for at in 0..1600 {
             let [i, j] = [at % 40, at / 40].map(|k| (k as f32 + 0.5) / 40.0);
-            let place = a + (b - a) * i + (c - a) * j;
+            let position = a + (b - a) * i + (c - a) * j;
             tried += 1;
-            if place.cmplt(Vec3::ZERO).any() || place.cmpgt(size).any() {
+            if position.cmplt(Vec3::ZERO).any() || position.cmpgt(size).any() {
                 continue;
             }
             inside += 1;
             for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
-                let place = place.as_dvec3() + sign * 1.01 * snap * normal;
-                if let Some(found) = find(&body, place) {
-                    let known = *sides[side].get_or_insert(pieces[found]);
-                    assert_eq!(known, pieces[found], "round {round}: at {place}");
+                let position = position.as_dvec3() + sign * 1.01 * snap * normal;
+                if let Some(found) = find(&body, position) {
+                    let side_piece = *sides[side].get_or_insert(pieces[found]);
+                    assert_eq!(side_piece, pieces[found], "round {round}: at {position}");
                 }
             }
         }
@@ -112,14 +116,14 @@ fn a_cut_that_ends_inside_opens_up_to_there() {
         for face in &changes.faces {
             area += face.area;
             for corner in body.solid.triangles()[face.triangles[0] as usize].corners {
-                let place = body.solid.rest_place(corner);
-                let off = normal.dot(place - DVec3::new(0.0, y as f64, low as f64)).abs();
-                assert!(off <= 1.001 * snap, "{off} off the blade");
-                // What was snapped lies no farther beyond the blade's ends than it was moved.
-                assert!(place.x <= x as f64 + 1.001 * snap && place.z >= low as f64 - 1.001 * snap);
+                let position = body.solid.rest_place(corner);
+                let distance = normal.dot(position - DVec3::new(0.0, y as f64, low as f64)).abs();
+                assert!(distance <= 1.001 * snap, "{distance} off the blade");
+                // Snapped vertices lie beyond the blade's ends by at most the snapping distance.
+                assert!(position.x <= x as f64 + 1.001 * snap && position.z >= low as f64 - 1.001 * snap);
             }
         }
-        // What was opened lags behind the blade by less than an element.
+        // The opened region lags behind the blade by less than an element.
         let (swept, inner) = (
             x as f64 * (4.0 - low as f64),
             (x as f64 - 1.5) * (4.0 - low as f64 - 1.5),
@@ -147,21 +151,21 @@ fn a_stroke_in_steps_does_what_one_step_does() {
         stepped.cut_along(&line);
         assert_eq!((whole.check(), stepped.check()), (2, 2), "round {round}");
         for (a, b) in whole.piece_volumes().iter().zip(stepped.piece_volumes()) {
-            // Each vertex is snapped by a twentieth of an edge at most.
+            // Each vertex is snapped by at most a twentieth of an edge.
             assert!((a - b).abs() < 0.5, "round {round}: {a} and {b}");
         }
     }
 }
 
 #[test]
-fn a_blade_that_saws_to_and_fro_parts_once() {
-    let place = |x: f32| [vec3(x, 2.2 + 0.1 * x, -1.0), vec3(x, 2.0 + 0.1 * x, 5.0)];
+fn a_sawing_blade_separates_once() {
+    let position = |x: f32| [vec3(x, 2.2 + 0.1 * x, -1.0), vec3(x, 2.0 + 0.1 * x, 5.0)];
     for mesh in [block([5, 4, 4]), shaken([5, 4, 4], 2)] {
         let mut body = Body::new(mesh, bent);
         let mut line = Vec::new();
         for step in 0..160 {
             let at = step as f32 * 0.05 - 1.0;
-            line.push(place(at + 0.6 * (step as f32 * 0.9).sin()));
+            line.push(position(at + 0.6 * (step as f32 * 0.9).sin()));
         }
         body.cut_along(&line);
         assert_eq!(body.check(), 2, "{:?}", body.piece_volumes());
@@ -169,7 +173,7 @@ fn a_blade_that_saws_to_and_fro_parts_once() {
 }
 
 #[test]
-fn a_blade_that_rocks_parts_once() {
+fn a_rocking_blade_separates_once() {
     for (mesh, pace) in [
         (block([5, 4, 4]), 0.9),
         (shaken([5, 4, 4], 2), 0.9),
@@ -187,16 +191,16 @@ fn a_blade_that_rocks_parts_once() {
 }
 
 #[test]
-fn a_later_stroke_goes_on_where_an_earlier_one_ended() {
-    let place = |x: f32| [vec3(x, 2.23, -1.0), vec3(x, 2.04, 5.0)];
+fn a_later_stroke_continues_an_earlier_one() {
+    let position = |x: f32| [vec3(x, 2.23, -1.0), vec3(x, 2.04, 5.0)];
     for mesh in [block([5, 4, 4]), shaken([5, 4, 4], 2)] {
         for end in [0.4, 1.1, 1.6, 2.0, 2.45, 2.7, 3.3, 4.0] {
             // From the other side, or again from the first.
             for (from, to) in [(6.0, end - 0.05), (end - 0.3, 6.0), (-1.0, 6.0)] {
                 let mut body = Body::new(mesh.clone(), flat);
-                body.cut(place(-1.0), place(end));
+                body.cut(position(-1.0), position(end));
                 assert_eq!(body.check(), 1);
-                body.cut(place(from), place(to));
+                body.cut(position(from), position(to));
                 assert_eq!(body.check(), 2, "{end}, {from} to {to}: {:?}", body.piece_volumes());
             }
         }
@@ -206,30 +210,30 @@ fn a_later_stroke_goes_on_where_an_earlier_one_ended() {
 #[test]
 fn a_notch_in_a_single_cell_opens_when_it_is_severed() {
     let rest = vec![Vec3::ZERO, 4.0 * Vec3::X, 4.0 * Vec3::Y, 4.0 * Vec3::Z];
-    let place = |x: f32| [vec3(x, -1.0, 1.1), vec3(x, 9.0, 1.2)];
+    let position = |x: f32| [vec3(x, -1.0, 1.1), vec3(x, 9.0, 1.2)];
     let mut body = Body::new((rest, vec![[0, 1, 2, 3]]), flat);
-    body.cut(place(-1.0), place(1.0));
+    body.cut(position(-1.0), position(1.0));
     assert_eq!((body.check(), body.nodes_that_move()), (1, 4));
-    body.cut(place(1.0), place(2.0));
+    body.cut(position(1.0), position(2.0));
     assert_eq!((body.check(), body.nodes_that_move()), (1, 4));
-    body.cut(place(2.0), place(3.5));
+    body.cut(position(2.0), position(3.5));
     assert_eq!((body.check(), body.nodes_that_move()), (2, 8));
     assert_eq!(body.solid.cells().len(), 2);
 }
 
 #[test]
-fn near_cuts_side_by_side_leave_a_slice() {
+fn close_parallel_cuts_leave_a_slice() {
     for gap in [0.25f32, 0.4, 0.7] {
         for mesh in [block([5, 4, 4]), shaken([5, 4, 4], 2)] {
             for is_there_and_back in [false, true] {
-                let place = |x: f32, y: f32| [vec3(x, y, -1.0), vec3(x, y + 0.1, 5.0)];
+                let position = |x: f32, y: f32| [vec3(x, y, -1.0), vec3(x, y + 0.1, 5.0)];
                 let mut body = Body::new(mesh.clone(), bent);
-                body.cut(place(-1.0, 1.3), place(6.0, 1.3));
+                body.cut(position(-1.0, 1.3), position(6.0, 1.3));
                 if is_there_and_back {
-                    body.cut(place(6.0, 1.3), place(6.0, 1.3 + gap));
-                    body.cut(place(6.0, 1.3 + gap), place(-1.0, 1.3 + gap));
+                    body.cut(position(6.0, 1.3), position(6.0, 1.3 + gap));
+                    body.cut(position(6.0, 1.3 + gap), position(-1.0, 1.3 + gap));
                 } else {
-                    body.cut(place(-1.0, 1.3 + gap), place(6.0, 1.3 + gap));
+                    body.cut(position(-1.0, 1.3 + gap), position(6.0, 1.3 + gap));
                 }
                 assert_eq!(body.check(), 3, "{gap}: {:?}", body.piece_volumes());
                 let slice = body.piece_volumes()[0];
@@ -243,19 +247,25 @@ fn near_cuts_side_by_side_leave_a_slice() {
 fn a_blade_that_does_not_meet_the_material_changes_nothing() {
     let mut body = Body::new(block([3, 3, 3]), flat);
     let all: Vec<u32> = (0..body.solid.cells().len() as u32).collect();
-    let place = vec3(1.3, 1.4, 1.2);
+    let position = vec3(1.3, 1.4, 1.2);
     for (start, end) in [
-        // Beside it, at rest in it, along itself, of no length, in one of its faces.
+        // Beside it, at rest in it, along itself, of zero length, in one of its faces.
         (
-            [place - 9.0 * Vec3::X, place - 9.0 * Vec3::X + Vec3::Z],
-            [place - 5.0 * Vec3::X, place - 4.0 * Vec3::X + Vec3::Z],
+            [position - 9.0 * Vec3::X, position - 9.0 * Vec3::X + Vec3::Z],
+            [position - 5.0 * Vec3::X, position - 4.0 * Vec3::X + Vec3::Z],
         ),
-        ([place - Vec3::Z, place + Vec3::Z], [place - Vec3::Z, place + Vec3::Z]),
         (
-            [place - Vec3::Z, place + Vec3::Z],
-            [place - 2.0 * Vec3::Z, place + 2.0 * Vec3::Z],
+            [position - Vec3::Z, position + Vec3::Z],
+            [position - Vec3::Z, position + Vec3::Z],
         ),
-        ([place - Vec3::Z, place - Vec3::Z], [place + Vec3::Z, place + Vec3::Z]),
+        (
+            [position - Vec3::Z, position + Vec3::Z],
+            [position - 2.0 * Vec3::Z, position + 2.0 * Vec3::Z],
+        ),
+        (
+            [position - Vec3::Z, position - Vec3::Z],
+            [position + Vec3::Z, position + Vec3::Z],
+        ),
         (
             [vec3(-1.0, -1.0, 0.0), vec3(-1.0, 4.0, 0.0)],
             [vec3(4.0, -1.0, 0.0), vec3(4.0, 4.0, 0.0)],

@@ -1,4 +1,4 @@
-//! Blocks, a body that follows the change list alone, and what has to hold after each cut.
+//! Blocks, a body that follows change lists only, and the invariants after each cut.
 #![allow(dead_code)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,10 +29,10 @@ pub fn block(size: [usize; 3]) -> Mesh {
     for z in 0..nz {
         for y in 0..ny {
             for x in 0..nx {
-                for way in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+                for axes in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
                     let mut p = [x, y, z];
                     let mut cell = [at(p); 4];
-                    for (k, &axis) in way.iter().enumerate() {
+                    for (k, &axis) in axes.iter().enumerate() {
                         p[axis] += 1;
                         cell[k + 1] = at(p);
                     }
@@ -44,15 +44,16 @@ pub fn block(size: [usize; 3]) -> Mesh {
     (rest, cells)
 }
 
-/// A block of which each cube has five tetrahedra, turned from cube to cube, and of which inner nodes are shaken, also within the outer faces.
+/// A block with five tetrahedra per cube, alternating between cubes. Inner nodes are moved at random, also within the
+/// outer faces.
 pub fn shaken(size: [usize; 3], seed: u64) -> Mesh {
     let mut random = Random(seed);
     let [nx, ny, nz] = size;
     let (mut rest, _) = block(size);
-    for place in &mut rest {
+    for position in &mut rest {
         for (k, n) in size.into_iter().enumerate() {
-            if place[k] > 0.0 && place[k] < n as f32 {
-                place[k] += random.between(-0.2, 0.2);
+            if position[k] > 0.0 && position[k] < n as f32 {
+                position[k] += random.between(-0.2, 0.2);
             }
         }
     }
@@ -74,7 +75,7 @@ pub fn shaken(size: [usize; 3], seed: u64) -> Mesh {
     (rest, cells)
 }
 
-/// A cell with its corners turned as bodies ask for.
+/// Returns a cell with its corners in the orientation that bodies require.
 pub fn upright(rest: &[Vec3], [a, b, c, d]: [u32; 4]) -> [u32; 4] {
     if volume([a, b, c, d].map(|node| rest[node as usize].as_dvec3())) > 0.0 {
         [a, b, c, d]
@@ -111,7 +112,7 @@ impl Body {
         Self { solid, follower }
     }
 
-    /// The blade's edge goes straight from one place to another, all in the rest shape.
+    /// Moves the blade's edge straight from one position to another, both in the rest shape.
     pub fn sweep(&self, start: [Vec3; 2], end: [Vec3; 2]) -> Sweep {
         Sweep {
             start: start.map(self.deformation),
@@ -138,10 +139,10 @@ impl Body {
         Ok(changes)
     }
 
-    /// The blade's edge goes along a line of places, stopping at each.
+    /// Moves the blade's edge along a line of positions, stopping at each.
     pub fn cut_along(&mut self, edges: &[[Vec3; 2]]) {
-        for way in edges.windows(2) {
-            self.cut(way[0], way[1]);
+        for pair in edges.windows(2) {
+            self.cut(pair[0], pair[1]);
         }
     }
 
@@ -152,20 +153,24 @@ impl Body {
         });
     }
 
-    /// Checks all that has to hold whatever was cut; returns the number of pieces.
+    /// Checks all invariants; returns the number of pieces.
     pub fn check(&self) -> usize {
-        self.check_drawn();
+        self.check_render_mesh();
         self.check_material();
         self.check_masses();
         self.check_springs(self.solid.cells().iter().map(|cell| cell.nodes), &EDGES);
         let (pieces, simulated) = (self.piece_volumes().len(), self.simulated_pieces());
-        assert_eq!(pieces, simulated, "pieces of material, and that nodes hang together in");
+        assert_eq!(
+            pieces, simulated,
+            "pieces of material, and connected components of nodes"
+        );
         assert_eq!(pieces, self.solid.piece_count().unwrap() as usize);
         pieces
     }
 
-    /// What is drawn is a closed manifold about the material, and is what the change lists made of the first.
-    pub fn check_drawn(&self) {
+    /// Checks that the render mesh is a closed manifold around the material, and equals the first one updated by the
+    /// change lists.
+    pub fn check_render_mesh(&self) {
         let triangles = self.solid.triangles();
         assert_eq!(self.triangles.len(), triangles.len());
         let mut sides = BTreeMap::new();
@@ -176,7 +181,7 @@ impl Body {
             assert_eq!(
                 self.triangles[number],
                 self.solid.corner_points(number as u32),
-                "triangle {number} as lists tell it"
+                "triangle {number} differs from the change lists"
             );
             let [a, b, c] = triangle.corners.map(|corner| self.solid.rest_place(corner) - center);
             enclosed += a.dot(b.cross(c)) / 6.0;
@@ -208,7 +213,7 @@ impl Body {
                     break;
                 }
             }
-            assert_eq!(count, about.len(), "the triangles about vertex {vertex} are one fan");
+            assert_eq!(count, about.len(), "the triangles around vertex {vertex} are one fan");
         }
         let material: f64 = self.first_sizes.iter().sum();
         assert!(
@@ -217,30 +222,30 @@ impl Body {
         );
         let (mut known, mut bound) = (BTreeSet::new(), 0);
         for (number, vertex) in self.solid.vertices().iter().enumerate() {
-            let off = self.carried[vertex.point as usize].distance(self.solid.rest_place(number as u32));
-            assert!(off < 1e-9, "vertex {number} carries what its sources did, {off} off");
+            let error = self.carried[vertex.point as usize].distance(self.solid.rest_place(number as u32));
+            assert!(error < 1e-9, "vertex {number} differs from its sources by {error}");
             assert!(known.insert(vertex.point), "point {} is two vertices", vertex.point);
             if vertex.point == vertex.nodes[0] {
                 assert_eq!(vertex.weights[0], 1.0);
             } else {
                 bound += 1;
-                let told = &self.bound[&vertex.point];
-                assert_eq!(told, &(vertex.nodes, vertex.weights));
+                let reported = &self.bound[&vertex.point];
+                assert_eq!(reported, &(vertex.nodes, vertex.weights));
             }
         }
         assert_eq!(bound, self.bound.len());
     }
 
-    /// No material is lost: each cell is filled exactly, and what it was copied from too.
+    /// Checks that no material is lost: each cell is filled exactly, and so is each cell it was copied from.
     pub fn check_material(&self) {
         let mut filled = vec![0.0; self.solid.cells().len()];
         for (number, tetrahedron) in self.solid.tetrahedra().iter().enumerate() {
-            let places = tetrahedron.corners.map(|corner| self.solid.rest_place(corner));
-            let volume = volume(places);
+            let positions = tetrahedron.corners.map(|corner| self.solid.rest_place(corner));
+            let volume = volume(positions);
             let first = self.first_sizes[self.cell_sources[tetrahedron.cell as usize] as usize];
             assert!(tetrahedron.volume > 0.0);
             assert!(
-                (volume - tetrahedron.volume).abs() < 1e-12 * first.max(places[0].length_squared()),
+                (volume - tetrahedron.volume).abs() < 1e-12 * first.max(positions[0].length_squared()),
                 "tetrahedron {number}: {volume} and {}",
                 tetrahedron.volume
             );
@@ -279,7 +284,7 @@ impl Body {
         }
     }
 
-    /// Which piece each tetrahedron is in, found by shared faces alone.
+    /// Returns the piece of each tetrahedron, found by shared faces only.
     pub fn piece_of_each(&self) -> Vec<u32> {
         let tetrahedra = self.solid.tetrahedra();
         let mut union = Union::new(tetrahedra.len());
@@ -296,7 +301,7 @@ impl Body {
         (0..tetrahedra.len() as u32).map(|at| union.root(at)).collect()
     }
 
-    /// The volumes of the pieces, in the rest shape, in ascending order.
+    /// Returns the volumes of the pieces, in the rest shape, in ascending order.
     pub fn piece_volumes(&self) -> Vec<f64> {
         let mut volumes = BTreeMap::new();
         for (tetrahedron, piece) in self.solid.tetrahedra().iter().zip(self.piece_of_each()) {
@@ -309,25 +314,25 @@ impl Body {
 }
 
 /// The block at rest.
-pub fn flat(place: Vec3) -> Vec3 {
-    place
+pub fn flat(position: Vec3) -> Vec3 {
+    position
 }
 
 /// The block sheared, stretched and bent.
-pub fn bent(place: Vec3) -> Vec3 {
+pub fn bent(position: Vec3) -> Vec3 {
     vec3(
-        1.3 * place.x + 0.2 * place.y,
-        0.8 * place.y + 0.2 * (0.5 * place.x).sin(),
-        1.1 * place.z + 0.3 * (0.6 * place.y).cos(),
+        1.3 * position.x + 0.2 * position.y,
+        0.8 * position.y + 0.2 * (0.5 * position.x).sin(),
+        1.1 * position.z + 0.3 * (0.6 * position.y).cos(),
     )
 }
 
-/// The block 2000 edges off, where rounding of places is 1e-4 of an edge.
-pub fn far(place: Vec3) -> Vec3 {
-    bent(place) + vec3(2000.0, -1700.0, 900.0)
+/// The block 2000 edges away, where rounding of positions is 1e-4 of an edge.
+pub fn far(position: Vec3) -> Vec3 {
+    bent(position) + vec3(2000.0, -1700.0, 900.0)
 }
 
-/// The largest snapping distance of all cells.
+/// Returns the largest snapping distance of all cells.
 pub fn snap(body: &Body) -> f64 {
     body.solid.cells().iter().map(|cell| cell.snap).fold(0.0, f64::max)
 }

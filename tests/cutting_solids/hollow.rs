@@ -1,4 +1,4 @@
-//! A hollow solid: cuts in its wall leave what it encloses, until one reaches it.
+//! A hollow solid: cuts in its wall leave its cavity closed, until one reaches it.
 
 use glam::{Vec3, vec3};
 use sinew::cutting::Sweep;
@@ -9,7 +9,7 @@ use crate::support::kept::kept;
 use crate::support::scene::SOLVERS;
 
 #[test]
-fn a_hollow_block_keeps_its_pressure_until_it_is_reached() {
+fn a_hollow_block_keeps_its_pressure_until_a_cut_reaches_it() {
     for solver in SOLVERS {
         let (rest, cells) = shaken([5, 5, 5], 6);
         let middle = |cell: &[u32; 4]| cell.iter().map(|&node| rest[node as usize]).sum::<Vec3>() / 4.0;
@@ -18,7 +18,7 @@ fn a_hollow_block_keeps_its_pressure_until_it_is_reached() {
             .filter(|cell| (middle(cell) - Vec3::splat(2.5)).abs().max_element() > 0.5)
             .map(|&cell| upright(&rest, cell))
             .collect();
-        let rest: Vec<Vec3> = rest.iter().map(|&place| 0.01 * place).collect();
+        let rest: Vec<Vec3> = rest.iter().map(|&position| 0.01 * position).collect();
         let mut world = World::new(WorldDefinition {
             gravity: Vec3::ZERO,
             ..Default::default()
@@ -51,7 +51,7 @@ fn a_hollow_block_keeps_its_pressure_until_it_is_reached() {
                 end: edge(0.07),
             }
         };
-        // Through the cells below the hollow, whose upper corners are its floor.
+        // Through the cells below the cavity, whose upper corners are its floor.
         let before = (kept(&world, body), world.body(body).unwrap().enclosed());
         assert_eq!(before.1.cavity_count, 1);
         assert_eq!(world.cut(body, &through(0.0125)).unwrap().pieces_parted, 1);

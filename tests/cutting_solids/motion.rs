@@ -1,4 +1,4 @@
-//! Solids that are cut while they move: what is kept, whatever they are made of, keeps their springs and moves them.
+//! Solids that are cut in motion: conserved quantities, with every material, storage and solver.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -16,17 +16,17 @@ use crate::support::kept::kept;
 use crate::support::random::Random;
 use crate::support::scene::SOLVERS;
 
-/// What a body is made of.
+/// The material of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Matter {
     Springs,
     Elements,
     Viscous,
     Both,
-    /// Elements that keep their volume by rings.
+    /// Elements with average nodal pressure.
     Rings,
     ViscousRings,
-    /// Elements with fibres, and a skin that bends.
+    /// Elements with fibers, and a skin that resists bending.
     Fibres,
     NeoHookean,
     MooneyRivlinRings,
@@ -48,7 +48,7 @@ const MATTER: [Matter; 9] = [
 pub fn mesh() -> Mesh {
     let (rest, cells) = shaken([6, 5, 4], 3);
     let cells = cells.iter().map(|&cell| upright(&rest, cell)).collect();
-    (rest.iter().map(|&place| 0.01 * place).collect(), cells)
+    (rest.iter().map(|&position| 0.01 * position).collect(), cells)
 }
 
 fn edges_of(cells: &[[u32; 4]]) -> Vec<[u32; 2]> {
@@ -147,13 +147,13 @@ pub fn in_flight(matter: Matter, solver: Solver, storage: Storage) -> (World, Bo
     let centre = positions.iter().sum::<Vec3>() / positions.len() as f32;
     let velocities: Vec<Vec3> = positions
         .iter()
-        .map(|&place| vec3(0.3, -0.2, 0.1) + vec3(3.0, 2.0, 6.0).cross(place - centre) + random.point(-0.1, 0.1))
+        .map(|&position| vec3(0.3, -0.2, 0.1) + vec3(3.0, 2.0, 6.0).cross(position - centre) + random.point(-0.1, 0.1))
         .collect();
     world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
     (world, body)
 }
 
-/// A blade's edge along z through a point of the rest shape, in m, where the block is now.
+/// Returns a blade's edge along z through a point of the rest shape (m), at the block's current positions.
 pub fn edge(body: &Body, [x, y]: [f32; 2], depth: [f32; 2]) -> [Vec3; 2] {
     let positions = body.positions();
     // Corners of the block, far from each other.
@@ -186,16 +186,16 @@ fn cuts_in_motion_keep_mass_momentum_and_energy_in_the_other_cases() {
     });
 }
 
-/// Each matter with a solver, and each solver with a matter: NEWTON, which takes long, with one.
+/// Each material with a solver, and each solver with a material; NEWTON, which is slow, with one.
 fn is_short(matter: usize, solver: Solver) -> bool {
     solver == SOLVERS[if matter == 1 { 2 } else { matter % 2 }]
 }
 
-fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_tried: fn(usize, Solver, Storage) -> bool) {
+fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_selected: fn(usize, Solver, Storage) -> bool) {
     for (number, matter) in MATTER.into_iter().enumerate() {
         for solver in SOLVERS {
             for storage in [Storage::Packed, Storage::FastLink, Storage::DynamicBulk] {
-                if !is_tried(number, solver, storage) {
+                if !is_selected(number, solver, storage) {
                     continue;
                 }
                 if storage != Storage::Packed && (solver == Solver::Newton || matter == Matter::Elements) {
@@ -210,7 +210,7 @@ fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_tried: fn(usize, Solver, S
                     }
                     let before = kept(&world, body);
                     let it = world.body(body).unwrap();
-                    // A blade that goes on waits where it stopped while the block moves on.
+                    // A continued stroke starts at the blade's last position, although the block has moved.
                     let start = last.filter(|&(at, _)| at == from).map(|(_, edge)| edge);
                     let sweep = Sweep {
                         start: start.unwrap_or(edge(it, from, depth)),
@@ -224,7 +224,7 @@ fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_tried: fn(usize, Solver, S
                     assert!(report.area > 1e-4 && report.length > 0.0, "{what}: {report:?}");
                     after.check_motion(&before, &what);
                     let gained = after.energy - before.energy;
-                    // Hinges of a skin that are cut through are gone.
+                    // Severed hinges of a skin are removed.
                     assert!(
                         gained < 1e-6 * before.energy && (gained > -1e-6 * before.energy || matter == Matter::Fibres),
                         "{what}: energy {} {}",
@@ -235,48 +235,48 @@ fn cuts_in_motion_keep_mass_momentum_and_energy_of(is_tried: fn(usize, Solver, S
                 assert_eq!(world.body(body).unwrap().pieces().unwrap().count, pieces, "{what}");
                 assert_eq!(pieces, 4, "{what}");
 
-                let at_last = kept(&world, body);
+                let at_end = kept(&world, body);
                 for _ in 0..100 {
                     world.step(1e-3).unwrap();
                 }
                 let later = kept(&world, body);
                 assert!(
-                    later.energy < 1.02 * at_last.energy,
+                    later.energy < 1.02 * at_end.energy,
                     "{what}: {} {}",
-                    at_last.energy,
+                    at_end.energy,
                     later.energy
                 );
-                assert!(later.momentum.distance(at_last.momentum) < 1e-4 * at_last.momentum.length());
+                assert!(later.momentum.distance(at_end.momentum) < 1e-4 * at_end.momentum.length());
             }
         }
     }
 }
 
-/// What is drawn is closed, turned outward, and has this volume with nodes at these places.
-pub fn enclosed(surface: &[[u32; 3]], place: impl Fn(u32) -> DVec3) -> f64 {
+/// Returns the volume of the render surface with nodes at these positions; it must be closed and oriented outward.
+pub fn enclosed(surface: &[[u32; 3]], position: impl Fn(u32) -> DVec3) -> f64 {
     let mut sides = BTreeMap::new();
     let mut volume = 0.0;
-    let origin = place(surface[0][0]);
+    let origin = position(surface[0][0]);
     for corners in surface {
-        let [a, b, c] = corners.map(|corner| place(corner) - origin);
+        let [a, b, c] = corners.map(|corner| position(corner) - origin);
         volume += a.dot(b.cross(c)) / 6.0;
         for k in 0..3 {
             *sides.entry((corners[k], corners[(k + 1) % 3])).or_insert(0) += 1;
         }
     }
     for (&(from, to), count) in &sides {
-        assert_eq!(sides.get(&(to, from)), Some(count), "what lies across {from} and {to}");
+        assert_eq!(sides.get(&(to, from)), Some(count), "opposite side of {from} and {to}");
     }
     volume
 }
 
 #[test]
-fn a_mesh_of_its_own_follows_the_list() {
+fn a_separate_mesh_follows_the_change_lists() {
     let (mut world, body) = in_flight(Matter::Elements, Solver::Verlet, Storage::Packed);
     let it = world.body(body).unwrap();
     let mut triangles = it.surface().to_vec();
-    let mut carried: Vec<DVec3> = it.positions().iter().map(|place| place.as_dvec3()).collect();
-    let whole = enclosed(&triangles, |node| carried[node as usize]);
+    let mut tracked: Vec<DVec3> = it.positions().iter().map(|position| position.as_dvec3()).collect();
+    let whole = enclosed(&triangles, |node| tracked[node as usize]);
     assert!((whole / 1.2e-4 - 1.0).abs() < 1e-6, "{whole}");
     let mut version = 0;
     for [from, to, depth] in CUTS {
@@ -296,37 +296,37 @@ fn a_mesh_of_its_own_follows_the_list() {
             let changes = it.changes_since(version).unwrap();
             version = changes.version;
             for new in changes.nodes {
-                assert_eq!(new.node as usize, carried.len());
-                let place = (0..3)
-                    .map(|k| f64::from(new.weights[k]) * carried[new.sources[k] as usize])
+                assert_eq!(new.node as usize, tracked.len());
+                let position = (0..3)
+                    .map(|k| f64::from(new.weights[k]) * tracked[new.sources[k] as usize])
                     .sum();
-                carried.push(place);
+                tracked.push(position);
             }
             triangles.resize(it.surface().len(), [0; 3]);
             for &triangle in changes.triangles {
                 triangles[triangle as usize] = it.surface()[triangle as usize];
             }
             assert_eq!(triangles, it.surface());
-            let now = enclosed(&triangles, |node| carried[node as usize]);
+            let now = enclosed(&triangles, |node| tracked[node as usize]);
             assert!((now / whole - 1.0).abs() < 1e-6, "{now} of {whole} m³ is drawn");
         }
     }
 }
 
 #[test]
-fn what_is_cut_off_falls_and_what_is_held_stays() {
-    what_is_cut_off_falls_and_what_is_held_stays_of(is_short);
+fn cut_off_tissue_falls_and_held_tissue_stays() {
+    cut_off_tissue_falls_and_held_tissue_stays_of(is_short);
 }
 
 #[test]
 #[ignore = "long"]
-fn what_is_cut_off_falls_and_what_is_held_stays_in_the_other_cases() {
-    what_is_cut_off_falls_and_what_is_held_stays_of(|matter, solver| !is_short(matter, solver));
+fn cut_off_tissue_falls_and_held_tissue_stays_in_the_other_cases() {
+    cut_off_tissue_falls_and_held_tissue_stays_of(|matter, solver| !is_short(matter, solver));
 }
 
-fn what_is_cut_off_falls_and_what_is_held_stays_of(is_tried: fn(usize, Solver) -> bool) {
+fn cut_off_tissue_falls_and_held_tissue_stays_of(is_selected: fn(usize, Solver) -> bool) {
     for (number, matter) in MATTER.into_iter().enumerate() {
-        for solver in SOLVERS.into_iter().filter(|&solver| is_tried(number, solver)) {
+        for solver in SOLVERS.into_iter().filter(|&solver| is_selected(number, solver)) {
             let (mut world, body) = made(matter, solver, Storage::Packed, vec3(0.0, -9.81, 0.0));
             let (rest, _) = mesh();
             for node in (0..rest.len()).filter(|&node| rest[node].y > 0.049) {
@@ -353,11 +353,11 @@ fn what_is_cut_off_falls_and_what_is_held_stays_of(is_tried: fn(usize, Solver) -
             let centre = |world: &World| {
                 let it = world.body(body).unwrap();
                 let (mut sum, mut mass) = (DVec3::ZERO, 0.0);
-                for (node, place) in (0..).zip(it.positions()) {
+                for (node, position) in (0..).zip(it.positions()) {
                     if pieces.of_nodes[node as usize] == pieces.of_nodes[0] {
-                        let of_node = f64::from(it.node_mass(node).unwrap());
-                        sum += of_node * place.as_dvec3();
-                        mass += of_node;
+                        let node_mass = f64::from(it.node_mass(node).unwrap());
+                        sum += node_mass * position.as_dvec3();
+                        mass += node_mass;
                     }
                 }
                 sum / mass
@@ -369,7 +369,7 @@ fn what_is_cut_off_falls_and_what_is_held_stays_of(is_tried: fn(usize, Solver) -
             for _ in 0..30 {
                 world.step(2e-3).unwrap();
             }
-            // Nothing holds it any more. Implicit steps of first order fall by a step more.
+            // Nothing holds it any more. First-order implicit steps fall by one step more.
             let fallen = start.y - centre(&world).y;
             let free = 0.5 * 9.81 * time * time;
             assert!(
@@ -389,17 +389,17 @@ fn what_is_cut_off_falls_and_what_is_held_stays_of(is_tried: fn(usize, Solver) -
 }
 
 #[test]
-fn a_stroke_through_tissue_that_gapes_leaves_no_bridge() {
-    a_stroke_through_tissue_that_gapes_leaves_no_bridge_of(0..8);
+fn a_stroke_through_opening_tissue_leaves_no_bridge() {
+    a_stroke_through_opening_tissue_leaves_no_bridge_of(0..8);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_stroke_through_tissue_that_gapes_leaves_no_bridge_in_the_other_rounds() {
-    a_stroke_through_tissue_that_gapes_leaves_no_bridge_of(8..24);
+fn a_stroke_through_opening_tissue_leaves_no_bridge_in_the_other_rounds() {
+    a_stroke_through_opening_tissue_leaves_no_bridge_of(8..24);
 }
 
-fn a_stroke_through_tissue_that_gapes_leaves_no_bridge_of(rounds: Range<usize>) {
+fn a_stroke_through_opening_tissue_leaves_no_bridge_of(rounds: Range<usize>) {
     let (rest, cells) = mesh();
     let mut random = Random(8);
     for round in 0..rounds.end {
@@ -408,7 +408,7 @@ fn a_stroke_through_tissue_that_gapes_leaves_no_bridge_of(rounds: Range<usize>) 
             continue;
         }
         let solver = SOLVERS[round % 2];
-        let positions: Vec<Vec3> = rest.iter().map(|&place| place * vec3(1.2, 1.0, 1.0)).collect();
+        let positions: Vec<Vec3> = rest.iter().map(|&position| position * vec3(1.2, 1.0, 1.0)).collect();
         let mut world = World::new(WorldDefinition::default()).unwrap();
         let body = world
             .create_body(&BodyDefinition {
@@ -455,7 +455,7 @@ fn a_stroke_through_tissue_that_gapes_leaves_no_bridge_of(rounds: Range<usize>) 
 }
 
 #[test]
-fn tetrahedra_may_be_turned_either_way() {
+fn tetrahedra_may_have_either_orientation() {
     let (positions, cells) = mesh();
     let turned: Vec<[u32; 4]> = (0..)
         .zip(&cells)
@@ -494,7 +494,7 @@ fn two_blades_in_one_solid_have_a_stroke_each() {
     let (mut world, body) = made(Matter::Elements, Solver::Verlet, Storage::Packed, Vec3::ZERO);
     let it = world.body(body).unwrap();
     // They cross, one after the other.
-    let ways = [
+    let paths = [
         [
             edge(it, [-0.01, 0.021], [-0.02, 0.06]),
             edge(it, [0.07, 0.027], [-0.02, 0.06]),
@@ -504,14 +504,14 @@ fn two_blades_in_one_solid_have_a_stroke_each() {
             edge(it, [0.033, 0.06], [-0.02, 0.06]),
         ],
     ];
-    let blades = ways.map(|[start, _]| {
+    let blades = paths.map(|[start, _]| {
         let middle = 0.5 * (start[0] + start[1]);
         let mut definition = BladeDefinition::new(start.map(|end| end - middle));
         definition.pose.position = middle;
         world.create_blade(&definition).unwrap()
     });
     for step in 1..=40 {
-        for ((&blade, [start, end]), wait) in blades.iter().zip(&ways).zip([0, 10]) {
+        for ((&blade, [start, end]), wait) in blades.iter().zip(&paths).zip([0, 10]) {
             let [from, to] = [start, end].map(|edge| 0.5 * (edge[0] + edge[1]));
             let part = ((step - wait) as f32 / 30.0).clamp(0.0, 1.0);
             world.set_blade_pose(blade, from.lerp(to, part), None).unwrap();

@@ -1,4 +1,4 @@
-//! Organs as they come: uneven tetrahedra with slivers, hollows and necks.
+//! Organ meshes: uneven tetrahedra with slivers, cavities and necks.
 
 use std::collections::BTreeMap;
 use std::f32::consts::TAU;
@@ -16,7 +16,8 @@ use crate::support::kept::kept;
 use crate::support::random::Random;
 use crate::support::scene::SOLVERS;
 
-/// Real meshes, said aloud where they are missing, and one that always is there; each 10 long about the origin.
+/// Real meshes, with a report of missing files, and one that is always available; each is scaled to length 10 about the
+/// origin.
 fn organs() -> Vec<(String, Mesh)> {
     let made = Loaded::organ(0.2, 0.02).unwrap();
     let mut all = vec![("Mesh::organ".to_string(), made)];
@@ -46,13 +47,16 @@ fn organs() -> Vec<(String, Mesh)> {
         let low = mesh.positions.iter().copied().reduce(Vec3::min).unwrap();
         let high = mesh.positions.iter().copied().reduce(Vec3::max).unwrap();
         let scale = 10.0 / (high - low).max_element();
-        let places = mesh.positions.iter().map(|&place| scale * (place - 0.5 * (low + high)));
-        (places.collect(), mesh.tetrahedra)
+        let positions = mesh
+            .positions
+            .iter()
+            .map(|&position| scale * (position - 0.5 * (low + high)));
+        (positions.collect(), mesh.tetrahedra)
     };
     all.into_iter().map(|(name, mesh)| (name, sized(mesh))).collect()
 }
 
-/// No piece has material farther than the snapping distance on both sides of where the blade went.
+/// Checks that no piece has material farther than the snapping distance on both sides of the blade's path.
 fn assert_parted(what: &str, body: &Body, side: impl Fn(DVec3) -> f64) {
     let far = 2.0 * snap(body);
     let mut sides: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
@@ -63,9 +67,9 @@ fn assert_parted(what: &str, body: &Body, side: impl Fn(DVec3) -> f64) {
             .iter()
             .sum::<DVec3>()
             / 4.0;
-        let off = side(middle);
-        if off.abs() > far {
-            sides.entry(piece).or_default()[usize::from(off > 0.0)] += tetrahedron.volume;
+        let distance = side(middle);
+        if distance.abs() > far {
+            sides.entry(piece).or_default()[usize::from(distance > 0.0)] += tetrahedron.volume;
         }
     }
     let mixed: Vec<_> = sides.iter().filter(|(_, [a, b])| *a > 0.0 && *b > 0.0).collect();
@@ -74,17 +78,17 @@ fn assert_parted(what: &str, body: &Body, side: impl Fn(DVec3) -> f64) {
 }
 
 #[test]
-fn planes_part_organs() {
-    planes_part_organs_of(0..1);
+fn planes_separate_organs() {
+    planes_separate_organs_of(0..1);
 }
 
 #[test]
 #[ignore = "long"]
-fn planes_part_organs_in_the_other_rounds() {
-    planes_part_organs_of(1..6);
+fn planes_separate_organs_in_the_other_rounds() {
+    planes_separate_organs_of(1..6);
 }
 
-fn planes_part_organs_of(rounds: Range<usize>) {
+fn planes_separate_organs_of(rounds: Range<usize>) {
     for (name, mesh) in organs() {
         let mut random = Random(31);
         for round in 0..rounds.end {
@@ -97,31 +101,31 @@ fn planes_part_organs_of(rounds: Range<usize>) {
             }
             let mut body = Body::new(mesh.clone(), flat);
             let steps = [1, 7, 40][round % 3];
-            let ways: Vec<[Vec3; 2]> = (0..=steps)
+            let edges: Vec<[Vec3; 2]> = (0..=steps)
                 .map(|step| 40.0 * step as f32 / steps as f32 - 20.0)
                 .map(|x| [at(x, -20.0), at(x, 20.0)])
                 .collect();
-            body.cut_along(&ways);
+            body.cut_along(&edges);
             let what = format!("{name}, round {round}");
             body.check();
             let normal = (turn * Vec3::Y).as_dvec3();
-            assert_parted(&what, &body, |place| (place - through.as_dvec3()).dot(normal));
+            assert_parted(&what, &body, |position| (position - through.as_dvec3()).dot(normal));
         }
     }
 }
 
 #[test]
-fn curved_strokes_and_loops_part_organs() {
-    curved_strokes_and_loops_part_organs_of(0..1);
+fn curved_strokes_and_loops_separate_organs() {
+    curved_strokes_and_loops_separate_organs_of(0..1);
 }
 
 #[test]
 #[ignore = "long"]
-fn curved_strokes_and_loops_part_organs_in_the_other_rounds() {
-    curved_strokes_and_loops_part_organs_of(1..4);
+fn curved_strokes_and_loops_separate_organs_in_the_other_rounds() {
+    curved_strokes_and_loops_separate_organs_of(1..4);
 }
 
-fn curved_strokes_and_loops_part_organs_of(rounds: Range<usize>) {
+fn curved_strokes_and_loops_separate_organs_of(rounds: Range<usize>) {
     for (name, mesh) in organs() {
         let mut random = Random(32);
         for round in 0..rounds.end {
@@ -129,7 +133,7 @@ fn curved_strokes_and_loops_part_organs_of(rounds: Range<usize>) {
                 Quat::from_rotation_y(random.between(0.0, TAU)) * Quat::from_rotation_x(random.between(0.0, TAU));
             let (middle, radius) = (random.point(-1.0, 1.0), random.between(1.5, 2.5));
             let steps = [60, 90][round % 2];
-            let ways: Vec<[Vec3; 2]> = (0..=steps)
+            let edges: Vec<[Vec3; 2]> = (0..=steps)
                 .map(|step| (step % steps) as f32 / steps as f32 * TAU)
                 .map(|angle| [-20.0, 20.0].map(|z| middle + turn * vec3(radius * angle.cos(), radius * angle.sin(), z)))
                 .collect();
@@ -137,22 +141,22 @@ fn curved_strokes_and_loops_part_organs_of(rounds: Range<usize>) {
                 continue;
             }
             let mut body = Body::new(mesh.clone(), flat);
-            body.cut_along(&ways);
+            body.cut_along(&edges);
             let what = format!("{name}, round {round}");
             body.check();
             let (back, middle) = (turn.inverse().as_dquat(), middle.as_dvec3());
-            // As a polygon it is inside of the circle.
+            // As a polygon it is inside the circle.
             let sagged = f64::from(radius) * (1.0 - (std::f64::consts::PI / f64::from(steps)).cos());
-            assert_parted(&what, &body, |place| {
-                let off = (back * (place - middle)).truncate().length() - f64::from(radius) + 0.5 * sagged;
-                if off.abs() < sagged { 0.0 } else { off }
+            assert_parted(&what, &body, |position| {
+                let distance = (back * (position - middle)).truncate().length() - f64::from(radius) + 0.5 * sagged;
+                if distance.abs() < sagged { 0.0 } else { distance }
             });
         }
     }
 }
 
 #[test]
-fn a_t_and_crossings_of_organs() {
+fn t_cuts_and_crossings_in_organs() {
     for (name, mesh) in organs() {
         let plane = |at: f32, axis: usize| -> [[Vec3; 2]; 2] {
             let (u, v) = ([Vec3::Y, Vec3::Z, Vec3::X][axis], [Vec3::Z, Vec3::X, Vec3::Y][axis]);
@@ -163,10 +167,12 @@ fn a_t_and_crossings_of_organs() {
         for (at, axis) in [(0.113, 0), (-0.071, 1), (0.057, 2)] {
             body.cut_along(&plane(at, axis));
             body.check();
-            let off = f64::from(at);
-            assert_parted(&format!("{name}, axis {axis}"), &body, |place| place[axis] - off);
+            let offset = f64::from(at);
+            assert_parted(&format!("{name}, axis {axis}"), &body, |position| {
+                position[axis] - offset
+            });
         }
-        // The foot ends in the cut across.
+        // The foot ends in the transverse cut.
         let mut body = Body::new(mesh, flat);
         body.cut_along(&plane(0.113, 0));
         body.cut_along(&[
@@ -174,9 +180,9 @@ fn a_t_and_crossings_of_organs() {
             [vec3(-0.4, 0.05, -20.0), vec3(-0.4, 0.05, 20.0)],
         ]);
         body.check();
-        assert_parted(&format!("{name}, T"), &body, |place| place.x - 0.113);
-        assert_parted(&format!("{name}, T"), &body, |place| {
-            if place.x > 0.113 { place.y - 0.05 } else { 0.0 }
+        assert_parted(&format!("{name}, T"), &body, |position| position.x - 0.113);
+        assert_parted(&format!("{name}, T"), &body, |position| {
+            if position.x > 0.113 { position.y - 0.05 } else { 0.0 }
         });
     }
 }
@@ -199,7 +205,7 @@ fn organs_in_motion_keep_mass_momentum_and_volume_of(cases: Range<usize>) {
                 continue;
             }
             let what = format!("{name}, elements {has_elements}, {solver:?}");
-            let positions: Vec<Vec3> = rest.iter().map(|&place| 0.01 * place).collect();
+            let positions: Vec<Vec3> = rest.iter().map(|&position| 0.01 * position).collect();
             let mut masses = vec![0.0; positions.len()];
             for cell in &cells {
                 let [a, b, c, d] = cell.map(|node| positions[node as usize]);
@@ -224,7 +230,7 @@ fn organs_in_motion_keep_mass_momentum_and_volume_of(cases: Range<usize>) {
                     tetrahedra: &cells,
                     stiffnesses: Values::Uniform(if has_elements { 0.0 } else { 5.0 }),
                     material: has_elements.then_some(elements),
-                    // What is added is found anew after a cut, and its motion counts.
+                    // Added mass is recomputed after a cut, and its momentum would count.
                     mass_scaling: 0.0,
                     spare_nodes: 60_000,
                     solver,
@@ -234,12 +240,12 @@ fn organs_in_motion_keep_mass_momentum_and_volume_of(cases: Range<usize>) {
                 .unwrap();
             let velocities: Vec<Vec3> = positions
                 .iter()
-                .map(|&place| vec3(0.3, -0.2, 0.1) + vec3(1.0, 2.0, 3.0).cross(place))
+                .map(|&position| vec3(0.3, -0.2, 0.1) + vec3(1.0, 2.0, 3.0).cross(position))
                 .collect();
             world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
-            let mut carried: Vec<DVec3> = positions.iter().map(|place| place.as_dvec3()).collect();
+            let mut tracked: Vec<DVec3> = positions.iter().map(|position| position.as_dvec3()).collect();
             let mut triangles = world.body(body).unwrap().surface().to_vec();
-            let whole = enclosed(&triangles, |node| carried[node as usize]);
+            let whole = enclosed(&triangles, |node| tracked[node as usize]);
             let (mut version, mut pieces, mut random) = (0, 1, Random(33));
             for cut in 0..4 {
                 world.step(5e-4).unwrap();
@@ -268,10 +274,10 @@ fn organs_in_motion_keep_mass_momentum_and_volume_of(cases: Range<usize>) {
                 let changes = it.changes_since(version).unwrap();
                 version = changes.version;
                 for new in changes.nodes {
-                    assert_eq!(new.node as usize, carried.len());
-                    carried.push(
+                    assert_eq!(new.node as usize, tracked.len());
+                    tracked.push(
                         (0..3)
-                            .map(|k| f64::from(new.weights[k]) * carried[new.sources[k] as usize])
+                            .map(|k| f64::from(new.weights[k]) * tracked[new.sources[k] as usize])
                             .sum(),
                     );
                 }
@@ -280,7 +286,7 @@ fn organs_in_motion_keep_mass_momentum_and_volume_of(cases: Range<usize>) {
                     triangles[triangle as usize] = it.surface()[triangle as usize];
                 }
                 assert_eq!(triangles, it.surface(), "{what}");
-                let now = enclosed(&triangles, |node| carried[node as usize]);
+                let now = enclosed(&triangles, |node| tracked[node as usize]);
                 assert!((now / whole - 1.0).abs() < 1e-6, "{what}: {now} of {whole} m³");
                 assert_eq!(it.pieces().unwrap().count, pieces, "{what}");
             }
@@ -293,7 +299,7 @@ fn organs_in_motion_keep_mass_momentum_and_volume_of(cases: Range<usize>) {
                     .unwrap()
                     .positions()
                     .iter()
-                    .all(|place| place.is_finite()),
+                    .all(|position| position.is_finite()),
                 "{what}"
             );
         }

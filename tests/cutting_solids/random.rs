@@ -1,4 +1,4 @@
-//! Many cuts at random: nothing breaks, cuts that close part what they should, and what is simulated stays well shaped.
+//! Many random cuts: nothing breaks, closed cuts separate pieces, and simulation elements stay well shaped.
 
 use std::ops::Range;
 
@@ -8,24 +8,24 @@ use crate::support::random::Random;
 use glam::{Vec3, vec3};
 use sinew::cutting::{Limits, Sweep};
 
-/// Upright, or leaning a little.
+/// Upright, or slightly tilted.
 fn edge(x: f32, y: f32, lean: [f32; 2]) -> [Vec3; 2] {
     let lean = vec3(lean[0], lean[1], 0.0);
     [vec3(x, y, -4.0) - 3.0 * lean, vec3(x, y, 8.0) + 3.0 * lean]
 }
 
 #[test]
-fn loops_of_any_size_and_pace_cut_a_piece_out() {
-    loops_of_any_size_and_pace_cut_a_piece_out_of(0..30);
+fn loops_of_any_size_and_speed_cut_a_piece_out() {
+    loops_of_any_size_and_speed_cut_a_piece_out_of(0..30);
 }
 
 #[test]
 #[ignore = "long"]
-fn loops_of_any_size_and_pace_cut_a_piece_out_in_more_rounds() {
-    loops_of_any_size_and_pace_cut_a_piece_out_of(30..90);
+fn loops_of_any_size_and_speed_cut_a_piece_out_in_more_rounds() {
+    loops_of_any_size_and_speed_cut_a_piece_out_of(30..90);
 }
 
-fn loops_of_any_size_and_pace_cut_a_piece_out_of(rounds: Range<usize>) {
+fn loops_of_any_size_and_speed_cut_a_piece_out_of(rounds: Range<usize>) {
     let blocks = [block([6, 6, 3]), shaken([6, 6, 3], 6), shaken([6, 6, 3], 7)];
     // Bends are no tighter than the elements: 0.65 edges.
     for round in rounds {
@@ -50,17 +50,17 @@ fn loops_of_any_size_and_pace_cut_a_piece_out_of(rounds: Range<usize>) {
 }
 
 #[test]
-fn wild_strokes_from_side_to_side_part_a_block() {
-    wild_strokes_from_side_to_side_part_a_block_of(0..30);
+fn random_strokes_from_side_to_side_separate_a_block() {
+    random_strokes_from_side_to_side_separate_a_block_of(0..30);
 }
 
 #[test]
 #[ignore = "long"]
-fn wild_strokes_from_side_to_side_part_a_block_in_more_rounds() {
-    wild_strokes_from_side_to_side_part_a_block_of(30..90);
+fn random_strokes_from_side_to_side_separate_a_block_in_more_rounds() {
+    random_strokes_from_side_to_side_separate_a_block_of(30..90);
 }
 
-fn wild_strokes_from_side_to_side_part_a_block_of(rounds: Range<usize>) {
+fn random_strokes_from_side_to_side_separate_a_block_of(rounds: Range<usize>) {
     let blocks = [block([6, 6, 3]), shaken([6, 6, 3], 8), shaken([6, 6, 3], 9)];
     for round in rounds {
         let mut random = Random(200_000 + round as u64);
@@ -89,17 +89,17 @@ fn wild_strokes_from_side_to_side_part_a_block_of(rounds: Range<usize>) {
 }
 
 #[test]
-fn three_hundred_cuts_in_a_row() {
-    cuts_in_a_row(block([8, 8, 6]), 300, 1);
+fn three_hundred_cuts_in_sequence() {
+    cuts_in_sequence(block([8, 8, 6]), 300, 1);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_thousand_cuts_in_a_row() {
-    cuts_in_a_row(shaken([8, 8, 6], 5), 1000, 2);
+fn a_thousand_cuts_in_sequence() {
+    cuts_in_sequence(shaken([8, 8, 6], 5), 1000, 2);
 }
 
-fn cuts_in_a_row(mesh: Mesh, cuts: usize, seed: u64) {
+fn cuts_in_sequence(mesh: Mesh, cuts: usize, seed: u64) {
     let mut body = Body::new(mesh, bent);
     let (nodes, tetrahedra, triangles) = (
         body.positions.len(),
@@ -111,19 +111,19 @@ fn cuts_in_a_row(mesh: Mesh, cuts: usize, seed: u64) {
     let mut worst = 0.0f64;
     for cut in 0..cuts {
         let start = random.point(-1.0, 9.0);
-        let (edge, way, turn) = (
+        let (edge, displacement, turn) = (
             random.point(-2.0, 2.0),
             random.point(-1.5, 1.5),
             random.point(-0.5, 0.5),
         );
-        // The wounds gape, and nodes go where they like.
+        // The wounds open, and nodes move at random.
         let Follower { positions, rest, .. } = &mut body.follower;
-        for (place, &rest) in positions.iter_mut().zip(&*rest) {
-            *place = bent(rest) + random.point(-0.1, 0.1);
+        for (position, &rest) in positions.iter_mut().zip(&*rest) {
+            *position = bent(rest) + random.point(-0.1, 0.1);
         }
         let sweep = Sweep {
             start: [start, start + edge],
-            end: [start + way, start + way + edge + turn],
+            end: [start + displacement, start + displacement + edge + turn],
         };
         let near = body.solid.near(&sweep, &body.positions).unwrap();
         let changes = body
@@ -142,7 +142,7 @@ fn cuts_in_a_row(mesh: Mesh, cuts: usize, seed: u64) {
         body.solid.triangles().len() - triangles,
     ];
     assert!(worst < 2.0, "stiffness by mass {worst} times what it was");
-    // A cut crosses some 20 edges, with five tetrahedra about each, and again those that earlier cuts have made of them.
+    // A cut crosses about 20 edges with five tetrahedra around each, and the elements that earlier cuts created.
     assert!(
         more[0] < 2 * cuts && more[1] < 120 * cuts && more[2] < 80 * cuts,
         "more nodes, tetrahedra, triangles: {more:?}"

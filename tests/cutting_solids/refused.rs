@@ -1,12 +1,12 @@
-//! What is refused changes nothing, and a cut can be taken back.
+//! Refused cuts change nothing, and a cut can be undone.
 
 use super::block::{Body, bent, block, shaken};
 use glam::{Vec3, vec3};
 use sinew::Error;
 use sinew::cutting::{CutSolid, Limits, Sweep};
 
-/// All that is in a solid.
-fn seen(solid: &CutSolid) -> String {
+/// Returns the full state of a solid as text.
+fn state_text(solid: &CutSolid) -> String {
     format!(
         "{:?} {:?} {:?} {:?} {:?}",
         solid.cells(),
@@ -30,7 +30,7 @@ fn cut_twice() -> Body {
     body
 }
 
-/// One that crosses both, and ends inside.
+/// A cut that crosses both, and ends inside.
 const THIRD: [[Vec3; 2]; 2] = [
     [vec3(2.0, 4.6, -1.0), vec3(2.2, 4.6, 4.0)],
     [vec3(2.9, 0.6, -1.0), vec3(2.7, 0.5, 4.0)],
@@ -39,7 +39,7 @@ const THIRD: [[Vec3; 2]; 2] = [
 #[test]
 fn a_cut_beyond_the_limits_changes_nothing() {
     let mut body = cut_twice();
-    let before = seen(&body.solid);
+    let before = state_text(&body.solid);
     let room = |solid: &CutSolid| {
         [
             solid.node_count(),
@@ -64,7 +64,7 @@ fn a_cut_beyond_the_limits_changes_nothing() {
             most[refused] -= left;
             let answer = body.try_cut(THIRD[0], THIRD[1], limits(most));
             assert!(matches!(answer, Err(Error::Capacity(_))), "{answer:?}");
-            assert_eq!(seen(&body.solid), before);
+            assert_eq!(state_text(&body.solid), before);
         }
     }
     assert!(body.try_cut(THIRD[0], THIRD[1], limits(needed)).is_ok());
@@ -72,22 +72,22 @@ fn a_cut_beyond_the_limits_changes_nothing() {
 }
 
 #[test]
-fn a_cut_that_is_taken_back_leaves_no_trace() {
+fn an_undone_cut_leaves_no_trace() {
     let mut body = cut_twice();
-    let before = seen(&body.solid);
+    let before = state_text(&body.solid);
     let sweep = body.sweep(THIRD[0], THIRD[1]);
     let near = body.solid.near(&sweep, &body.positions).unwrap();
     let first = body
         .solid
         .cut(&sweep, &body.follower.positions, &near, Limits::NONE)
         .unwrap();
-    let after = seen(&body.solid);
+    let after = state_text(&body.solid);
     assert_ne!(after, before);
     body.solid.undo();
-    assert_eq!(seen(&body.solid), before);
+    assert_eq!(state_text(&body.solid), before);
     body.solid.undo();
-    assert_eq!(seen(&body.solid), before);
-    // Whatever the order of the candidates, and whatever others there are.
+    assert_eq!(state_text(&body.solid), before);
+    // For any order of the candidates, and with additional ones.
     let mut all: Vec<u32> = (0..body.solid.cells().len() as u32).rev().collect();
     all.extend(&near);
     let again = body
@@ -95,18 +95,18 @@ fn a_cut_that_is_taken_back_leaves_no_trace() {
         .cut(&sweep, &body.follower.positions, &all, Limits::NONE)
         .unwrap();
     assert_eq!(first, again);
-    assert_eq!(seen(&body.solid), after);
+    assert_eq!(state_text(&body.solid), after);
     body.apply(&again);
     body.check();
 }
 
 #[test]
-fn a_stroke_goes_on_from_a_step_that_was_taken_back() {
-    let place = |x: f32| [vec3(x, 2.2, -1.0), vec3(x, 1.9, 5.0)];
+fn a_stroke_continues_after_an_undone_step() {
+    let position = |x: f32| [vec3(x, 2.2, -1.0), vec3(x, 1.9, 5.0)];
     let mut body = Body::new(block([4, 4, 4]), bent);
     let mut other = Body::new(block([4, 4, 4]), bent);
     for at in 0..60 {
-        let [from, to] = [at, at + 1].map(|at| place(0.1 * at as f32 - 1.0));
+        let [from, to] = [at, at + 1].map(|at| position(0.1 * at as f32 - 1.0));
         let astray = body.sweep(from, [to[0] + vec3(0.5, 1.0, 0.0), to[1] + vec3(0.5, 1.0, 0.0)]);
         let near = body.solid.near(&astray, &body.positions).unwrap();
         body.solid
@@ -115,7 +115,7 @@ fn a_stroke_goes_on_from_a_step_that_was_taken_back() {
         body.solid.undo();
         body.cut(from, to);
         other.cut(from, to);
-        assert_eq!(seen(&body.solid), seen(&other.solid));
+        assert_eq!(state_text(&body.solid), state_text(&other.solid));
     }
     assert_eq!(body.check(), 2);
 }
@@ -123,17 +123,17 @@ fn a_stroke_goes_on_from_a_step_that_was_taken_back() {
 #[test]
 fn arguments_are_checked() {
     let mut body = cut_twice();
-    let before = seen(&body.solid);
+    let before = state_text(&body.solid);
     let sweep = body.sweep(THIRD[0], THIRD[1]);
     let near = body.solid.near(&sweep, &body.positions).unwrap();
-    let refused = |body: &mut Body, sweep: &Sweep, positions: &[Vec3], near: &[u32], told: &str| {
+    let refused = |body: &mut Body, sweep: &Sweep, positions: &[Vec3], near: &[u32], expected_message: &str| {
         let message = body
             .solid
             .cut(sweep, positions, near, Limits::NONE)
             .unwrap_err()
             .to_string();
-        assert!(message.contains(told), "{message}");
-        assert_eq!(seen(&body.solid), before);
+        assert!(message.contains(expected_message), "{message}");
+        assert_eq!(state_text(&body.solid), before);
     };
     let positions = body.positions.clone();
     refused(&mut body, &sweep, &positions[1..], &near, "positions for");
@@ -150,11 +150,11 @@ fn arguments_are_checked() {
 }
 
 #[test]
-fn solids_that_are_not_sound_are_refused() {
+fn invalid_solids_are_refused() {
     let (rest, cells) = block([2, 2, 2]);
-    let refused = |rest: &[Vec3], cells: &[[u32; 4]], told: &str| {
+    let refused = |rest: &[Vec3], cells: &[[u32; 4]], expected_message: &str| {
         let message = CutSolid::new(rest, cells, &[]).unwrap_err().to_string();
-        assert!(message.contains(told), "{message}");
+        assert!(message.contains(expected_message), "{message}");
     };
     let mut twice = cells.clone();
     twice.push(cells[3]);
@@ -176,7 +176,7 @@ fn solids_that_are_not_sound_are_refused() {
     let mut broken = rest.clone();
     broken[4].z = f32::NAN;
     refused(&broken, &cells, "rest position 4");
-    // Cells may be given either way round.
+    // Cells may have either orientation.
     let turned: Vec<[u32; 4]> = cells.iter().map(|&[a, b, c, d]| [b, a, c, d]).collect();
     assert!(CutSolid::new(&rest, &turned, &[]).is_ok());
 }

@@ -1,5 +1,5 @@
-//! Nearly incompressible solids that are cut: rings of tetrahedra that keep their volume fall apart, without a jolt, and each piece comes to the
-//! rest shape that it has by itself.
+//! Nearly incompressible solids that are cut: average nodal pressures separate without a jolt, and each piece reaches
+//! its own rest shape.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ use crate::support::scene::SOLVERS;
 struct Tissue {
     poisson_ratio: f32,
     solver: Solver,
-    /// N s/m of each node.
+    /// Damping of each node (N s/m).
     damping: f32,
     is_viscous: bool,
     gravity: f32,
@@ -36,17 +36,17 @@ const FREE: Tissue = Tissue {
     substeps: 0,
 };
 
-/// The block, with its nodes at `place` of where they are at rest.
-fn tissue(of: Tissue, place: impl Fn(Vec3) -> Vec3) -> (World, BodyId) {
+/// The block, with its nodes moved from rest by `place`.
+fn tissue(parameters: Tissue, place: impl Fn(Vec3) -> Vec3) -> (World, BodyId) {
     let (rest, cells) = mesh();
     let positions: Vec<Vec3> = rest.iter().map(|&rest| place(rest)).collect();
     let mut world = World::new(WorldDefinition {
-        gravity: vec3(0.0, of.gravity, 0.0),
-        substeps: of.substeps,
+        gravity: vec3(0.0, parameters.gravity, 0.0),
+        substeps: parameters.substeps,
         ..Default::default()
     })
     .unwrap();
-    let time = if of.is_viscous { 0.05 } else { 0.0 };
+    let time = if parameters.is_viscous { 0.05 } else { 0.0 };
     let body = world
         .create_body(&BodyDefinition {
             positions: &positions,
@@ -55,7 +55,7 @@ fn tissue(of: Tissue, place: impl Fn(Vec3) -> Vec3) -> (World, BodyId) {
             material: Some(Material {
                 model: Model::Tetrahedra,
                 young_modulus: 3000.0,
-                poisson_ratio: of.poisson_ratio,
+                poisson_ratio: parameters.poisson_ratio,
                 density: 1000.0,
                 ..Default::default()
             }),
@@ -63,9 +63,9 @@ fn tissue(of: Tissue, place: impl Fn(Vec3) -> Vec3) -> (World, BodyId) {
                 retardation_time: time,
                 relaxation_time: time,
             },
-            node_dampings: Values::Uniform(of.damping),
+            node_dampings: Values::Uniform(parameters.damping),
             spare_nodes: 3000,
-            solver: of.solver,
+            solver: parameters.solver,
             ..Default::default()
         })
         .unwrap();
@@ -80,51 +80,51 @@ fn stretched(rest: Vec3) -> Vec3 {
     )
 }
 
-/// Where all points are at rest, as who follows the list of changes knows.
-fn carried(body: &Body) -> Vec<DVec3> {
-    let mut places: Vec<DVec3> = mesh().0.iter().map(|rest| rest.as_dvec3()).collect();
+/// Returns the rest positions of all points, tracked by change lists.
+fn tracked_rest_positions(body: &Body) -> Vec<DVec3> {
+    let mut positions: Vec<DVec3> = mesh().0.iter().map(|rest| rest.as_dvec3()).collect();
     for new in body.changes_since(0).unwrap().nodes {
-        let place = (0..3).map(|k| f64::from(new.weights[k]) * places[new.sources[k] as usize]);
-        places.push(place.sum());
+        let place = (0..3).map(|k| f64::from(new.weights[k]) * positions[new.sources[k] as usize]);
+        positions.push(place.sum());
     }
-    places
+    positions
 }
 
-/// What is drawn of each piece: its triangles.
-fn skins(body: &Body) -> Vec<Vec<[u32; 3]>> {
+/// Returns the triangles of each piece's surface.
+fn piece_surfaces(body: &Body) -> Vec<Vec<[u32; 3]>> {
     let pieces = body.pieces().unwrap();
-    let mut skins = BTreeMap::new();
+    let mut piece_surfaces = BTreeMap::new();
     for &corners in body.surface() {
-        let of: &mut Vec<[u32; 3]> = skins.entry(pieces.of_nodes[corners[0] as usize]).or_default();
-        of.push(corners);
+        let triangles: &mut Vec<[u32; 3]> = piece_surfaces.entry(pieces.of_nodes[corners[0] as usize]).or_default();
+        triangles.push(corners);
     }
-    skins.into_values().collect()
+    piece_surfaces.into_values().collect()
 }
 
-/// By how much distances between drawn points of a piece are off from those at rest at most, m.
-fn off_rest(body: &Body, rest: &[DVec3]) -> f64 {
-    let mut off = 0.0_f64;
-    for skin in skins(body) {
+/// Returns the largest difference between distances of a piece's surface points and those at rest (m).
+fn distance_error(body: &Body, rest: &[DVec3]) -> f64 {
+    let mut error = 0.0_f64;
+    for skin in piece_surfaces(body) {
         let mut points: Vec<u32> = skin.into_iter().flatten().collect();
         points.sort_unstable();
         points.dedup();
         for (k, &a) in points.iter().enumerate() {
             for &b in &points[..k] {
                 let [from, to] = [a, b].map(|point| body.positions()[point as usize].as_dvec3());
-                off = off.max((from.distance(to) - rest[a as usize].distance(rest[b as usize])).abs());
+                error = error.max((from.distance(to) - rest[a as usize].distance(rest[b as usize])).abs());
             }
         }
     }
-    off
+    error
 }
 
-/// How far the volume of any piece is off that at rest, as a part of it.
-fn off_volume(body: &Body, rest: &[DVec3]) -> f64 {
-    let of_piece = |skin: Vec<[u32; 3]>| {
+/// Returns the largest relative volume error of a piece.
+fn volume_error(body: &Body, rest: &[DVec3]) -> f64 {
+    let piece_volume = |skin: Vec<[u32; 3]>| {
         let now = enclosed(&skin, |point| body.positions()[point as usize].as_dvec3());
         (now / enclosed(&skin, |point| rest[point as usize]) - 1.0).abs()
     };
-    skins(body).into_iter().map(of_piece).fold(0.0, f64::max)
+    piece_surfaces(body).into_iter().map(piece_volume).fold(0.0, f64::max)
 }
 
 fn cut_across(world: &mut World, body: BodyId) {
@@ -138,8 +138,8 @@ fn cut_across(world: &mut World, body: BodyId) {
 }
 
 #[test]
-fn a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume() {
-    a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume_of(&[
+fn a_piece_reaches_its_own_rest_shape_and_keeps_its_volume() {
+    a_piece_reaches_its_own_rest_shape_and_keeps_its_volume_of(&[
         (Solver::Verlet, 0.49, false),
         (Solver::Implicit, 0.45, true),
     ]);
@@ -147,69 +147,69 @@ fn a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume() {
 
 #[test]
 #[ignore = "long"]
-fn a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume_in_the_other_cases() {
-    a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume_of(&[
+fn a_piece_reaches_its_own_rest_shape_and_keeps_its_volume_in_the_other_cases() {
+    a_piece_reaches_its_own_rest_shape_and_keeps_its_volume_of(&[
         (Solver::Verlet, 0.45, true),
         (Solver::Implicit, 0.49, false),
         (Solver::Newton, 0.49, false),
     ]);
 }
 
-fn a_piece_comes_to_its_own_rest_shape_and_keeps_its_volume_of(cases: &[(Solver, f32, bool)]) {
+fn a_piece_reaches_its_own_rest_shape_and_keeps_its_volume_of(cases: &[(Solver, f32, bool)]) {
     for &(solver, poisson_ratio, is_viscous) in cases {
         let what = format!("{poisson_ratio}, {solver:?}");
-        let of = Tissue {
+        let parameters = Tissue {
             poisson_ratio,
             solver,
             is_viscous,
             damping: 0.02,
             ..FREE
         };
-        let (mut world, body) = tissue(of, stretched);
+        let (mut world, body) = tissue(parameters, stretched);
         for _ in 0..10 {
             world.step(2e-3).unwrap();
         }
         cut_across(&mut world, body);
         let it = world.body(body).unwrap();
-        let rest = carried(it);
-        assert!(off_rest(it, &rest) > 1e-3, "{what}: strained as it is cut");
-        // As near to incompressible as the whole was: what presses it is some part of Young's modulus.
-        let most = (2.0 * off_volume(it, &rest)).max(0.01);
+        let rest = tracked_rest_positions(it);
+        assert!(distance_error(it, &rest) > 1e-3, "{what}: strained when it is cut");
+        // As nearly incompressible as the whole body: the pressure is a fraction of Young's modulus.
+        let most = (2.0 * volume_error(it, &rest)).max(0.01);
         for step in 0..400 {
             world.step(2e-3).unwrap();
             if step % 10 == 0 {
-                let off = off_volume(world.body(body).unwrap(), &rest);
+                let error = volume_error(world.body(body).unwrap(), &rest);
                 assert!(
-                    off < most,
-                    "{what}: a volume is off by {off}, {most} expected, at {step}"
+                    error < most,
+                    "{what}: a volume is off by {error}, {most} expected, at {step}"
                 );
             }
         }
         let it = world.body(body).unwrap();
-        let off = off_rest(it, &rest);
-        assert!(off < 1e-4 * 0.06, "{what}: {off} m off the rest shape");
-        assert!(off_volume(it, &rest) < 1e-4, "{what}");
+        let error = distance_error(it, &rest);
+        assert!(error < 1e-4 * 0.06, "{what}: {error} m off the rest shape");
+        assert!(volume_error(it, &rest) < 1e-4, "{what}");
     }
 }
 
-/// A state of rest knows nothing of the past.
+/// A static equilibrium does not depend on the history.
 #[test]
-fn under_load_it_comes_to_rest_where_it_would_without_a_past() {
+fn under_load_it_rests_as_without_history() {
     for solver in [Solver::Verlet, Solver::Implicit] {
-        let of = Tissue {
+        let parameters = Tissue {
             solver,
             damping: 0.02,
             gravity: -9.81,
             ..FREE
         };
-        let (mut world, body) = tissue(of, |rest| rest);
+        let (mut world, body) = tissue(parameters, |rest| rest);
         let (rest, _) = mesh();
         for node in (0..rest.len()).filter(|&node| rest[node].y > 0.049) {
             world.body_mut(body).unwrap().pin(node as u32).unwrap();
         }
         world.rest_state(body, &RestStateDefinition::default()).unwrap();
         let it = world.body(body).unwrap();
-        // Not through: nothing falls.
+        // Not all the way through: nothing falls.
         let sweep = Sweep {
             start: edge(it, [0.027, -0.03], [-0.03, 0.07]),
             end: edge(it, [0.031, 0.033], [-0.03, 0.07]),
@@ -221,30 +221,33 @@ fn under_load_it_comes_to_rest_where_it_would_without_a_past() {
         }
         let settled = world.body(body).unwrap().positions().to_vec();
         world.rest_state(body, &RestStateDefinition::default()).unwrap();
-        let way = |from: &[Vec3]| {
-            let places = world.body(body).unwrap().positions().iter();
-            places.zip(from).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
+        let displacement = |from: &[Vec3]| {
+            let positions = world.body(body).unwrap().positions().iter();
+            positions.zip(from).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
         };
-        let (moved, off) = (way(&start), way(&settled));
+        let (moved, error) = (displacement(&start), displacement(&settled));
         assert!(moved > 5e-4, "{solver:?}: the wound opened by {moved} m");
-        assert!(off < 1e-3 * 0.06, "{solver:?}: {off} m off where it would be at rest");
+        assert!(
+            error < 1e-3 * 0.06,
+            "{solver:?}: {error} m off where it would be at rest"
+        );
     }
 }
 
 #[test]
-fn no_energy_comes_in_afterwards() {
-    no_energy_comes_in_afterwards_of(|matter, solver| matter == Matter::ViscousRings && solver != Solver::Newton);
+fn no_energy_is_added_afterwards() {
+    no_energy_is_added_afterwards_of(|matter, solver| matter == Matter::ViscousRings && solver != Solver::Newton);
 }
 
 #[test]
 #[ignore = "long"]
-fn no_energy_comes_in_afterwards_in_the_other_cases() {
-    no_energy_comes_in_afterwards_of(|matter, solver| matter == Matter::Rings || solver == Solver::Newton);
+fn no_energy_is_added_afterwards_in_the_other_cases() {
+    no_energy_is_added_afterwards_of(|matter, solver| matter == Matter::Rings || solver == Solver::Newton);
 }
 
-fn no_energy_comes_in_afterwards_of(is_tried: fn(Matter, Solver) -> bool) {
+fn no_energy_is_added_afterwards_of(is_selected: fn(Matter, Solver) -> bool) {
     for matter in [Matter::Rings, Matter::ViscousRings] {
-        for solver in SOLVERS.into_iter().filter(|solver| is_tried(matter, *solver)) {
+        for solver in SOLVERS.into_iter().filter(|solver| is_selected(matter, *solver)) {
             let what = format!("{matter:?}, {solver:?}");
             let mut tops = [f64::MIN; 2];
             for (cuts, top) in [0, CUTS.len()].into_iter().zip(&mut tops) {
@@ -280,9 +283,9 @@ fn no_energy_comes_in_afterwards_of(is_tried: fn(Matter, Solver) -> bool) {
     }
 }
 
-/// What is held cannot pay for what fades.
+/// Fully pinned tissue does no work, so the fading pressure offset can only dissipate energy.
 #[test]
-fn fading_by_itself_takes_energy() {
+fn fading_dissipates_energy() {
     for solver in SOLVERS {
         let (mut world, body) = tissue(Tissue { solver, ..FREE }, stretched);
         for node in 0..mesh().0.len() {
@@ -303,9 +306,9 @@ fn fading_by_itself_takes_energy() {
 
 #[test]
 fn a_refused_step_leaves_everything_as_it_was() {
-    let of = Tissue { substeps: 1, ..FREE };
+    let parameters = Tissue { substeps: 1, ..FREE };
     let hash_after = |is_refused: bool| {
-        let (mut world, body) = tissue(of, stretched);
+        let (mut world, body) = tissue(parameters, stretched);
         cut_across(&mut world, body);
         for _ in 0..40 {
             world.step(1e-4).unwrap();
@@ -323,13 +326,13 @@ fn a_refused_step_leaves_everything_as_it_was() {
     assert_eq!(hash_after(true), hash_after(false));
 }
 
-/// Where places are set the past is forgotten, and nothing but that sets the states apart.
+/// Setting positions clears the history, which is the only difference of the states.
 #[test]
-fn the_state_hash_knows_the_past() {
+fn the_state_hash_includes_the_history() {
     for (poisson_ratio, has_rings) in [(0.3, false), (0.49, true)] {
-        let of = Tissue { poisson_ratio, ..FREE };
+        let parameters = Tissue { poisson_ratio, ..FREE };
         let hash = |forgets: bool| {
-            let (mut world, body) = tissue(of, stretched);
+            let (mut world, body) = tissue(parameters, stretched);
             let put = |world: &mut World| {
                 let positions = world.body(body).unwrap().positions().to_vec();
                 world.body_mut(body).unwrap().set_positions(&positions).unwrap();
@@ -351,7 +354,7 @@ fn threads_agree() {
     let cells: Vec<[u32; 4]> = cells.iter().map(|&cell| upright(&rest, cell)).collect();
     let positions: Vec<Vec3> = rest.iter().map(|&rest| stretched(0.001 * rest)).collect();
     let rest: Vec<Vec3> = rest.iter().map(|&rest| 0.001 * rest).collect();
-    assert!(rest.len() > 8192, "so many are shared out");
+    assert!(rest.len() > 8192, "enough for several threads");
     let hashes = |thread_count: u32| {
         let mut world = World::new(WorldDefinition {
             thread_count,

@@ -1,4 +1,4 @@
-//! Cuts of all shapes, through blocks of all kinds: what has to be kept is kept, and pieces count as expected.
+//! Cuts of all shapes, through blocks of all kinds: conserved quantities and the expected number of pieces.
 
 use super::block::{Body, bent, block, far, flat, shaken};
 use glam::{Vec3, vec3};
@@ -13,7 +13,7 @@ fn blocks() -> Vec<Body> {
     bodies
 }
 
-/// The blade's edge upright at a point, through all of the block.
+/// Returns the blade's edge upright at a point, through all of the block.
 fn upright(x: f32, y: f32) -> [Vec3; 2] {
     [vec3(x, y, -3.0), vec3(x, y, 7.0)]
 }
@@ -29,14 +29,14 @@ fn cut(body: &mut Body, lines: &[&[[Vec3; 2]]]) -> usize {
 }
 
 #[test]
-fn a_plane_parts_a_block_in_two() {
+fn a_plane_separates_a_block_in_two() {
     for mut body in blocks() {
         assert_eq!(cut(&mut body, &[&[upright(-2.0, 2.3), upright(8.0, 3.6)]]), 2);
     }
 }
 
 #[test]
-fn planes_through_nodes_edges_and_faces_part_too() {
+fn planes_through_nodes_edges_and_faces_separate_too() {
     for ends in [
         [upright(-2.0, 3.0), upright(8.0, 3.0)],
         [upright(3.0, 8.0), upright(3.0, -2.0)],
@@ -60,7 +60,7 @@ fn planes_through_nodes_edges_and_faces_part_too() {
 }
 
 #[test]
-fn planes_that_cross_part_a_block_in_four() {
+fn crossing_planes_separate_a_block_in_four() {
     for mut body in blocks() {
         let (one, other) = (
             [upright(-2.0, 2.3), upright(8.0, 3.6)],
@@ -71,7 +71,7 @@ fn planes_that_cross_part_a_block_in_four() {
 }
 
 #[test]
-fn a_t_parts_a_block_in_three() {
+fn a_t_cut_separates_a_block_in_three() {
     for mut body in blocks() {
         let (one, other) = (
             [upright(-2.0, 2.3), upright(8.0, 3.6)],
@@ -82,7 +82,7 @@ fn a_t_parts_a_block_in_three() {
 }
 
 #[test]
-fn a_cut_that_pauses_goes_on() {
+fn a_cut_that_pauses_continues() {
     for (number, mut body) in blocks().into_iter().enumerate() {
         assert_eq!(cut(&mut body, &[&[upright(-2.0, 2.3), upright(3.4, 3.0)]]), 1);
         assert_eq!(
@@ -137,17 +137,17 @@ fn a_closed_loop_cuts_a_piece_out() {
 
 #[test]
 fn far_from_the_origin() {
-    let off = vec3(2000.0, -1700.0, 900.0);
+    let offset = vec3(2000.0, -1700.0, 900.0);
     for (mut rest, cells) in [block([6, 6, 4]), shaken([6, 6, 4], 3)] {
-        for place in &mut rest {
-            *place += off;
+        for position in &mut rest {
+            *position += offset;
         }
         let mut body = Body::new((rest, cells), flat);
         let circle: Vec<[Vec3; 2]> = (0..=30)
             .map(|at| (at % 30) as f32 / 30.0 * std::f32::consts::TAU)
-            .map(|angle| upright(3.1 + 1.8 * angle.cos(), 2.9 + 1.8 * angle.sin()).map(|end| end + off))
+            .map(|angle| upright(3.1 + 1.8 * angle.cos(), 2.9 + 1.8 * angle.sin()).map(|end| end + offset))
             .collect();
-        let plane = [upright(-2.0, 2.3), upright(8.0, 3.6)].map(|edge| edge.map(|end| end + off));
+        let plane = [upright(-2.0, 2.3), upright(8.0, 3.6)].map(|edge| edge.map(|end| end + offset));
         assert_eq!(cut(&mut body, &[&circle]), 2);
         assert_eq!(cut(&mut body, &[&plane]), 4);
     }

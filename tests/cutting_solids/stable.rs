@@ -1,4 +1,4 @@
-//! Cuts leave substeps about as long as they were: no copy of a node carries more for its mass than nodes about it did.
+//! Cuts hardly shorten substeps: no copy of a node has more stiffness per mass than the nodes around it had.
 
 use std::f32::consts::TAU;
 
@@ -12,20 +12,20 @@ use crate::support::random::Random;
 use crate::support::tissue::world;
 
 #[test]
-fn hundreds_of_cuts_of_elements_leave_substeps_as_long_as_they_were() {
-    let (stable, first) = cut_often(Model::Tetrahedra);
+fn hundreds_of_cuts_of_elements_keep_the_substep() {
+    let (stable, first) = least_substep_while_cutting(Model::Tetrahedra);
     assert!(stable > 0.999 * first, "{stable} of {first} s");
 }
 
-/// The bound of springs counts the masses at both ends: a copy beside a lighter one has a higher bound than it had.
+/// The bound for springs includes the masses at both ends: a copy beside a lighter one has a higher bound than before.
 #[test]
 fn hundreds_of_cuts_of_springs_leave_more_than_half_of_a_substep() {
-    let (stable, first) = cut_often(Model::Springs);
+    let (stable, first) = least_substep_while_cutting(Model::Springs);
     assert!(stable > 0.7 * first, "{stable} of {first} s");
 }
 
-/// The shortest stable substep while an organ of these is cut, and the one before it, s.
-fn cut_often(model: Model) -> (f32, f32) {
+/// Returns the shortest stable substep while an organ of this model is cut, and the one before cutting (s).
+fn least_substep_while_cutting(model: Model) -> (f32, f32) {
     let organ = Mesh::organ(0.12, 0.006).unwrap();
     let mut world = world(Vec3::ZERO);
     let body = world
@@ -33,7 +33,7 @@ fn cut_often(model: Model) -> (f32, f32) {
             positions: &organ.positions,
             tetrahedra: &organ.tetrahedra,
             masses: Values::Uniform(1e-4),
-            // What is added would hide what a cut does.
+            // Added mass would hide the effect of a cut.
             mass_scaling: 0.0,
             spare_nodes: 60_000,
             stiffnesses: Values::Uniform(0.0),

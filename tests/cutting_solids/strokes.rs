@@ -1,4 +1,4 @@
-//! Cuts of solids in motion that meet each other, and strokes that are open.
+//! Crossing cuts of solids in motion, and open strokes.
 
 use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
@@ -10,10 +10,10 @@ use crate::support::scene::SOLVERS;
 
 const THROUGH: [f32; 2] = [-0.02, 0.06];
 
-/// Strokes through a block of 6, 5 and 4 cm, each from a point to another, and how many pieces they leave.
-type Figure = (&'static str, Vec<[[f32; 2]; 2]>, u32);
+/// Strokes through a block of 6, 5 and 4 cm, each from one point to another, and the number of pieces.
+type StrokePattern = (&'static str, Vec<[[f32; 2]; 2]>, u32);
 
-fn figures() -> Vec<Figure> {
+fn stroke_patterns() -> Vec<StrokePattern> {
     vec![
         (
             "a cross",
@@ -50,30 +50,34 @@ fn figures() -> Vec<Figure> {
 fn volume_of(body: &Body, rest: &mut Vec<DVec3>) -> f64 {
     for new in &body.changes_since(0).unwrap().nodes[rest.len() - 210..] {
         assert_eq!(new.node as usize, rest.len());
-        let place = (0..3).map(|k| f64::from(new.weights[k]) * rest[new.sources[k] as usize]);
-        rest.push(place.sum());
+        let position = (0..3).map(|k| f64::from(new.weights[k]) * rest[new.sources[k] as usize]);
+        rest.push(position.sum());
     }
     enclosed(body.surface(), |node| rest[node as usize])
 }
 
 #[test]
-fn cuts_that_meet_in_motion_keep_mass_momentum_and_volume() {
-    cuts_that_meet_in_motion_keep_mass_momentum_and_volume_of(&SOLVERS[..2]);
+fn crossing_cuts_in_motion_keep_mass_momentum_and_volume() {
+    crossing_cuts_in_motion_keep_mass_momentum_and_volume_of(&SOLVERS[..2]);
 }
 
 #[test]
 #[ignore = "long"]
-fn cuts_that_meet_in_motion_keep_mass_momentum_and_volume_with_newton() {
-    cuts_that_meet_in_motion_keep_mass_momentum_and_volume_of(&SOLVERS[2..]);
+fn crossing_cuts_in_motion_keep_mass_momentum_and_volume_with_newton() {
+    crossing_cuts_in_motion_keep_mass_momentum_and_volume_of(&SOLVERS[2..]);
 }
 
-fn cuts_that_meet_in_motion_keep_mass_momentum_and_volume_of(solvers: &[Solver]) {
-    for (figure, strokes, expected) in figures() {
+fn crossing_cuts_in_motion_keep_mass_momentum_and_volume_of(solvers: &[Solver]) {
+    for (figure, strokes, expected) in stroke_patterns() {
         for matter in [Matter::Springs, Matter::Elements] {
             for &solver in solvers {
                 let what = format!("{figure}, {matter:?}, {solver:?}");
                 let (mut world, body) = in_flight(matter, solver, Storage::Packed);
-                let mut rest: Vec<DVec3> = super::motion::mesh().0.iter().map(|place| place.as_dvec3()).collect();
+                let mut rest: Vec<DVec3> = super::motion::mesh()
+                    .0
+                    .iter()
+                    .map(|position| position.as_dvec3())
+                    .collect();
                 assert_eq!(rest.len(), 210);
                 let mut pieces = 1;
                 for [from, to] in &strokes {
@@ -102,7 +106,7 @@ fn cuts_that_meet_in_motion_keep_mass_momentum_and_volume_of(solvers: &[Solver])
                 }
                 let counted = world.body(body).unwrap().pieces().unwrap().count;
                 assert_eq!(counted, pieces, "{what}");
-                // Where three meet there may be a seventh piece between them.
+                // Where three cuts meet there may be a seventh piece between them.
                 let is_right = if expected == 0 {
                     (6..=7).contains(&pieces)
                 } else {
@@ -132,7 +136,7 @@ fn a_refused_cut_leaves_the_stroke_and_the_step_open() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let mut worlds = [with_open_stroke(solver), with_open_stroke(solver)];
         for (world, body, stopped) in &mut worlds {
-            // What is held has to have its step closed before it is copied.
+            // A held node's step must be closed before it is copied.
             world.body_mut(*body).unwrap().pin(100).unwrap();
             world.step(1e-3).unwrap();
             let _ = stopped;
@@ -150,7 +154,7 @@ fn a_refused_cut_leaves_the_stroke_and_the_step_open() {
             assert!(world.cut(*body, &sweep).is_err());
             assert_eq!(world.state_hash(), hash, "{solver:?}");
         }
-        // Both go on as if nothing had been asked.
+        // Both continue as if nothing had been requested.
         for (world, body, stopped) in &mut worlds {
             let sweep = Sweep { start: *stopped, end };
             let report = world.cut(*body, &sweep).unwrap();
@@ -162,14 +166,14 @@ fn a_refused_cut_leaves_the_stroke_and_the_step_open() {
 }
 
 #[test]
-fn a_cut_that_rows_have_no_room_for_leaves_the_step_open() {
+fn a_cut_that_exceeds_the_rows_leaves_the_step_open() {
     let (mut world, body) = in_flight(Matter::Springs, Solver::Verlet, Storage::FastLink);
     let at = |i: u32, j: u32, k: u32| (k * 6 + j) * 7 + i;
-    // Rows are full on both sides, and what is held there has its step closed before it is copied.
+    // Rows are full on both sides, and a held node's step must be closed before it is copied.
     let it = world.body_mut(body).unwrap();
     let mut is_full = false;
     for full in (1..4).flat_map(|k| (2..4).flat_map(move |j| (1..6).map(move |i| at(i, j, k)))) {
-        // On the same side of the cut, so that it leaves them.
+        // On the same side of the cut, which therefore does not sever them.
         let side = |node: u32| node / 7 % 6 < 3;
         for other in (0..210).filter(|&other| other != full && side(other) == side(full)) {
             match it.add_spring(full, other, 1.0, Some(0.02)) {
@@ -197,8 +201,8 @@ fn a_cut_that_rows_have_no_room_for_leaves_the_step_open() {
 }
 
 #[test]
-fn what_strokes_are_open_is_in_the_hash() {
-    // An edge that stopped beside the block, and one that did so elsewhere: nothing but the stroke differs.
+fn open_strokes_are_in_the_hash() {
+    // An edge that stopped beside the block, and one that stopped elsewhere: only the stroke differs.
     let hashes = [0.023_f32, 0.03].map(|y| {
         let (mut world, body) = in_flight(Matter::Springs, Solver::Verlet, Storage::Packed);
         world.step(1e-3).unwrap();
@@ -224,36 +228,36 @@ fn blades_that_cross_in_one_instant_leave_no_bridge_in_the_other_cases() {
     blades_that_cross_in_one_instant_leave_no_bridge_of(|matter, steps| matter != Matter::Springs || steps != 60);
 }
 
-fn blades_that_cross_in_one_instant_leave_no_bridge_of(is_tried: fn(Matter, usize) -> bool) {
+fn blades_that_cross_in_one_instant_leave_no_bridge_of(is_selected: fn(Matter, usize) -> bool) {
     for (matter, solver) in [
         (Matter::Elements, Solver::Implicit),
         (Matter::Springs, Solver::Verlet),
         (Matter::Elements, Solver::Verlet),
     ] {
-        for steps in [60, 20, 75].into_iter().filter(|&steps| is_tried(matter, steps)) {
+        for steps in [60, 20, 75].into_iter().filter(|&steps| is_selected(matter, steps)) {
             let (mut world, body) = in_flight(matter, solver, Storage::Packed);
             let still = vec![Vec3::ZERO; 210];
             world.body_mut(body).unwrap().set_velocities(&still).unwrap();
             let it = world.body(body).unwrap();
-            // They come to the middle together.
-            let ways = [
+            // They reach the middle together.
+            let paths = [
                 [edge(it, [-0.01, 0.021], THROUGH), edge(it, [0.066, 0.027], THROUGH)],
                 [
                     edge(it, [0.0252, -0.0138], THROUGH),
                     edge(it, [0.0308, 0.0618], THROUGH),
                 ],
             ];
-            let blades = ways.map(|[start, _]| {
+            let blades = paths.map(|[start, _]| {
                 let middle = 0.5 * (start[0] + start[1]);
                 let mut definition = BladeDefinition::new(start.map(|end| end - middle));
                 definition.pose.position = middle;
                 world.create_blade(&definition).unwrap()
             });
             for step in 1..=steps {
-                for (&blade, [start, end]) in blades.iter().zip(&ways) {
+                for (&blade, [start, end]) in blades.iter().zip(&paths) {
                     let [from, to] = [start, end].map(|edge| 0.5 * (edge[0] + edge[1]));
-                    let place = from.lerp(to, step as f32 / steps as f32);
-                    world.set_blade_pose(blade, place, None).unwrap();
+                    let position = from.lerp(to, step as f32 / steps as f32);
+                    world.set_blade_pose(blade, position, None).unwrap();
                 }
                 world.step(1e-3).unwrap();
             }

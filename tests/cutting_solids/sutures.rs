@@ -1,4 +1,4 @@
-//! Sutures in the inside that a cut has bared.
+//! Sutures on an interior surface exposed by a cut.
 
 use glam::{Vec3, vec3};
 use sinew::cutting::Sweep;
@@ -6,7 +6,7 @@ use sinew::{Anchor, Solver, Storage, SurfacePoint, SutureDefinition};
 
 use super::motion::{CUTS, Matter, edge, in_flight};
 
-/// The two sides of a wound lie in one place of the rest shape, and what sits in one stays there.
+/// The two sides of a wound coincide in the rest shape, and sutures stay on their side.
 #[test]
 fn a_suture_stays_on_its_side_of_a_wound_that_is_cut_again() {
     let (mut world, body) = in_flight(Matter::Springs, Solver::Verlet, Storage::Packed);

@@ -1,4 +1,4 @@
-//! Tearing of tetrahedral solids: springs and edges of elements beyond what they bear part the material.
+//! Tearing of tetrahedral solids: springs and element edges loaded beyond their limits separate the material.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::HashMap;
@@ -11,7 +11,7 @@ use sinew::{
     Body, BodyDefinition, BodyId, Material, Model, Solver, Storage, TearReport, Tearing, Values, World, WorldDefinition,
 };
 
-/// The side of a cell, m.
+/// The side of a cell (m).
 const CELL: f32 = 0.01;
 
 const TEARING: Tearing = Tearing {
@@ -21,14 +21,14 @@ const TEARING: Tearing = Tearing {
     smallest_piece: 0.0,
 };
 
-/// It may tear, but not yet.
+/// Tearing is enabled, with limits that are never reached.
 const NEVER: Tearing = Tearing {
     strain: 100.0,
     ..TEARING
 };
 
 #[derive(Clone, Copy)]
-struct Made {
+struct Options {
     size: [usize; 3],
     has_elements: bool,
     tearing: Tearing,
@@ -36,12 +36,12 @@ struct Made {
     storage: Storage,
     spare_nodes: u32,
     thread_count: u32,
-    /// By how much it is longer along x than at rest.
+    /// Length along x relative to the rest length.
     stretched: f32,
     damping: f32,
 }
 
-const BAR: Made = Made {
+const BAR: Options = Options {
     size: [10, 3, 3],
     has_elements: true,
     tearing: TEARING,
@@ -53,18 +53,18 @@ const BAR: Made = Made {
     damping: 20.0,
 };
 
-impl Made {
+impl Options {
     fn mesh(&self) -> Mesh {
         let (rest, cells) = shaken(self.size, 5);
         let cells = cells.iter().map(|&cell| upright(&rest, cell)).collect();
-        (rest.iter().map(|&place| CELL * place).collect(), cells)
+        (rest.iter().map(|&position| CELL * position).collect(), cells)
     }
 
     fn definition_with<T>(&self, made: impl FnOnce(&BodyDefinition) -> T) -> T {
         let (rest, cells) = self.mesh();
         let positions: Vec<Vec3> = rest
             .iter()
-            .map(|&place| place * vec3(1.0 + self.stretched, 1.0, 1.0))
+            .map(|&position| position * vec3(1.0 + self.stretched, 1.0, 1.0))
             .collect();
         let definition = BodyDefinition {
             positions: &positions,
@@ -114,18 +114,19 @@ impl Made {
         (x * y * z) as f64 * f64::from(CELL).powi(3)
     }
 
-    /// Where nodes and points are at rest.
+    /// Returns the rest positions of nodes and points.
     fn at_rest(&self, body: &Body) -> Vec<DVec3> {
-        let mut rest: Vec<DVec3> = self.mesh().0.iter().map(|place| place.as_dvec3()).collect();
+        let mut rest: Vec<DVec3> = self.mesh().0.iter().map(|position| position.as_dvec3()).collect();
         for new in body.changes_since(0).unwrap().nodes {
             assert_eq!(new.node as usize, rest.len());
-            let place = (0..3).map(|k| f64::from(new.weights[k]) * rest[new.sources[k] as usize]);
-            rest.push(place.sum());
+            let position = (0..3).map(|k| f64::from(new.weights[k]) * rest[new.sources[k] as usize]);
+            rest.push(position.sum());
         }
         rest
     }
 
-    /// The volumes of what hangs together by its surface at rest, the smallest first; checks that each is closed and has each edge once.
+    /// Returns the rest volumes of the connected components of the surface, the smallest first; checks that each is
+    /// closed and has each edge once.
     fn pieces(&self, body: &Body) -> Vec<f64> {
         let rest = self.at_rest(body);
         let triangles = body.surface();
@@ -168,7 +169,7 @@ impl Made {
         volumes
     }
 
-    /// The largest strain of an edge of the cells as they were made, as far as no node of it was copied.
+    /// Returns the largest strain of an original cell edge whose nodes were not copied.
     fn largest_strain(&self, body: &Body) -> f64 {
         let (rest, cells) = self.mesh();
         let edges = cells
@@ -195,19 +196,19 @@ fn a_bar_tears_in_two_at_its_limit_and_not_below() {
         (false, Solver::Implicit),
     ] {
         let what = format!("elements {has_elements}, {solver:?}");
-        let made = Made {
+        let made = Options {
             has_elements,
             solver,
             ..BAR
         };
-        let twin = Made { tearing: NEVER, ..made };
+        let twin = Options { tearing: NEVER, ..made };
         let mut worlds = [made.world(), twin.world()];
         let (rest, _) = made.mesh();
         let end = made.size[0] as f32 * CELL;
         let held: Vec<(u32, f32)> = (0..)
             .zip(&rest)
-            .filter(|(_, place)| place.x < 1e-5 || place.x > end - 1e-5)
-            .map(|(node, place)| (node, (place.x - 0.5 * end).signum()))
+            .filter(|(_, position)| position.x < 1e-5 || position.x > end - 1e-5)
+            .map(|(node, position)| (node, (position.x - 0.5 * end).signum()))
             .collect();
         for (world, body) in &mut worlds {
             held.iter()
@@ -217,9 +218,9 @@ fn a_bar_tears_in_two_at_its_limit_and_not_below() {
         loop {
             for (world, body) in &mut worlds {
                 let it = world.body_mut(*body).unwrap();
-                for &(node, way) in &held {
-                    let place = it.positions()[node as usize];
-                    it.move_pin(node, place + 2e-5 * way * Vec3::X).unwrap();
+                for &(node, direction) in &held {
+                    let position = it.positions()[node as usize];
+                    it.move_pin(node, position + 2e-5 * direction * Vec3::X).unwrap();
                 }
                 world.step(5e-3).unwrap();
             }
@@ -237,9 +238,9 @@ fn a_bar_tears_in_two_at_its_limit_and_not_below() {
         for step in 0..500 {
             if step < 300 {
                 let it = world.body_mut(*body).unwrap();
-                for &(node, way) in &held {
-                    let place = it.positions()[node as usize];
-                    it.move_pin(node, place + 2e-5 * way * Vec3::X).unwrap();
+                for &(node, direction) in &held {
+                    let position = it.positions()[node as usize];
+                    it.move_pin(node, position + 2e-5 * direction * Vec3::X).unwrap();
                 }
             }
             world.step(5e-3).unwrap();
@@ -249,7 +250,7 @@ fn a_bar_tears_in_two_at_its_limit_and_not_below() {
         let pieces = made.pieces(it);
         assert_eq!(pieces.len() as u32, 1 + parted, "{what}");
         assert_eq!(it.pieces().unwrap().count, 1 + parted, "{what}");
-        // Two ends, and crumbs perhaps.
+        // Two ends, and possibly slivers.
         let largest: f64 = pieces.iter().rev().take(2).sum();
         assert!(pieces.len() >= 2 && pieces.len() < 6, "{what}: {pieces:?}");
         assert!(largest > 0.95 * made.volume(), "{what}: {pieces:?}");
@@ -268,7 +269,7 @@ fn a_tear_keeps_mass_momentum_volume_and_energy() {
                     continue;
                 }
                 let what = format!("elements {has_elements}, {solver:?}, {storage:?}");
-                let made = Made {
+                let made = Options {
                     size: [6, 5, 4],
                     has_elements,
                     solver,
@@ -277,13 +278,13 @@ fn a_tear_keeps_mass_momentum_volume_and_energy() {
                     damping: 0.0,
                     ..BAR
                 };
-                let mut worlds = [made, Made { tearing: NEVER, ..made }].map(|made| made.world());
+                let mut worlds = [made, Options { tearing: NEVER, ..made }].map(|made| made.world());
                 for (world, body) in &mut worlds {
                     let it = world.body_mut(*body).unwrap();
-                    let places = it.positions().to_vec();
-                    let velocities: Vec<Vec3> = places
+                    let positions = it.positions().to_vec();
+                    let velocities: Vec<Vec3> = positions
                         .iter()
-                        .map(|&place| vec3(0.3, -0.2, 0.1) + vec3(0.5, 0.4, 2.0).cross(place))
+                        .map(|&position| vec3(0.3, -0.2, 0.1) + vec3(0.5, 0.4, 2.0).cross(position))
                         .collect();
                     it.set_velocities(&velocities).unwrap();
                     world.step(2e-4).unwrap();
@@ -306,14 +307,14 @@ fn a_tear_keeps_mass_momentum_volume_and_energy() {
                     after.energy
                 );
                 let it = torn.body(*body).unwrap();
-                let places = whole.body(*twin).unwrap().positions();
-                assert_eq!(it.positions()[..places.len()], *places, "{what}: moved");
+                let positions = whole.body(*twin).unwrap().positions();
+                assert_eq!(it.positions()[..positions.len()], *positions, "{what}: moved");
                 assert!(
                     it.surface().len() > whole.body(*twin).unwrap().surface().len(),
                     "{what}"
                 );
                 made.pieces(it);
-                // It goes on without gaining energy.
+                // It continues without gaining energy.
                 let mut last = after.energy;
                 for _ in 0..60 {
                     torn.step(2e-4).unwrap();
@@ -327,8 +328,8 @@ fn a_tear_keeps_mass_momentum_volume_and_energy() {
     }
 }
 
-/// The volumes of pieces, how many tears, and the state's hash.
-fn pulled_about(made: Made) -> (Vec<f64>, u32, u64) {
+/// Returns the volumes of pieces, the number of tears, and the state hash.
+fn pull_at_random(made: Options) -> (Vec<f64>, u32, u64) {
     let (mut world, body) = made.world();
     let mut random = Random(4);
     let count = made.mesh().0.len() as f32;
@@ -350,7 +351,7 @@ fn pulled_about(made: Made) -> (Vec<f64>, u32, u64) {
                 .unwrap()
                 .positions()
                 .iter()
-                .all(|place| place.is_finite())
+                .all(|position| position.is_finite())
         );
     }
     let it = world.body(body).unwrap();
@@ -361,22 +362,19 @@ fn pulled_about(made: Made) -> (Vec<f64>, u32, u64) {
 }
 
 #[test]
-fn whatever_pulls_it_stays_closed_and_no_piece_is_smaller_than_asked() {
-    whatever_pulls_it_stays_closed_and_no_piece_is_smaller_than_asked_of(&[(true, Solver::Verlet)]);
+fn the_surface_stays_closed_and_no_piece_is_below_the_minimum() {
+    the_surface_stays_closed_and_no_piece_is_below_the_minimum_of(&[(true, Solver::Verlet)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn whatever_pulls_it_stays_closed_and_no_piece_is_smaller_than_asked_in_the_other_cases() {
-    whatever_pulls_it_stays_closed_and_no_piece_is_smaller_than_asked_of(&[
-        (false, Solver::Verlet),
-        (true, Solver::Implicit),
-    ]);
+fn the_surface_stays_closed_and_no_piece_is_below_the_minimum_in_the_other_cases() {
+    the_surface_stays_closed_and_no_piece_is_below_the_minimum_of(&[(false, Solver::Verlet), (true, Solver::Implicit)]);
 }
 
-fn whatever_pulls_it_stays_closed_and_no_piece_is_smaller_than_asked_of(cases: &[(bool, Solver)]) {
+fn the_surface_stays_closed_and_no_piece_is_below_the_minimum_of(cases: &[(bool, Solver)]) {
     for &(has_elements, solver) in cases {
-        let made = Made {
+        let made = Options {
             size: [6, 5, 4],
             has_elements,
             solver,
@@ -389,7 +387,7 @@ fn whatever_pulls_it_stays_closed_and_no_piece_is_smaller_than_asked_of(cases: &
             ..BAR
         };
         let what = format!("elements {has_elements}, {solver:?}");
-        let (pieces, tears, _) = pulled_about(made);
+        let (pieces, tears, _) = pull_at_random(made);
         assert!(tears > 40 && pieces.len() > 2, "{what}: {tears} tears, {pieces:?}");
         let least = 3e-6;
         assert!(pieces[0] < least, "{what}: {pieces:?}");
@@ -397,7 +395,7 @@ fn whatever_pulls_it_stays_closed_and_no_piece_is_smaller_than_asked_of(cases: &
             smallest_piece: least as f32,
             ..made.tearing
         };
-        let (pieces, tears, _) = pulled_about(Made { tearing, ..made });
+        let (pieces, tears, _) = pull_at_random(Options { tearing, ..made });
         assert!(tears > 40, "{what}: {tears} tears");
         assert!(pieces[0] > least * (1.0 - 1e-5), "{what}: {pieces:?}");
     }
@@ -406,7 +404,7 @@ fn whatever_pulls_it_stays_closed_and_no_piece_is_smaller_than_asked_of(cases: &
 #[test]
 fn tears_of_solids_are_the_same_for_any_number_of_threads() {
     let [one, two] = [1, 2].map(|thread_count| {
-        pulled_about(Made {
+        pull_at_random(Options {
             size: [6, 5, 4],
             thread_count,
             tearing: Tearing {
@@ -421,8 +419,8 @@ fn tears_of_solids_are_the_same_for_any_number_of_threads() {
 }
 
 #[test]
-fn without_room_the_step_goes_on_and_no_solid_tears() {
-    let made = Made {
+fn without_capacity_the_step_succeeds_and_no_solid_tears() {
+    let made = Options {
         stretched: 0.3,
         spare_nodes: 1,
         ..BAR
@@ -439,14 +437,15 @@ fn without_room_the_step_goes_on_and_no_solid_tears() {
     assert!(without_room > 0);
     // At a corner one is enough.
     assert!(tears <= 1);
-    // A tear opens a face to both sides, and at a corner a second one with it, where what is left would hang by an edge.
+    // A tear opens a face on both sides. At a corner it opens a second face where the remainder would be connected by
+    // an edge only.
     assert!(world.body(body).unwrap().surface().len() <= surface.len() + 4 * tears as usize);
     made.pieces(world.body(body).unwrap());
 }
 
 #[test]
-fn an_edge_of_elements_bears_its_own_strain() {
-    let made = Made {
+fn an_element_edge_has_its_own_strain_limit() {
+    let made = Options {
         tearing: Tearing { strain: 0.0, ..TEARING },
         stretched: 0.1,
         ..BAR
@@ -454,14 +453,14 @@ fn an_edge_of_elements_bears_its_own_strain() {
     let (mut world, body) = made.world();
     world.step(1e-4).unwrap();
     assert_eq!(report(&world, body), TearReport::default());
-    // One that is along x in the middle.
+    // An edge along x in the middle.
     let (rest, cells) = made.mesh();
     let [a, b] = cells
         .iter()
         .flat_map(|cell| (0..4).flat_map(move |a| (0..a).map(move |b| [cell[a], cell[b]])))
         .find(|&[a, b]| {
-            let way = rest[b as usize] - rest[a as usize];
-            way.x.abs() > 0.9 * way.length() && (rest[a as usize].x - 0.05).abs() < 0.01
+            let direction = rest[b as usize] - rest[a as usize];
+            direction.x.abs() > 0.9 * direction.length() && (rest[a as usize].x - 0.05).abs() < 0.01
         })
         .unwrap();
     let it = world.body_mut(body).unwrap();
@@ -477,13 +476,13 @@ fn an_edge_of_elements_bears_its_own_strain() {
 }
 
 #[test]
-fn what_elements_cannot_bear_is_refused() {
+fn invalid_tear_limits_of_elements_are_refused() {
     let tearing = Tearing { force: 0.1, ..TEARING };
     let mut world = World::new(WorldDefinition::default()).unwrap();
-    let made = Made { tearing, ..BAR };
+    let made = Options { tearing, ..BAR };
     let error = made.definition_with(|definition| world.create_body(definition).unwrap_err());
     assert!(error.to_string().contains("tear_force is 0.1"), "{error}");
-    let springs = Made {
+    let springs = Options {
         has_elements: false,
         ..made
     };

@@ -1,4 +1,4 @@
-//! Blades in solids that resist them: what a stroke costs, and what it gives.
+//! Blades in tough solids: the work of a stroke, and the momentum it transfers.
 
 use glam::{Vec3, vec3};
 use sinew::{BodyDefinition, BodyId, Material, Model, Solver, Values, World, WorldDefinition};
@@ -10,14 +10,14 @@ use crate::support::stroke::{Stroke, blade_at};
 /// J/m².
 const TOUGHNESS: f32 = 2.0;
 
-/// A block of 6, 5 and 4 cm in cells of 1 cm, that weighs 1000 kg/m³.
+/// A block of 6, 5 and 4 cm in cells of 1 cm, with a density of 1000 kg/m³.
 #[derive(Clone, Copy)]
 struct Block {
     solver: Solver,
     has_elements: bool,
-    /// Of cells of springs.
+    /// For cells of springs.
     volume_stiffness: f32,
-    /// At its sides along y.
+    /// True if its sides along y are held.
     is_held: bool,
     toughness: f32,
     spare: u32,
@@ -42,12 +42,18 @@ impl Block {
     fn world(&self) -> (World, BodyId) {
         let (rest, cells) = shaken([6, 5, 4], 3);
         let cells: Vec<[u32; 4]> = cells.iter().map(|&cell| upright(&rest, cell)).collect();
-        let positions: Vec<Vec3> = rest.iter().map(|&place| 0.01 * place).collect();
+        let positions: Vec<Vec3> = rest.iter().map(|&position| 0.01 * position).collect();
         let node_mass = 0.12 / positions.len() as f32;
-        let is_side = |place: &Vec3| place.y < 1e-4 || place.y > 0.0499;
+        let is_side = |position: &Vec3| position.y < 1e-4 || position.y > 0.0499;
         let masses: Vec<f32> = positions
             .iter()
-            .map(|place| if self.is_held && is_side(place) { 0.0 } else { node_mass })
+            .map(|position| {
+                if self.is_held && is_side(position) {
+                    0.0
+                } else {
+                    node_mass
+                }
+            })
             .collect();
         let mut world = World::new(WorldDefinition {
             gravity: Vec3::ZERO,
@@ -87,15 +93,16 @@ impl Block {
         (world, body)
     }
 
-    /// What is stable in the first frame and at the least, s, while a stiff blade whose edge ends inside is drawn through.
+    /// Returns the stable substep in the first frame and its minimum (s), while a stiff blade whose edge ends inside is
+    /// drawn through.
     fn first_and_least_substep(&self) -> (f32, f32) {
         let (mut world, _) = self.world();
-        let way = [vec3(-0.01, 0.023, 0.02), vec3(0.09, 0.027, 0.02)];
-        let blade = blade_at(&mut world, 3000.0, way[0], [vec3(0.0, 0.0, -0.04), Vec3::ZERO]);
+        let path = [vec3(-0.01, 0.023, 0.02), vec3(0.09, 0.027, 0.02)];
+        let blade = blade_at(&mut world, 3000.0, path[0], [vec3(0.0, 0.0, -0.04), Vec3::ZERO]);
         let (mut first, mut least, mut area) = (0.0, f32::INFINITY, 0.0);
         for step in 1..=120 {
-            let place = way[0].lerp(way[1], step as f32 / 120.0);
-            world.set_blade_pose(blade, place, None).unwrap();
+            let position = path[0].lerp(path[1], step as f32 / 120.0);
+            world.set_blade_pose(blade, position, None).unwrap();
             let report = world.step(1.0 / 60.0).unwrap();
             if step == 1 {
                 first = report.stable_substep;
@@ -108,7 +115,7 @@ impl Block {
     }
 }
 
-/// An edge of 8 cm along z about its own origin, at the level of the block's middle.
+/// An edge of 8 cm along z about its own origin, at mid-height of the block.
 const THROUGH: [Vec3; 2] = [vec3(0.0, 0.0, -0.04), vec3(0.0, 0.0, 0.04)];
 
 #[test]
@@ -140,10 +147,10 @@ fn the_work_of_a_stroke_is_toughness_times_area_of(cases: &[(Solver, bool, usize
             ..Block::HELD
         };
         let (mut world, body) = block.world();
-        let way = [vec3(-0.01, 0.023, 0.021), vec3(0.08, 0.027, 0.021)];
-        let blade = blade_at(&mut world, 100.0, way[0], THROUGH);
+        let path = [vec3(-0.01, 0.023, 0.021), vec3(0.08, 0.027, 0.021)];
+        let blade = blade_at(&mut world, 100.0, path[0], THROUGH);
         let mut stroke = Stroke::default();
-        stroke.draw(&mut world, blade, way, steps, 1.5 / steps as f32);
+        stroke.draw(&mut world, blade, path, steps, 1.5 / steps as f32);
         let spent = f64::from(TOUGHNESS) * stroke.area;
         let what = format!(
             "{solver:?}, elements {has_elements}, {steps} steps: work {:.6} J, told {:.6}, opened {:.6} m², ratio {:.4}, jump {:.4}",
@@ -163,8 +170,9 @@ fn the_work_of_a_stroke_is_toughness_times_area_of(cases: &[(Solver, bool, usize
 }
 
 #[test]
-fn a_stroke_that_ends_inside_costs_what_it_opens() {
-    // The softer tissue is against its toughness, the more it has stored where it slips off the end of the edge: that is lost.
+fn a_stroke_that_ends_inside_costs_its_opened_area() {
+    // The softer the tissue is relative to its toughness, the more energy it has stored where it slips off the end of
+    // the edge: that energy is lost.
     for (solver, has_elements, toughness, depth, lost) in [
         (Solver::Verlet, true, TOUGHNESS, 0.02, 0.0),
         (Solver::Verlet, true, TOUGHNESS, 0.014, 0.0),
@@ -180,26 +188,26 @@ fn a_stroke_that_ends_inside_costs_what_it_opens() {
             ..Block::HELD
         };
         let (mut world, body) = block.world();
-        let way = [vec3(-0.01, 0.023, 0.02), vec3(0.08, 0.027, 0.02)];
+        let path = [vec3(-0.01, 0.023, 0.02), vec3(0.08, 0.027, 0.02)];
         let edge = [vec3(0.0, 0.0, -0.04), vec3(0.0, 0.0, depth - 0.02)];
-        let blade = blade_at(&mut world, 500.0, way[0], edge);
+        let blade = blade_at(&mut world, 500.0, path[0], edge);
         let mut stroke = Stroke::default();
-        stroke.draw(&mut world, blade, way, 300, 3.0 / 300.0);
+        stroke.draw(&mut world, blade, path, 300, 3.0 / 300.0);
         let cost = stroke.work / (f64::from(toughness) * stroke.area);
         let opened = stroke.area / (0.06 * f64::from(depth));
         let what = format!(
-            "{solver:?}, elements {has_elements}, toughness {toughness}, depth {depth}: {cost} of what has opened, {opened} of what it sweeps"
+            "{solver:?}, elements {has_elements}, toughness {toughness}, depth {depth}: {cost} of the opened area, {opened} of the swept area"
         );
         assert!(cost > 0.97 && cost < 1.03 + lost, "{what}");
-        // Cells open whole: along the end of the edge, up to one is left.
+        // Whole cells open: along the end of the edge, up to one cell is left.
         assert!(opened > 0.5 && opened < 1.03, "{what}");
         assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 1, "{what}");
         assert_eq!(*stroke.forces.last().unwrap(), Vec3::ZERO, "{what}");
     }
 }
 
-/// Toughness over Young's modulus is two cells: the edge squeezes the cells about it before they give way. Where mass may be added for those, the stable
-/// substep stays at more than half of what it is at rest.
+/// Toughness over Young's modulus is two cells: the edge compresses the cells around it before they separate. With
+/// added mass for these cells, the stable substep stays above half of its value at rest.
 #[test]
 fn soft_tough_tissue_keeps_half_of_its_stable_substep() {
     let springs = Block {
@@ -229,16 +237,16 @@ fn soft_tough_tissue_keeps_half_of_its_stable_substep() {
 
 #[test]
 fn the_jumps_of_the_force_halve_with_the_step() {
-    // Soft enough for some steps of 8 ms before it cuts, and at the skin at the end of a step of each length.
+    // Soft enough for several steps of 8 ms before it cuts; a step of each length ends at the skin.
     let jumps: Vec<f32> = [8e-3, 4e-3, 2e-3, 1e-3]
         .into_iter()
         .map(|dt: f32| {
             let (mut world, _) = Block::HELD.world();
             let start = -0.05 * 0.024 + 1e-6;
-            let way = [vec3(start, 0.023, 0.021), vec3(start + 0.04, 0.026, 0.021)];
-            let blade = blade_at(&mut world, 10.0, way[0], THROUGH);
+            let path = [vec3(start, 0.023, 0.021), vec3(start + 0.04, 0.026, 0.021)];
+            let blade = blade_at(&mut world, 10.0, path[0], THROUGH);
             let mut stroke = Stroke::default();
-            stroke.draw(&mut world, blade, way, (0.8 / dt).round() as usize, dt);
+            stroke.draw(&mut world, blade, path, (0.8 / dt).round() as usize, dt);
             assert!(stroke.area > 5e-4, "{} m²", stroke.area);
             stroke.largest_jump()
         })
@@ -249,21 +257,21 @@ fn the_jumps_of_the_force_halve_with_the_step() {
 }
 
 #[test]
-fn a_free_block_gets_the_momentum_and_no_more_than_the_work() {
-    a_free_block_gets_the_momentum_and_no_more_than_the_work_of(&[(Solver::Verlet, true)]);
+fn a_free_block_gets_the_momentum_and_at_most_the_work() {
+    a_free_block_gets_the_momentum_and_at_most_the_work_of(&[(Solver::Verlet, true)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_free_block_gets_the_momentum_and_no_more_than_the_work_in_the_other_cases() {
-    a_free_block_gets_the_momentum_and_no_more_than_the_work_of(&[
+fn a_free_block_gets_the_momentum_and_at_most_the_work_in_the_other_cases() {
+    a_free_block_gets_the_momentum_and_at_most_the_work_of(&[
         (Solver::Verlet, false),
         (Solver::Implicit, true),
         (Solver::Newton, true),
     ]);
 }
 
-fn a_free_block_gets_the_momentum_and_no_more_than_the_work_of(cases: &[(Solver, bool)]) {
+fn a_free_block_gets_the_momentum_and_at_most_the_work_of(cases: &[(Solver, bool)]) {
     for &(solver, has_elements) in cases {
         let block = Block {
             is_held: false,
@@ -274,12 +282,12 @@ fn a_free_block_gets_the_momentum_and_no_more_than_the_work_of(cases: &[(Solver,
             ..Block::HELD
         };
         let (mut world, body) = block.world();
-        let way = [vec3(-0.01, 0.018, 0.035), vec3(0.05, 0.022, 0.035)];
+        let path = [vec3(-0.01, 0.018, 0.035), vec3(0.05, 0.022, 0.035)];
         // Not all the way through.
         let edge = [vec3(0.0, 0.0, -0.02), vec3(0.0, 0.0, 0.03)];
-        let blade = blade_at(&mut world, 100.0, way[0], edge);
+        let blade = blade_at(&mut world, 100.0, path[0], edge);
         let mut stroke = Stroke::default();
-        stroke.draw(&mut world, blade, way, 150, 0.5e-3);
+        stroke.draw(&mut world, blade, path, 150, 0.5e-3);
         let kept = kept(&world, body);
         let spent = f64::from(block.toughness) * stroke.area;
         let what = format!(
@@ -291,7 +299,7 @@ fn a_free_block_gets_the_momentum_and_no_more_than_the_work_of(cases: &[(Solver,
             "{what}"
         );
         assert!(kept.spin.distance(stroke.spin) <= 1e-2 * stroke.spin.length(), "{what}");
-        // What has opened lags behind what is paid for.
+        // The opened area lags behind the paid work.
         assert!(
             stroke.area > 2e-4 && stroke.work >= 0.95 * spent + kept.energy,
             "{what}"
@@ -300,17 +308,17 @@ fn a_free_block_gets_the_momentum_and_no_more_than_the_work_of(cases: &[(Solver,
 }
 
 #[test]
-fn what_resists_a_blade_is_the_same_with_any_number_of_threads() {
+fn blade_resistance_is_the_same_for_any_number_of_threads() {
     let [one, three] = [1, 3].map(|thread_count| {
         let (mut world, body) = Block {
             thread_count,
             ..Block::HELD
         }
         .world();
-        let way = [vec3(-0.01, 0.023, 0.021), vec3(0.04, 0.027, 0.021)];
-        let blade = blade_at(&mut world, 100.0, way[0], THROUGH);
+        let path = [vec3(-0.01, 0.023, 0.021), vec3(0.04, 0.027, 0.021)];
+        let blade = blade_at(&mut world, 100.0, path[0], THROUGH);
         let mut stroke = Stroke::default();
-        stroke.draw(&mut world, blade, way, 60, 5e-3);
+        stroke.draw(&mut world, blade, path, 60, 5e-3);
         (
             world.state_hash(),
             stroke.forces,
@@ -321,20 +329,20 @@ fn what_resists_a_blade_is_the_same_with_any_number_of_threads() {
 }
 
 #[test]
-fn without_room_a_blade_stays_and_the_block_is_as_it_was() {
+fn without_capacity_a_blade_stays_and_the_block_is_unchanged() {
     let (mut world, body) = Block {
         spare: 5,
         ..Block::HELD
     }
     .world();
     let triangles = world.body(body).unwrap().surface().to_vec();
-    let way = [vec3(-0.01, 0.023, 0.021), vec3(0.05, 0.027, 0.021)];
-    let blade = blade_at(&mut world, 20.0, way[0], THROUGH);
+    let path = [vec3(-0.01, 0.023, 0.021), vec3(0.05, 0.027, 0.021)];
+    let blade = blade_at(&mut world, 20.0, path[0], THROUGH);
     let mut stroke = Stroke::default();
-    stroke.draw(&mut world, blade, way, 100, 5e-3);
+    stroke.draw(&mut world, blade, path, 100, 5e-3);
     assert!(stroke.refused > 20 && stroke.area == 0.0);
     assert_eq!(world.body(body).unwrap().surface(), triangles);
-    // It still resists, no harder than it would if it gave way.
+    // It still resists, with no more force than if it were cut.
     let force = stroke.forces.last().unwrap().length();
     let most = 0.04 * TOUGHNESS;
     assert!(force > 0.2 * most && force < 1.3 * most, "{force} N");

@@ -1,4 +1,5 @@
-// sinew.hpp: what is owned is ended once, in any order; errors carry their status and words; views and spans show what C shows.
+// sinew.hpp: owned objects are destroyed once, in any order; errors carry their status and message; views and spans
+// agree with C.
 #include <sinew.hpp>
 
 #include <array>
@@ -59,10 +60,10 @@ static void owners() {
   const sinew_world *raw = world.get();
   auto first = world.create_body(solid(shape)), second = world.create_body(solid(shape));
 
-  sinew::world moved = std::move(world); // what belongs to it still does
+  sinew::world moved = std::move(world); // its objects still belong to it
   EXPECT(moved.get() == raw && world.get() == nullptr);
   EXPECT(refused([&] { world.step(0.01f); }, "world") == SINEW_STATUS_INVALID_ARGUMENT);
-  moved = std::move(*&moved); // of itself
+  moved = std::move(*&moved); // self-assignment
   EXPECT(moved.get() == raw);
 
   sinew::tool_def ball;
@@ -92,12 +93,12 @@ static void owners() {
   const auto felt = haptic.tick(tool.pose(), {}, {}, 0.001f);
   EXPECT(felt.force[0] == 0);
 
-  // Of the fixed corner, springs and weight are held.
+  // The corner is fixed: the pin balances springs and weight.
   const auto weight = first.pin_force(0);
   EXPECT(std::isfinite(weight[1]));
   first.destroy();
   EXPECT(refused([&] { first.pin(0); }, "body") == SINEW_STATUS_STALE_ID);
-  moved = sinew::world(); // the old one ends, and with it what is left
+  moved = sinew::world(); // destroys the old world and its remaining objects
   EXPECT(reader.read().is_over == 1);
 }
 
@@ -133,7 +134,7 @@ static void spans() {
   EXPECT(refused([&] { sinew::world::load_snapshot(bytes); }, "checksum") == SINEW_STATUS_INVALID_ARGUMENT);
 }
 
-// Arrays of one length, of which some may be left out.
+// Arrays of equal length; some may be omitted.
 static void springs() {
   sinew::world world;
   EXPECT(sinew::version() == SINEW_VERSION);
@@ -183,7 +184,7 @@ static void springs() {
   EXPECT(std::fabs(of_tetrahedra[0].growth) < 1e-5f);
 }
 
-// Each node has an attachment of its own, and none is written beyond those.
+// Each node has its own attachment, and nothing is written beyond the array.
 static void attachments() {
   sinew::world world;
   const auto mesh = sinew::mesh::block({0.1f, 0.1f, 0.1f}, {2, 2, 2});
@@ -204,7 +205,7 @@ static void attachments() {
     held.release();
     EXPECT(refused([&] { held.release(); }, "attachment") == SINEW_STATUS_STALE_ID);
   }
-  EXPECT(weight > 0.9f * 3 * 1e-3f * 9.81f); // at least that of the three, at first
+  EXPECT(weight > 0.9f * 3 * 1e-3f * 9.81f); // at least the weight of the three nodes, initially
   first.attach(nodes, second, others, out);
   EXPECT(ids[0].index1 == 0 && ids[4].index1 == 0 && ids[1].index1 != 0 && ids[3].index1 != 0);
   first.attach(2, tool).release();
@@ -218,7 +219,7 @@ static void poses() {
   ball.radius = 0.01f;
   auto tool = world.create_tool(ball);
   tool.set_position({0, 1, 0});
-  tool.teleport({0, 2, 0}); // a position in braces is no pose
+  tool.teleport({0, 2, 0}); // a position in braces is not a pose
   EXPECT(tool.pose().position[1] == 2);
   tool.teleport({0, 3, 0}, {0, 0, 0, 1});
   EXPECT(tool.pose().position[1] == 3);

@@ -1,4 +1,4 @@
-// sinew.hpp where exceptions are off: what is refused goes where the program says.
+// sinew.hpp without exceptions: errors go to the program's handler.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

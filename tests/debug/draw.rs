@@ -1,4 +1,4 @@
-//! What debug drawing shows: each thing where it is, and nothing that was not asked for.
+//! Debug drawing shows each object at its position, and only requested objects.
 
 use glam::{Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -20,7 +20,7 @@ const NOTHING: DebugDrawDefinition = DebugDrawDefinition {
     full_strain: 0.1,
 };
 
-/// Keeps what is drawn.
+/// Stores the drawn primitives.
 #[derive(Debug, Default, PartialEq)]
 struct Drawing {
     lines: Vec<([Vec3; 2], Rgba)>,
@@ -33,8 +33,8 @@ impl DebugCanvas for Drawing {
         self.lines.push((ends, color));
     }
 
-    fn point(&mut self, place: Vec3, color: Rgba) {
-        self.points.push((place, color));
+    fn point(&mut self, position: Vec3, color: Rgba) {
+        self.points.push((position, color));
     }
 
     fn triangle(&mut self, corners: [Vec3; 3], color: Rgba) {
@@ -75,7 +75,7 @@ const AWAKE: Sleep = Sleep { speed: 0.0, time: 0.1 };
 #[test]
 fn springs_are_lines_whose_color_is_that_of_their_strain() {
     let mut world = weightless();
-    // At rest, compressed to half, stretched by far, and a little.
+    // At rest, compressed to half, stretched far, and stretched slightly.
     let positions = [0.0, 1.0, 1.5, 4.5, 5.55].map(|x| Vec3::X * x);
     let body = world
         .create_body(&BodyDefinition {
@@ -114,7 +114,7 @@ fn springs_are_lines_whose_color_is_that_of_their_strain() {
     assert!(rest[0] == rest[1] && rest[1] == rest[2], "{rest:?}");
     assert!(compressed[2] > compressed[0], "blue: {compressed:?}");
     assert!(stretched[0] > stretched[2], "red: {stretched:?}");
-    // Half the scale is half the way, within the rounding of a byte.
+    // Half of the scale gives half of the color, within the rounding of a byte.
     for channel in 0..3 {
         let middle = (f32::from(rest[channel]) + f32::from(stretched[channel])) / 2.0;
         assert!((f32::from(little[channel]) - middle).abs() <= 1.0, "{little:?}");
@@ -177,18 +177,18 @@ fn contacts_are_drawn_where_the_world_reports_them() {
 }
 
 #[test]
-fn pins_attachments_and_boxes_are_where_they_are() {
+fn pins_attachments_and_boxes_are_drawn_at_their_positions() {
     let mut world = weightless();
     let (body, mesh) = block(&mut world, AWAKE);
     let it = world.body_mut(body).expect("a body");
     it.pin(3).expect("a pin");
     it.pin_axes(5, [true, false, true]).expect("a slider");
     let pins = drawn(&world, DebugDrawDefinition { pins: true, ..NOTHING });
-    let mut places: Vec<Vec3> = pins.points.iter().map(|point| point.0).collect();
-    places.sort_by(|a, b| a.to_array().partial_cmp(&b.to_array()).expect("finite"));
+    let mut positions: Vec<Vec3> = pins.points.iter().map(|point| point.0).collect();
+    positions.sort_by(|a, b| a.to_array().partial_cmp(&b.to_array()).expect("finite"));
     let mut expected = [mesh.positions[3], mesh.positions[5]];
     expected.sort_by(|a, b| a.to_array().partial_cmp(&b.to_array()).expect("finite"));
-    assert_eq!(places, expected);
+    assert_eq!(positions, expected);
     assert_ne!(pins.points[0].1, pins.points[1].1, "a slider has a color of its own");
 
     let tool = world
@@ -226,7 +226,7 @@ fn pins_attachments_and_boxes_are_where_they_are() {
 }
 
 #[test]
-fn what_sleeps_is_shown_until_it_wakes() {
+fn sleeping_tissue_is_shown_until_it_wakes() {
     let mut world = weightless();
     let (body, _) = block(
         &mut world,
@@ -251,7 +251,7 @@ fn what_sleeps_is_shown_until_it_wakes() {
 }
 
 #[test]
-fn numbers_that_are_no_lengths_are_refused_and_nothing_is_drawn() {
+fn invalid_lengths_are_refused_and_nothing_is_drawn() {
     let mut world = weightless();
     block(&mut world, AWAKE);
     let good = DebugDrawDefinition::default();

@@ -1,4 +1,4 @@
-//! What a world tells of itself: where the time of a step goes, and how its contacts, springs and pins are.
+//! Diagnostics of a world: the time of each stage of a step, and drawings of contacts, springs and pins.
 
 mod draw;
 mod profile;

@@ -52,7 +52,7 @@ fn pressed(solver: Solver, thread_count: u32) -> (World, ToolId) {
     (world, ball)
 }
 
-/// Presses the ball in, and gives what the last step took and the hash of the state.
+/// Presses the ball in; returns the profile of the last step and the state hash.
 fn press(world: &mut World, ball: ToolId) -> (Option<StepProfile>, u64) {
     for step in 0..5 {
         let height = 0.022 - 1e-3 * (step + 1) as f32;
@@ -62,7 +62,7 @@ fn press(world: &mut World, ball: ToolId) -> (Option<StepProfile>, u64) {
     (world.profile(), world.state_hash())
 }
 
-/// All that is timed within a step.
+/// Returns all times within a step.
 fn stages(profile: &StepProfile) -> [f64; 8] {
     let it = profile;
     [
@@ -78,7 +78,7 @@ fn stages(profile: &StepProfile) -> [f64; 8] {
 }
 
 #[test]
-fn a_world_that_is_not_profiled_has_no_profile_and_the_same_states() {
+fn an_unprofiled_world_has_no_profile_and_the_same_states() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let (mut plain, ball) = pressed(solver, 1);
         let (none, expected) = press(&mut plain, ball);
@@ -104,7 +104,7 @@ fn stages_of_one_thread_are_parts_of_the_step() {
         let parts = stages(&profile);
         assert!(parts.iter().all(|part| *part >= 0.0), "{solver:?}: {profile:?}");
         assert!(parts.iter().sum::<f64>() <= profile.step, "{solver:?}: {profile:?}");
-        // Each body is stepped by one of the two.
+        // One of the two solvers steps each body.
         let [mine, other] = match solver {
             Solver::Verlet => [profile.forces, profile.solver],
             _ => [profile.solver, profile.forces],
@@ -139,7 +139,7 @@ fn counts_are_those_of_the_reports() {
 }
 
 #[test]
-fn a_tool_that_presses_harder_than_its_limit_has_the_step_tried_again() {
+fn a_tool_beyond_its_force_limit_repeats_the_step() {
     let (mut world, ball) = pressed(Solver::Verlet, 1);
     world.set_force_limit(ball, 1e-3).expect("a limit");
     world.set_profiling(true).expect("room");
@@ -161,14 +161,14 @@ fn a_refused_step_is_profiled_too() {
 }
 
 #[test]
-fn what_sleeps_and_what_meets_other_tissue_is_counted() {
+fn sleeping_and_colliding_tissue_is_counted() {
     let mesh = Mesh::block([0.02; 3], [3; 3]).expect("a block");
     let mut world = World::new(WorldDefinition {
         gravity: Vec3::ZERO,
         ..WorldDefinition::default()
     })
     .expect("a world");
-    let at = |by: f32| -> Vec<Vec3> { mesh.positions.iter().map(|place| *place + Vec3::X * by).collect() };
+    let at = |by: f32| -> Vec<Vec3> { mesh.positions.iter().map(|position| *position + Vec3::X * by).collect() };
     let cubes = [at(0.0), at(0.0205), at(0.5)];
     for (index, positions) in cubes.iter().enumerate() {
         let mut velocity = Vec3::ZERO;

@@ -1,4 +1,4 @@
-//! A block of tissue, a sphere, and a hand that leads it: ticks and steps by turns, on one thread.
+//! A block of tissue, a sphere, and a hand that moves it. Ticks and steps alternate on one thread.
 
 use glam::{DVec3, Quat, Vec3, vec3};
 use sinew::mesh::Mesh;
@@ -7,16 +7,16 @@ use sinew::{
     ToolDefinition, ToolId, Values, World, WorldDefinition,
 };
 
-/// s.
+/// The time of a tick (s).
 pub const TICK: f32 = 1e-3;
 
-/// m.
+/// The radius of the tool (m).
 pub const RADIUS: f32 = 0.01;
 
-/// m: so far above the tissue the tool begins.
+/// The initial height of the tool above the tissue (m).
 pub const CLEAR: f32 = 2e-3;
 
-/// m: the top of the block is at y = 0.
+/// The height of the block (m). Its top is at y = 0.
 pub const HEIGHT: f32 = 0.04;
 
 pub struct Bench {
@@ -24,12 +24,12 @@ pub struct Bench {
     pub body: BodyId,
     pub tool: ToolId,
     pub handle: HapticHandle,
-    /// Ticks for each step; 0: it stands still.
+    /// The number of ticks per step; 0 takes no steps.
     pub every: u32,
     ticks: u32,
 }
 
-/// A tick as it was.
+/// The input and the result of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Record {
     pub position: DVec3,
@@ -38,17 +38,17 @@ pub struct Record {
 }
 
 impl Bench {
-    /// One step for so many ticks.
+    /// Creates a bench that takes one step per `every` ticks.
     pub fn new(solver: Solver, every: u32) -> Self {
         Self::with(solver, every, |_| ())
     }
 
-    /// The same with another definition of the handle.
+    /// Creates a bench with a handle definition that `change` edits.
     pub fn with(solver: Solver, every: u32, change: impl FnOnce(&mut HapticDefinition)) -> Self {
         Self::of([10, 4, 10], solver, every, change)
     }
 
-    /// The same with smaller elements.
+    /// Creates a bench with smaller elements.
     pub fn fine(solver: Solver, every: u32) -> Self {
         Self::of([14, 5, 14], solver, every, |_| ())
     }
@@ -109,7 +109,7 @@ impl Bench {
         }
     }
 
-    /// A tick of a hand that is here.
+    /// Takes a tick with the hand at this position.
     pub fn tick(&mut self, position: DVec3, velocity: DVec3) -> Record {
         let pose = Pose {
             position: position.as_vec3(),
@@ -127,13 +127,13 @@ impl Bench {
         }
     }
 
-    /// What the tissue has, J.
+    /// Returns the energy of the tissue (J).
     pub fn energy(&self) -> f64 {
         let energy = self.world.body(self.body).unwrap().energy(self.world.gravity());
         energy.kinetic + energy.elastic
     }
 
-    /// Ticks of a hand that goes where `path` says, s to m.
+    /// Takes ticks with a hand that follows `path`, which maps seconds to meters.
     pub fn follow(&mut self, seconds: f64, path: impl Fn(f64) -> DVec3) -> Vec<Record> {
         let ticks = (seconds / f64::from(TICK)).round() as u32;
         (1..=ticks)

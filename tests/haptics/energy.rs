@@ -1,17 +1,17 @@
-//! A hand in the loop gains no energy.
+//! A hand in the haptic loop gains no energy.
 
 use super::bench::*;
 use glam::{DVec3, dvec3};
 use sinew::Solver;
 
-/// J: what a spring of 1000 N/m stores where it is drawn out by 0.06 mm.
-const UNFELT: f64 = 2e-6;
+/// The energy of a spring of 1000 N/m stretched by 0.06 mm (J).
+const TOLERANCE: f64 = 2e-6;
 
-/// A mass on a spring, whose motion under a force that is constant for a tick is exact.
+/// A mass on a spring. Its motion under a force that is constant during a tick is exact.
 struct Hand {
     /// kg.
     mass: f64,
-    /// N/m, and where it pulls to.
+    /// The stiffness (N/m) and the rest position.
     stiffness: f64,
     home: DVec3,
     position: DVec3,
@@ -29,9 +29,9 @@ impl Hand {
         let omega = (self.stiffness / self.mass).sqrt();
         let rest = self.home + force / self.stiffness;
         let (sine, cosine) = (omega * dt).sin_cos();
-        let off = self.position - rest;
-        self.position = rest + off * cosine + self.velocity * (sine / omega);
-        self.velocity = self.velocity * cosine - off * (omega * sine);
+        let offset = self.position - rest;
+        self.position = rest + offset * cosine + self.velocity * (sine / omega);
+        self.velocity = self.velocity * cosine - offset * (omega * sine);
     }
 
     fn energy(&self) -> f64 {
@@ -40,39 +40,40 @@ impl Hand {
     }
 }
 
-/// A hand that strikes the tissue: what it had at first and at most, and what hand and tissue have in the end, J.
+/// Runs a hand that strikes the tissue. Returns the hand's initial and largest energy, and the final energy of hand and
+/// tissue (J).
 fn strike(bench: &mut Bench, mut hand: Hand, ticks: u32) -> [f64; 3] {
     let first = hand.energy();
-    let mut most = 0.0_f64;
+    let mut largest = 0.0_f64;
     for _ in 0..ticks {
         let record = bench.tick(hand.position, hand.velocity);
         hand.tick(record.tick.force.as_dvec3(), f64::from(TICK));
-        most = most.max(hand.energy());
+        largest = largest.max(hand.energy());
     }
-    [first, most, hand.energy() + bench.energy()]
+    [first, largest, hand.energy() + bench.energy()]
 }
 
 #[test]
-fn a_hand_that_strikes_tissue_gains_nothing() {
-    a_hand_that_strikes_tissue_gains_nothing_of(is_short);
+fn a_hand_that_strikes_tissue_gains_no_energy() {
+    check_a_hand_that_strikes_tissue_gains_no_energy(is_short);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_hand_that_strikes_tissue_gains_nothing_in_the_other_cases() {
-    a_hand_that_strikes_tissue_gains_nothing_of(|solver, stiffness, speed| !is_short(solver, stiffness, speed));
+fn a_hand_that_strikes_tissue_gains_no_energy_in_the_other_cases() {
+    check_a_hand_that_strikes_tissue_gains_no_energy(|solver, stiffness, speed| !is_short(solver, stiffness, speed));
 }
 
-/// IMPLICIT takes long.
+/// Selects the short cases. IMPLICIT is slow.
 fn is_short(solver: Solver, stiffness: f64, speed: f64) -> bool {
     solver == Solver::Verlet || (stiffness, speed) == (200.0, 0.2)
 }
 
-fn a_hand_that_strikes_tissue_gains_nothing_of(is_tried: fn(Solver, f64, f64) -> bool) {
+fn check_a_hand_that_strikes_tissue_gains_no_energy(is_selected: fn(Solver, f64, f64) -> bool) {
     for (solver, every) in [(Solver::Verlet, 1), (Solver::Verlet, 16), (Solver::Implicit, 1)] {
         for (mass, stiffness) in [(0.05, 0.0), (0.3, 0.0), (0.1, 200.0), (0.1, 3000.0)] {
             for speed in [0.05, 0.2] {
-                if !is_tried(solver, stiffness, speed) {
+                if !is_selected(solver, stiffness, speed) {
                     continue;
                 }
                 let mut bench = Bench::new(solver, every);
@@ -83,10 +84,10 @@ fn a_hand_that_strikes_tissue_gains_nothing_of(is_tried: fn(Solver, f64, f64) ->
                     position: dvec3(0.0, f64::from(RADIUS) + 5e-4, 0.0),
                     velocity: dvec3(0.0, -speed, 0.0),
                 };
-                let [first, most, left] = strike(&mut bench, hand, 700);
+                let [first, largest, remaining] = strike(&mut bench, hand, 700);
                 let case = format!("{solver:?}, a step for {every} ticks, {mass} kg, {stiffness} N/m, {speed} m/s");
-                assert!(most <= first + UNFELT, "{case}: {most} J of {first} J");
-                assert!(left < 0.9 * first, "{case}: {left} J are left of {first} J");
+                assert!(largest <= first + TOLERANCE, "{case}: {largest} J of {first} J");
+                assert!(remaining < 0.9 * first, "{case}: {remaining} J are left of {first} J");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Haptic handles: what a hand feels of a world that steps beside it.
+//! Haptic handles: the force on a hand while a world steps concurrently.
 #![allow(clippy::unwrap_used)]
 
 mod bench;

@@ -1,4 +1,4 @@
-//! A hand, steps and frames, each on a thread of its own.
+//! Ticks, steps and frames, each on its own thread.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
@@ -7,14 +7,14 @@ use super::bench::*;
 use glam::{Quat, Vec3, vec3};
 use sinew::{Pose, Solver};
 
-/// Ticks for each step, and how many the hand may be ahead.
+/// The ticks per step, and the number of ticks that the hand may be ahead.
 const EVERY: u32 = 16;
 const AHEAD: u32 = 24;
 const TICKS: u32 = 480;
 const STEP: f32 = EVERY as f32 * TICK;
 
 #[test]
-fn what_a_hand_did_beside_a_world_can_be_done_again() {
+fn a_concurrent_haptic_session_can_be_replayed() {
     let Bench {
         mut world,
         body,
@@ -32,9 +32,9 @@ fn what_a_hand_did_beside_a_world_can_be_done_again() {
             assert!(patience > 0, "another thread has failed");
         }
     };
-    let led: Vec<Pose> = thread::scope(|scope| {
+    let targets: Vec<Pose> = thread::scope(|scope| {
         scope.spawn(|| {
-            let (mut version, mut most) = (0, 0.0_f32);
+            let (mut version, mut largest) = (0, 0.0_f32);
             for tick in 1..=TICKS {
                 wait_for(&stepped, tick.saturating_sub(AHEAD) / EVERY);
                 let t = tick as f32 * TICK;
@@ -42,14 +42,14 @@ fn what_a_hand_did_beside_a_world_can_be_done_again() {
                     position: vec3(0.01 * (2.0 * t).sin(), RADIUS - 4e-3 * (5.0 * t).sin(), 0.0),
                     orientation: Quat::from_rotation_x(3.0 * t),
                 };
-                let felt = handle.tick(pose, None, None, TICK).unwrap();
-                assert!(felt.version >= version, "{} after {version}", felt.version);
-                version = felt.version;
-                most = most.max(felt.force.length());
+                let result = handle.tick(pose, None, None, TICK).unwrap();
+                assert!(result.version >= version, "{} after {version}", result.version);
+                version = result.version;
+                largest = largest.max(result.force.length());
                 handle.contacts(|contact| assert!((contact.normal.length() - 1.0).abs() < 1e-4, "{contact:?}"));
                 ticked.store(tick, Ordering::Relaxed);
             }
-            assert!(version > 0 && most > 0.01, "{version} steps, {most} N");
+            assert!(version > 0 && largest > 0.01, "{version} steps, {largest} N");
         });
         scope.spawn(|| {
             let mut version = 0;
@@ -57,33 +57,34 @@ fn what_a_hand_did_beside_a_world_can_be_done_again() {
                 let frame = reader.read();
                 assert!(frame.version >= version);
                 version = frame.version;
-                assert!(frame.positions.iter().all(|place| place.is_finite()));
+                assert!(frame.positions.iter().all(|node| node.is_finite()));
                 thread::yield_now();
             }
         });
-        let led = (0..TICKS / EVERY).map(|step| {
+        let targets = (0..TICKS / EVERY).map(|step| {
             wait_for(&ticked, step * EVERY);
             world.step(STEP).unwrap();
             stepped.store(step + 1, Ordering::Relaxed);
             world.tool_target(tool).unwrap()
         });
-        led.collect()
+        targets.collect()
     });
     assert!(
-        led.iter()
+        targets
+            .iter()
             .any(|pose| pose.orientation.angle_between(Quat::IDENTITY) > 0.1)
     );
     let Bench {
-        world: mut again,
+        world: mut replayed,
         tool,
         handle,
         ..
     } = Bench::new(Solver::Implicit, 0);
     drop(handle);
-    for pose in led {
-        again.set_pose(tool, pose.position, Some(pose.orientation)).unwrap();
-        again.step(STEP).unwrap();
+    for pose in targets {
+        replayed.set_pose(tool, pose.position, Some(pose.orientation)).unwrap();
+        replayed.step(STEP).unwrap();
     }
-    assert_eq!(again.state_hash(), world.state_hash());
-    assert_ne!(again.wrench(tool).unwrap().0, Vec3::ZERO);
+    assert_eq!(replayed.state_hash(), world.state_hash());
+    assert_ne!(replayed.wrench(tool).unwrap().0, Vec3::ZERO);
 }

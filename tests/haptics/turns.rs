@@ -1,4 +1,4 @@
-//! What turns: a capsule that lies on the tissue, led by a hand that turns it too.
+//! Rotation: a capsule that lies on the tissue, moved and rotated by a hand.
 
 use super::bench::*;
 use glam::{DQuat, DVec3, Quat, Vec3, dvec3, vec3};
@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_PI_2;
 
 const HALF: f32 = 0.02;
 
-/// A bench whose tool is a capsule along x, this far above where it touches.
+/// Creates a bench whose tool is a capsule along x, at the distance `above` from the tissue.
 fn lying(solver: Solver, every: u32, above: f32, change: impl FnOnce(&mut HapticDefinition)) -> Bench {
     let mut bench = Bench::new(solver, every);
     bench.world.destroy_tool(bench.tool).unwrap();
@@ -28,14 +28,14 @@ fn lying(solver: Solver, every: u32, above: f32, change: impl FnOnce(&mut Haptic
     bench
 }
 
-/// Ticks of a hand that stays there, turned so from lying.
-fn hold(bench: &mut Bench, ticks: u32, position: Vec3, turned: impl Fn(u32) -> Quat) -> HapticTick {
+/// Takes ticks with the hand at `position`, rotated from the lying orientation by `turned`.
+fn hold(bench: &mut Bench, ticks: u32, position: Vec3, rotation: impl Fn(u32) -> Quat) -> HapticTick {
     let lying = Quat::from_rotation_z(FRAC_PI_2 as f32);
     let mut last = None;
     for tick in 1..=ticks {
         let pose = Pose {
             position,
-            orientation: turned(tick) * lying,
+            orientation: rotation(tick) * lying,
         };
         last = Some(bench.handle.tick(pose, None, None, TICK).unwrap());
         if tick % bench.every == 0 {
@@ -46,59 +46,64 @@ fn hold(bench: &mut Bench, ticks: u32, position: Vec3, turned: impl Fn(u32) -> Q
 }
 
 #[test]
-fn a_torque_turns_the_hand_back() {
-    a_torque_turns_the_hand_back_of(1.0);
+fn a_torque_rotates_the_hand_back() {
+    check_a_torque_rotates_the_hand_back(1.0);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_torque_turns_the_hand_back_the_other_way() {
-    a_torque_turns_the_hand_back_of(-1.0);
+fn a_torque_rotates_the_hand_back_the_other_way() {
+    check_a_torque_rotates_the_hand_back(-1.0);
 }
 
-fn a_torque_turns_the_hand_back_of(sign: f32) {
+fn check_a_torque_rotates_the_hand_back(sign: f32) {
     let mut bench = lying(Solver::Implicit, 16, 0.0, |_| ());
-    let place = vec3(0.0, RADIUS - 2e-3, 0.0);
-    // About z the end at +x goes up, the other down into the tissue. Either sign of a quaternion is the same turn.
-    let felt = hold(&mut bench, 600, place, |tick| {
+    let position = vec3(0.0, RADIUS - 2e-3, 0.0);
+    // Rotation about z raises the end at +x and presses the other end into the tissue. Both signs of a quaternion are
+    // the same rotation.
+    let result = hold(&mut bench, 600, position, |tick| {
         Quat::from_rotation_z(sign * 0.15 * (tick as f32 / 300.0).min(1.0)) * if tick % 2 == 0 { 1.0 } else { -1.0 }
     });
     let (force, torque) = bench.world.wrench(bench.tool).unwrap();
-    assert!(sign * felt.torque.z < -1e-3, "{felt:?}");
+    assert!(sign * result.torque.z < -1e-3, "{result:?}");
     assert!(
-        (felt.torque - torque).length() < 2e-3 * torque.length(),
-        "{felt:?} {torque}"
+        (result.torque - torque).length() < 2e-3 * torque.length(),
+        "{result:?} {torque}"
     );
     assert!(
-        (felt.force - force).length() < 2e-3 * force.length(),
-        "{felt:?} {force}"
+        (result.force - force).length() < 2e-3 * force.length(),
+        "{result:?} {force}"
     );
-    // The tool is turned back by what the torque draws the spring out.
-    let wanted = Quat::from_rotation_z(sign * 0.15 + FRAC_PI_2 as f32);
-    let drawn = (felt.proxy.orientation * wanted.conjugate()).to_scaled_axis();
+    // The tool rotates back by the deflection of the angular coupling spring.
+    let commanded = Quat::from_rotation_z(sign * 0.15 + FRAC_PI_2 as f32);
+    let deflection = (result.proxy.orientation * commanded.conjugate()).to_scaled_axis();
     let lever = RADIUS + HALF;
     assert!(
-        (drawn * 1000.0 * lever * lever - felt.torque).length() < 5e-3 * felt.torque.length(),
-        "{drawn}"
+        (deflection * 1000.0 * lever * lever - result.torque).length() < 5e-3 * result.torque.length(),
+        "{deflection}"
     );
 }
 
 #[test]
-fn turning_may_be_soft_or_hard() {
+fn the_angular_coupling_can_be_soft_or_stiff() {
     for (stiffness, furthest) in [(1e-3, 1.0), (1e38, 1e-6)] {
-        let mut bench = lying(Solver::Implicit, 16, 0.0, |it| it.angular_stiffness = stiffness);
+        let mut bench = lying(Solver::Implicit, 16, 0.0, |definition| {
+            definition.angular_stiffness = stiffness
+        });
         for tick in 1..=250 {
             let t = tick as f32 * TICK;
-            let turned = Quat::from_rotation_z(0.2 * (11.0 * t).sin());
-            let place = vec3(0.01 * (3.0 * t).sin(), RADIUS - 4e-3 * (7.0 * t).sin(), 0.0);
-            let felt = hold(&mut bench, 1, place, |_| turned);
+            let rotation = Quat::from_rotation_z(0.2 * (11.0 * t).sin());
+            let position = vec3(0.01 * (3.0 * t).sin(), RADIUS - 4e-3 * (7.0 * t).sin(), 0.0);
+            let result = hold(&mut bench, 1, position, |_| rotation);
             if tick % 16 == 0 {
                 bench.world.step(16.0 * TICK).unwrap();
             }
-            let wanted = turned * Quat::from_rotation_z(FRAC_PI_2 as f32);
-            let off = (felt.proxy.orientation * wanted.conjugate()).to_scaled_axis().length();
-            assert!(off <= furthest * 1.001, "{off} rad: {felt:?}");
-            assert!(felt.torque.length() < 0.1, "{felt:?}");
+            let commanded = rotation * Quat::from_rotation_z(FRAC_PI_2 as f32);
+            let deviation = (result.proxy.orientation * commanded.conjugate())
+                .to_scaled_axis()
+                .length();
+            assert!(deviation <= furthest * 1.001, "{deviation} rad: {result:?}");
+            assert!(result.torque.length() < 0.1, "{result:?}");
         }
     }
 }
@@ -123,46 +128,46 @@ impl Hand {
             + 0.5 * self.stiffness * (self.position - self.home).length_squared()
     }
 
-    /// Exact where it is free, else with a hundred parts of a tick.
-    fn tick(&mut self, felt: &HapticTick) {
-        let parts = if self.stiffness == 0.0 { 1 } else { 100 };
-        let dt = f64::from(TICK) / f64::from(parts);
-        let turning = felt.torque.as_dvec3() / self.inertia;
-        for _ in 0..parts {
-            let pull = |position: DVec3| self.stiffness * (self.home - position) + felt.force.as_dvec3();
+    /// Takes a tick: exact for a free hand, else in a hundred substeps.
+    fn tick(&mut self, result: &HapticTick) {
+        let substeps = if self.stiffness == 0.0 { 1 } else { 100 };
+        let dt = f64::from(TICK) / f64::from(substeps);
+        let angular_acceleration = result.torque.as_dvec3() / self.inertia;
+        for _ in 0..substeps {
+            let pull = |position: DVec3| self.stiffness * (self.home - position) + result.force.as_dvec3();
             let before = pull(self.position) / self.mass;
             self.position += self.velocity * dt + 0.5 * dt * dt * before;
             self.velocity += 0.5 * dt * (before + pull(self.position) / self.mass);
-            let turned = self.spin * dt + 0.5 * dt * dt * turning;
-            self.spin += turning * dt;
-            self.orientation = (DQuat::from_scaled_axis(turned) * self.orientation).normalize();
+            let rotation = self.spin * dt + 0.5 * dt * dt * angular_acceleration;
+            self.spin += angular_acceleration * dt;
+            self.orientation = (DQuat::from_scaled_axis(rotation) * self.orientation).normalize();
         }
     }
 }
 
-/// Ticks of this hand: the most energy that it had, J.
-fn led(bench: &mut Bench, hand: &mut Hand) -> f64 {
-    let mut most = 0.0_f64;
+/// Takes 200 ticks with this hand. Returns its largest energy (J).
+fn run_hand(bench: &mut Bench, hand: &mut Hand) -> f64 {
+    let mut largest = 0.0_f64;
     for tick in 1..=200 {
         let pose = Pose {
             position: hand.position.as_vec3(),
             orientation: hand.orientation.as_quat(),
         };
-        let [velocity, turning] = [hand.velocity, hand.spin].map(|it| Some(it.as_vec3()));
-        let felt = bench.handle.tick(pose, velocity, turning, TICK).unwrap();
+        let [velocity, angular_velocity] = [hand.velocity, hand.spin].map(|rate| Some(rate.as_vec3()));
+        let result = bench.handle.tick(pose, velocity, angular_velocity, TICK).unwrap();
         if tick % bench.every == 0 {
             bench.world.step(bench.every as f32 * TICK).unwrap();
         }
-        hand.tick(&felt);
-        most = most.max(hand.energy());
+        hand.tick(&result);
+        largest = largest.max(hand.energy());
     }
-    most
+    largest
 }
 
 #[test]
-fn a_hand_that_strikes_with_a_capsule_gains_nothing() {
-    // J: what a spring of 1000 N/m stores where it is drawn out by 0.06 mm.
-    let unfelt = 2e-6;
+fn a_hand_that_strikes_with_a_capsule_gains_no_energy() {
+    // The energy of a spring of 1000 N/m stretched by 0.06 mm (J).
+    let tolerance = 2e-6;
     for (mass, stiffness, speed, spin, ratio) in [
         (0.05, 0.0, 0.2, 0.0, 1.0),
         (0.05, 0.0, 0.1, 4.0, 1.0),
@@ -175,7 +180,9 @@ fn a_hand_that_strikes_with_a_capsule_gains_nothing() {
         for phase in 0..4 {
             // Contact begins at any time between two steps.
             let above = 1e-4 + f64::from(phase) / 4.0 * speed * 0.016;
-            let mut bench = lying(Solver::Verlet, 16, above as f32, |it| it.damping_ratio = ratio);
+            let mut bench = lying(Solver::Verlet, 16, above as f32, |definition| {
+                definition.damping_ratio = ratio
+            });
             let start = dvec3(0.0, f64::from(RADIUS) + above, 0.0);
             let mut hand = Hand {
                 mass,
@@ -188,9 +195,9 @@ fn a_hand_that_strikes_with_a_capsule_gains_nothing() {
                 spin: dvec3(0.0, 0.0, spin),
             };
             let first = hand.energy();
-            let most = led(&mut bench, &mut hand);
+            let largest = run_hand(&mut bench, &mut hand);
             let case = format!("{mass} kg, {stiffness} N/m, {speed} m/s, {spin} rad/s, damped {ratio}, phase {phase}");
-            assert!(most <= first + unfelt, "{case}: {most} J of {first} J");
+            assert!(largest <= first + tolerance, "{case}: {largest} J of {first} J");
         }
     }
 }
@@ -198,7 +205,7 @@ fn a_hand_that_strikes_with_a_capsule_gains_nothing() {
 #[test]
 fn tissue_that_moves_carries_a_hand() {
     for (mass, speed) in [(0.05, 0.1), (0.05, 0.3), (0.1, 0.3), (0.3, 0.1)] {
-        // The hand has given nothing, and is to be given what it is given where every tick is a step.
+        // The hand starts at rest and must gain the same velocity as with one step per tick.
         let [ticks, steps] = [1, 16].map(|every| {
             let mut bench = lying(Solver::Verlet, every, 1e-4, |_| ());
             let start = dvec3(0.0, f64::from(RADIUS) + 1e-4, 0.0);
@@ -216,10 +223,10 @@ fn tissue_that_moves_carries_a_hand() {
             let rising: Vec<Vec3> = body
                 .positions()
                 .iter()
-                .map(|it| vec3(0.0, speed * (1.0 + it.y / HEIGHT).max(0.0), 0.0))
+                .map(|node| vec3(0.0, speed * (1.0 + node.y / HEIGHT).max(0.0), 0.0))
                 .collect();
             body.set_velocities(&rising).unwrap();
-            led(&mut bench, &mut hand);
+            run_hand(&mut bench, &mut hand);
             hand.velocity.y
         });
         assert!(ticks > 0.003, "{ticks} m/s");

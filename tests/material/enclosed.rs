@@ -1,5 +1,5 @@
-//! Pressure inside closed surfaces: its forces against slopes of a formula in `f64`, thin shell theory, volumes that are kept, the same rest
-//! from every solver, what oscillates and what is kept as it does, what a cut takes away, and what is refused.
+//! Pressure inside closed surfaces: forces against gradients of a formula in `f64`, thin-shell theory, conserved
+//! volumes, the same rest shape with every solver, oscillation, conserved quantities, cuts, and refusals.
 
 use std::f64::consts::PI;
 
@@ -14,7 +14,7 @@ const RADIUS: f64 = 0.05;
 const YOUNG: f64 = 1e5;
 const THICKNESS: f64 = 1e-3;
 
-/// Rubber, filling triangles.
+/// Rubber that fills the triangles.
 const SHEET: Material = Material {
     model: Model::Springs,
     young_modulus: YOUNG as f32,
@@ -37,8 +37,8 @@ impl Surface {
         Self { positions, triangles }
     }
 
-    /// Both, the other moved.
-    fn and(mut self, other: &Self, offset: Vec3) -> Self {
+    /// Returns both surfaces, the other one translated.
+    fn combined_with(mut self, other: &Self, offset: Vec3) -> Self {
         let first = self.positions.len() as u32;
         self.positions
             .extend(other.positions.iter().map(|&position| position + offset));
@@ -52,11 +52,11 @@ impl Surface {
     }
 
     fn at(&self) -> Vec<DVec3> {
-        exact(&self.positions)
+        as_f64(&self.positions)
     }
 
-    /// Of springs of no stiffness.
-    fn loose(&self) -> BodyDefinition<'_> {
+    /// A body with springs of zero stiffness.
+    fn without_stiffness(&self) -> BodyDefinition<'_> {
         BodyDefinition {
             positions: &self.positions,
             triangles: &self.triangles,
@@ -65,7 +65,7 @@ impl Surface {
         }
     }
 
-    /// Of rubber.
+    /// A body of rubber.
     fn sheet(&self) -> BodyDefinition<'_> {
         BodyDefinition {
             positions: &self.positions,
@@ -76,20 +76,20 @@ impl Surface {
     }
 }
 
-fn exact(positions: &[Vec3]) -> Vec<DVec3> {
+fn as_f64(positions: &[Vec3]) -> Vec<DVec3> {
     positions.iter().map(|position| position.as_dvec3()).collect()
 }
 
-/// What triangles enclose, m³.
+/// Returns the volume enclosed by triangles (m³).
 fn volume(triangles: &[[u32; 3]], at: &[DVec3]) -> f64 {
-    let of = triangles.iter().map(|corners| {
+    let terms = triangles.iter().map(|corners| {
         let [a, b, c] = corners.map(|corner| at[corner as usize]);
         DMat3::from_cols(a, b, c).determinant() / 6.0
     });
-    of.sum()
+    terms.sum()
 }
 
-/// A body of some cavities that keep their volumes, and are under pressure.
+/// A body with cavities that keep their volumes and are under pressure.
 struct Formula<'a> {
     cavities: Vec<&'a [[u32; 3]]>,
     rest: Vec<DVec3>,
@@ -99,25 +99,25 @@ struct Formula<'a> {
 
 impl Formula<'_> {
     fn energy(&self, at: &[DVec3]) -> f64 {
-        let of = self.cavities.iter().map(|triangles| {
+        let terms = self.cavities.iter().map(|triangles| {
             let (rest, now) = (volume(triangles, &self.rest), volume(triangles, at));
             0.5 * self.stiffness * rest * (now / rest - 1.0).powi(2) - self.pressure * (now - rest)
         });
-        of.sum()
+        terms.sum()
     }
 
-    /// Minus the slopes of that.
+    /// Returns the negative gradient of the energy.
     fn forces(&self, at: &[DVec3]) -> Vec<DVec3> {
         const STEP: f64 = 1e-5;
         let mut at = at.to_vec();
         let mut force = |node: usize| {
             DVec3::from_array([0, 1, 2].map(|axis| {
-                let place = at[node][axis];
+                let position = at[node][axis];
                 let [more, less] = [STEP, -STEP].map(|step| {
-                    at[node][axis] = place + step;
+                    at[node][axis] = position + step;
                     self.energy(&at)
                 });
-                at[node][axis] = place;
+                at[node][axis] = position;
                 (less - more) / (2.0 * STEP)
             }))
         };
@@ -126,12 +126,12 @@ impl Formula<'_> {
 }
 
 impl Scene {
-    /// What acts on each node there, measured by what would hold it.
-    fn forces(&mut self, places: &[Vec3]) -> Vec<DVec3> {
-        let nodes = 0..places.len() as u32;
+    /// Returns the force on each node at these positions, measured as the force that holds it.
+    fn forces(&mut self, positions: &[Vec3]) -> Vec<DVec3> {
+        let nodes = 0..positions.len() as u32;
         let body = self.body_mut();
         nodes.clone().for_each(|node| body.pin(node).expect("a node"));
-        body.set_positions(places).expect("places");
+        body.set_positions(positions).expect("positions");
         self.run(1e-5, 1);
         let held = |node| -self.body().pin_force(node).expect("a pin").as_dvec3();
         nodes.map(held).collect()
@@ -142,7 +142,7 @@ fn longest(vectors: &[DVec3]) -> f64 {
     vectors.iter().map(|vector| vector.length()).fold(0.0, f64::max)
 }
 
-/// Turned, wider than high, and crumpled.
+/// Returns rotated, widened and crumpled positions.
 fn deformed(surface: &Surface, seed: u64) -> Vec<Vec3> {
     let mut random = Random::new(seed);
     let turned = glam::Quat::from_rotation_y(0.4) * glam::Quat::from_rotation_x(0.3);
@@ -151,10 +151,10 @@ fn deformed(surface: &Surface, seed: u64) -> Vec<Vec3> {
 }
 
 #[test]
-fn forces_and_energy_are_those_of_the_formula() {
+fn forces_and_energy_agree_with_the_formula() {
     let (large, small) = (Surface::sphere(RADIUS, 3), Surface::sphere(0.02, 1));
-    let both = large.clone().and(&small, Vec3::new(0.2, 0.01, 0.0));
-    let places = deformed(&both, 3);
+    let both = large.clone().combined_with(&small, Vec3::new(0.2, 0.01, 0.0));
+    let positions = deformed(&both, 3);
     let (first, second) = both.triangles.split_at(large.triangles.len());
     let formula = Formula {
         cavities: vec![first, second],
@@ -162,7 +162,7 @@ fn forces_and_energy_are_those_of_the_formula() {
         stiffness: 2000.0,
         pressure: 300.0,
     };
-    let expected = formula.forces(&exact(&places));
+    let expected = formula.forces(&as_f64(&positions));
     let size = longest(&expected);
     for storage in STORAGES {
         for solver in SOLVERS {
@@ -176,15 +176,15 @@ fn forces_and_energy_are_those_of_the_formula() {
                     solver,
                     enclosed_stiffness: 2000.0,
                     pressure: 300.0,
-                    ..both.loose()
+                    ..both.without_stiffness()
                 },
             );
-            let off = largest_difference(&scene.forces(&places), &expected) / size;
-            assert!(off < 2e-6, "{storage:?}, {solver:?}: {off:e} off");
-            let (energy, expected) = (scene.energy(), formula.energy(&exact(&places)));
+            let error = largest_difference(&scene.forces(&positions), &expected) / size;
+            assert!(error < 2e-6, "{storage:?}, {solver:?}: {error:e} off");
+            let (energy, expected) = (scene.energy(), formula.energy(&as_f64(&positions)));
             assert!((energy / expected - 1.0).abs() < 1e-6, "{energy} {expected}");
             let report = scene.body().enclosed();
-            let [rest, now] = [both.at(), exact(&places)].map(|at| volume(&both.triangles, &at));
+            let [rest, now] = [both.at(), as_f64(&positions)].map(|at| volume(&both.triangles, &at));
             assert_eq!(report.cavity_count, 2);
             assert!((report.rest_volume / rest - 1.0).abs() < 1e-9);
             assert!((report.volume / now - 1.0).abs() < 1e-6, "{} {now}", report.volume);
@@ -199,7 +199,7 @@ fn forces_and_energy_are_those_of_the_formula() {
 }
 
 #[test]
-fn pressure_pushes_nothing_as_a_whole() {
+fn pressure_has_no_net_force() {
     let surface = Surface::sphere(RADIUS, 3);
     for solver in SOLVERS {
         let mut scene = Scene::new(
@@ -208,18 +208,21 @@ fn pressure_pushes_nothing_as_a_whole() {
                 solver,
                 enclosed_stiffness: 1000.0,
                 pressure: 500.0,
-                ..surface.loose()
+                ..surface.without_stiffness()
             },
         );
-        scene.body_mut().set_positions(&deformed(&surface, 5)).expect("places");
+        scene
+            .body_mut()
+            .set_positions(&deformed(&surface, 5))
+            .expect("positions");
         scene.run(1e-4, 1);
         let body = scene.body();
         let centre = scene.positions().iter().sum::<DVec3>() / surface.positions.len() as f64;
         let (mut sum, mut turn, mut size) = (DVec3::ZERO, DVec3::ZERO, 0.0);
-        for (place, velocity) in scene.positions().iter().zip(body.velocities()) {
+        for (position, velocity) in scene.positions().iter().zip(body.velocities()) {
             let velocity = velocity.as_dvec3();
             sum += velocity;
-            turn += (*place - centre).cross(velocity) / RADIUS;
+            turn += (*position - centre).cross(velocity) / RADIUS;
             size += velocity.length();
         }
         assert!(size > 1.0, "{solver:?}: hardly anything moves");
@@ -228,8 +231,8 @@ fn pressure_pushes_nothing_as_a_whole() {
     }
 }
 
-/// Springs with the weights of cotangents (Pinkall, Polthier 1993): unlike those of a material they balance each other on any mesh that is
-/// stretched evenly, and have the same E t and Poisson's ratio of 1/3 then.
+/// Springs with cotangent weights (Pinkall, Polthier 1993): unlike those of a material they balance each other on any
+/// uniformly stretched mesh. Their E t is the same, and Poisson's ratio is 1/3.
 fn balanced_springs(surface: &Surface) -> (Vec<[u32; 2]>, Vec<f32>) {
     let at = surface.at();
     let mut weights = std::collections::BTreeMap::new();
@@ -246,9 +249,9 @@ fn balanced_springs(surface: &Surface) -> (Vec<[u32; 2]>, Vec<f32>) {
         .unzip()
 }
 
-/// By what part a sphere with Poisson's ratio 1/3 becomes wider: `p R (1 - nu) / 2 E t`.
+/// The relative growth in radius of a sphere with Poisson's ratio 1/3: `p R (1 - nu) / 2 E t`.
 #[test]
-fn a_thin_sphere_widens_as_laplace_says() {
+fn a_thin_sphere_widens_by_laplaces_law() {
     let pressure = 18.0;
     let expected = pressure * RADIUS * (1.0 - 1.0 / 3.0) / (2.0 * YOUNG * THICKNESS);
     let mut errors = Vec::new();
@@ -261,13 +264,13 @@ fn a_thin_sphere_widens_as_laplace_says() {
                 springs: Some(&springs),
                 stiffnesses: Values::Each(&stiffnesses),
                 pressure: pressure as f32,
-                ..surface.loose()
+                ..surface.without_stiffness()
             },
         );
         scene.rest();
         let report = scene.body().enclosed();
         let wider = (report.volume / report.rest_volume).cbrt() - 1.0;
-        // The surface it presses on has become larger too.
+        // The surface under pressure has grown too.
         errors.push(wider / (1.0 + wider).powi(2) / expected - 1.0);
     }
     assert!(errors[3].abs() < 0.001, "{errors:?}");
@@ -276,7 +279,7 @@ fn a_thin_sphere_widens_as_laplace_says() {
     }
 }
 
-/// Pressed together at its poles, by pins that go.
+/// Compresses a sphere at its poles by moving pins.
 fn squeezed(surface: &Surface, solver: Solver, stiffness: f32) -> Scene {
     let definition = BodyDefinition {
         solver,
@@ -292,10 +295,11 @@ fn squeezed(surface: &Surface, solver: Solver, stiffness: f32) -> Scene {
     poles.iter().for_each(|&node| body.pin(node).expect("a node"));
     for step in 1..=30 {
         for &node in &poles {
-            let place = surface.positions[node as usize];
-            let lower = place.y * (1.0 - 0.3 * step as f32 / 30.0);
+            let position = surface.positions[node as usize];
+            let lower = position.y * (1.0 - 0.3 * step as f32 / 30.0);
             let body = scene.body_mut();
-            body.move_pin(node, Vec3::new(place.x, lower, place.z)).expect("a pin");
+            body.move_pin(node, Vec3::new(position.x, lower, position.z))
+                .expect("a pin");
         }
         scene.run(1.0 / 60.0, 1);
     }
@@ -316,7 +320,7 @@ fn a_squeezed_sphere_keeps_its_volume() {
         let growth = |report: sinew::EnclosedReport| report.volume / report.rest_volume - 1.0;
         assert!(hard.pressure > 100.0, "{solver:?}: {hard:?}");
         assert!(growth(hard).abs() < 0.002, "{solver:?}: {hard:?}");
-        // The harder, the less it gives way under what is nearly the same pressure.
+        // The stiffer sphere deforms less under almost the same pressure.
         assert!((soft.pressure / hard.pressure - 1.0).abs() < 0.05, "{soft:?} {hard:?}");
         assert!(
             (growth(soft) / growth(hard) / 10.0 - 1.0).abs() < 0.05,
@@ -325,7 +329,7 @@ fn a_squeezed_sphere_keeps_its_volume() {
     }
     let lax = squeezed(&surface, Solver::Implicit, 0.0).positions();
     let left = volume(&surface.triangles, &lax) / volume(&surface.triangles, &surface.at());
-    assert!(left < 0.95, "a sphere without keeps {left} of its volume");
+    assert!(left < 0.95, "a sphere without contents keeps {left} of its volume");
 }
 
 #[test]
@@ -356,7 +360,7 @@ fn every_solver_and_storage_comes_to_the_same_rest() {
     let iterations = found.rest();
     assert!(
         iterations < 30,
-        "{iterations} linearised equations: second derivatives are not what they should be"
+        "{iterations} linearised equations: second derivatives are wrong"
     );
     let rest = found.positions();
     assert!(
@@ -370,15 +374,15 @@ fn every_solver_and_storage_comes_to_the_same_rest() {
             }
             let mut scene = hung(solver, storage);
             scene.run(0.02, 100);
-            let off = largest_difference(&scene.positions(), &rest) / RADIUS;
-            assert!(off < 2e-5, "{solver:?}, {storage:?}: {off:e} off");
+            let error = largest_difference(&scene.positions(), &rest) / RADIUS;
+            assert!(error < 2e-5, "{solver:?}, {storage:?}: {error:e} off");
         }
     }
 }
 
-/// A sphere that becomes larger and smaller, with the frequency that its springs and its contents give it.
+/// A sphere that grows and shrinks with the frequency of its springs and contents.
 #[test]
-fn a_sphere_breathes_at_its_frequency() {
+fn a_sphere_oscillates_at_its_frequency() {
     const STIFFNESS: f64 = 3e4;
     let surface = Surface::sphere(RADIUS, 3);
     let area = 4.0 * PI * RADIUS * RADIUS;
@@ -396,13 +400,13 @@ fn a_sphere_breathes_at_its_frequency() {
                 ..surface.sheet()
             },
         );
-        scene.body_mut().set_positions(&wide).expect("places");
+        scene.body_mut().set_positions(&wide).expect("positions");
         let step = expected / 200.0;
         let growth = |scene: &Scene| {
             let report = scene.body().enclosed();
             report.volume / report.rest_volume - 1.0
         };
-        // When it goes through rest the third time: three quarters and half a period more.
+        // The time of its third passage through rest: three quarters and half a period more.
         let (mut crossings, mut last, mut time) = (0, growth(&scene), 0.0);
         while crossings < 3 {
             scene.run(step as f32, 1);
@@ -425,7 +429,8 @@ fn a_sphere_breathes_at_its_frequency() {
     }
 }
 
-/// The highest frequency of nodes of equal mass under pressure, 1/s, by power iteration with differences of forces.
+/// Returns the highest frequency of nodes of equal mass under pressure (1/s), by power iteration with differences of
+/// forces.
 fn highest_frequency(
     triangles: &[[u32; 3]],
     [rest, at]: [&[DVec3]; 2],
@@ -444,23 +449,23 @@ fn highest_frequency(
         forces
     };
     let mut random = Random::new(1);
-    let mut way: Vec<DVec3> = at.iter().map(|_| random.vector().as_dvec3()).collect();
+    let mut mode: Vec<DVec3> = at.iter().map(|_| random.vector().as_dvec3()).collect();
     let mut square = 0.0;
     for _ in 0..400 {
-        let size = way.iter().map(|way| way.length_squared()).sum::<f64>().sqrt() / 1e-5;
+        let size = mode.iter().map(|mode| mode.length_squared()).sum::<f64>().sqrt() / 1e-5;
         let moved = |sign: f64| -> Vec<DVec3> {
             at.iter()
-                .zip(&way)
-                .map(|(at, way)| *at + *way * (sign / size))
+                .zip(&mode)
+                .map(|(at, mode)| *at + *mode * (sign / size))
                 .collect()
         };
         let (more, less) = (forces(&moved(1.0)), forces(&moved(-1.0)));
-        way = more
+        mode = more
             .iter()
             .zip(less)
             .map(|(more, less)| (*more - less) / (2e-5 * mass))
             .collect();
-        square = way.iter().map(|way| way.length_squared()).sum::<f64>().sqrt();
+        square = mode.iter().map(|mode| mode.length_squared()).sum::<f64>().sqrt();
     }
     square.sqrt()
 }
@@ -469,7 +474,7 @@ fn highest_frequency(
 fn the_stable_substep_is_short_enough_and_not_far_too_short() {
     let surface = Surface::sphere(RADIUS, 2);
     let crumpled = deformed(&surface, 4);
-    for (stiffness, pressure, places, least) in [
+    for (stiffness, pressure, positions, least) in [
         (1e4, 0.0, &surface.positions, 0.95),
         (0.0, 500.0, &surface.positions, 0.6),
         (0.0, -500.0, &crumpled, 0.4),
@@ -480,13 +485,13 @@ fn the_stable_substep_is_short_enough_and_not_far_too_short() {
             &BodyDefinition {
                 enclosed_stiffness: stiffness,
                 pressure,
-                ..surface.loose()
+                ..surface.without_stiffness()
             },
         );
-        scene.body_mut().set_positions(places).expect("places");
+        scene.body_mut().set_positions(positions).expect("positions");
         let stable = scene.world.step(1e-7).expect("a step").stable_substep;
         let numbers = [stiffness, pressure].map(f64::from);
-        let highest = highest_frequency(&surface.triangles, [&surface.at(), &exact(places)], numbers, 1e-4);
+        let highest = highest_frequency(&surface.triangles, [&surface.at(), &as_f64(positions)], numbers, 1e-4);
         let part = f64::from(stable) / (2.0 / highest);
         assert!(
             (least..1.001).contains(&part),
@@ -514,7 +519,7 @@ fn verlet_keeps_the_energy_of_a_balloon() {
                     ..surface.sheet()
                 },
             );
-            scene.body_mut().set_positions(&wide).expect("places");
+            scene.body_mut().set_positions(&wide).expect("positions");
             let before = scene.energy();
             let (mut most, mut fastest) = (0.0_f64, 0.0_f64);
             for _ in 0..200 {
@@ -550,7 +555,7 @@ fn implicit_steps_gain_no_energy_and_keep_momentum() {
             assert!(scene.body().solver_report().has_converged, "{solver:?}");
             lowest = lowest.min(scene.energy());
         }
-        // What the pressure has done is more than is stored; the rest was lost on the way.
+        // The work of the pressure exceeds the stored energy; the rest was dissipated.
         assert!(
             scene.energy() < 0.0 && scene.energy() < before,
             "{solver:?}: {}",
@@ -571,7 +576,7 @@ fn implicit_steps_gain_no_energy_and_keep_momentum() {
             scene.energy(),
             found.energy()
         );
-        let sum: DVec3 = exact(scene.body().velocities()).iter().sum();
+        let sum: DVec3 = as_f64(scene.body().velocities()).iter().sum();
         assert!(sum.length() < 1e-4, "{solver:?}: {sum}");
     }
 }
@@ -600,7 +605,10 @@ fn results_are_the_same_for_any_number_of_threads_of(solver: Solver) {
                 ..surface.sheet()
             },
         );
-        scene.body_mut().set_positions(&deformed(&surface, 8)).expect("places");
+        scene
+            .body_mut()
+            .set_positions(&deformed(&surface, 8))
+            .expect("positions");
         scene.run(1e-3, 4);
         scene.world.state_hash()
     };
@@ -609,8 +617,8 @@ fn results_are_the_same_for_any_number_of_threads_of(solver: Solver) {
 }
 
 #[test]
-fn a_cut_opens_one_cavity_for_good() {
-    let surface = Surface::sphere(RADIUS, 1).and(&Surface::sphere(RADIUS, 1), Vec3::new(0.2, 0.0, 0.0));
+fn a_cut_opens_one_cavity_permanently() {
+    let surface = Surface::sphere(RADIUS, 1).combined_with(&Surface::sphere(RADIUS, 1), Vec3::new(0.2, 0.0, 0.0));
     let [a, b, _] = surface.triangles[100];
     assert!(a >= 42 && b >= 42, "an edge of the second");
     for storage in STORAGES {
@@ -622,7 +630,7 @@ fn a_cut_opens_one_cavity_for_good() {
                     solver,
                     enclosed_stiffness: 1000.0,
                     pressure: 200.0,
-                    ..surface.loose()
+                    ..surface.without_stiffness()
                 },
             );
             scene.run(1e-4, 1);
@@ -643,9 +651,9 @@ fn a_cut_opens_one_cavity_for_good() {
                 pressure: 300.0,
             };
             let expected = expected.forces(&surface.at());
-            let off = largest_difference(&forces, &expected) / longest(&expected);
-            assert!(off < 2e-6, "{storage:?}, {solver:?}: {off:e} off");
-            // The spring is not there any more, but a second cut finds nothing else either.
+            let error = largest_difference(&forces, &expected) / longest(&expected);
+            assert!(error < 2e-6, "{storage:?}, {solver:?}: {error:e} off");
+            // The spring no longer exists, and a second cut finds nothing else either.
             scene.body_mut().remove_spring(a, b).expect("a spring");
             let nothing = scene.body_mut().remove_spring(a, b);
             assert!(matches!(nothing, Err(Error::InvalidArgument(_))), "{nothing:?}");
@@ -654,7 +662,7 @@ fn a_cut_opens_one_cavity_for_good() {
 }
 
 #[test]
-fn pressure_can_be_changed_as_it_runs() {
+fn pressure_can_change_during_the_run() {
     let surface = Surface::sphere(RADIUS, 2);
     for solver in SOLVERS {
         let definition = BodyDefinition {
@@ -683,7 +691,7 @@ fn pressure_can_be_changed_as_it_runs() {
             volumes[1] > 1.1 * volume(&surface.triangles, &surface.at()),
             "{volumes:?}"
         );
-        // Sucked out, it comes to rest smaller, or crumpled.
+        // Under negative pressure it comes to rest smaller, or crumpled.
         scene.body_mut().set_pressure(-50.0).expect("a pressure");
         scene.run(0.02, 20);
         assert!(scene.body().enclosed().volume < 0.98 * volume(&surface.triangles, &surface.at()));
@@ -707,7 +715,7 @@ fn scrambled_flattened_and_collapsed_spheres_stay_finite() {
     let inside_out: Vec<Vec3> = surface.positions.iter().map(|&p| -p).collect();
     let point = vec![Vec3::splat(0.01); surface.positions.len()];
     for solver in [Solver::Verlet, Solver::Implicit] {
-        for (name, places) in [
+        for (name, positions) in [
             ("scrambled", &scrambled),
             ("flat", &flat),
             ("inside out", &inside_out),
@@ -723,7 +731,7 @@ fn scrambled_flattened_and_collapsed_spheres_stay_finite() {
                     ..surface.sheet()
                 },
             );
-            scene.body_mut().set_positions(places).expect("places");
+            scene.body_mut().set_positions(positions).expect("positions");
             scene.run(1.0 / 60.0, 90);
             let report = scene.body().enclosed();
             assert!(
@@ -731,10 +739,10 @@ fn scrambled_flattened_and_collapsed_spheres_stay_finite() {
                 "{solver:?}, {name}"
             );
             if name == "a point" {
-                // Nothing tells its springs which way to go but along one line.
+                // All springs lie on one line: no force leads off it.
                 continue;
             }
-            // Contents want out: the volume is there again, whether or not folds are left.
+            // The contents expand: the volume recovers, whether or not folds are left.
             let filled = report.volume / report.rest_volume;
             assert!(
                 (0.9..1.1).contains(&filled),
@@ -744,10 +752,10 @@ fn scrambled_flattened_and_collapsed_spheres_stay_finite() {
     }
 }
 
-/// A constant pressure that springs cannot hold: as the surface it presses on grows, a body is infinitely large before long. It grows until
-/// a step says that it cannot be taken, or ends elsewhere; nothing is NaN.
+/// A constant pressure that springs cannot balance: the pressurized area grows, and the body soon becomes infinitely
+/// large. It grows until a step is refused, or ends otherwise; nothing becomes NaN.
 #[test]
-fn what_bursts_is_told_or_goes_on() {
+fn bursting_is_refused_or_stays_finite() {
     let surface = Surface::sphere(RADIUS, 1);
     for solver in SOLVERS {
         let mut scene = Scene::new(
@@ -777,7 +785,7 @@ fn what_bursts_is_told_or_goes_on() {
     }
 }
 
-/// A ball of tetrahedra with a hole in it.
+/// Returns a ball of tetrahedra with a cavity.
 fn hollow_ball(inside: &Surface) -> (Vec<Vec3>, Vec<[u32; 4]>) {
     let count = inside.positions.len() as u32;
     let mut positions = inside.positions.clone();
@@ -797,7 +805,7 @@ fn hollow_ball(inside: &Surface) -> (Vec<Vec3>, Vec<[u32; 4]>) {
 }
 
 #[test]
-fn the_cavity_of_a_hollow_organ_is_what_is_inside() {
+fn the_cavity_of_a_hollow_organ_is_its_inside() {
     let inside = Surface::sphere(RADIUS, 2);
     let (positions, tetrahedra) = hollow_ball(&inside);
     let definition = BodyDefinition {
@@ -815,17 +823,17 @@ fn the_cavity_of_a_hollow_organ_is_what_is_inside() {
     let forces = scene.forces(&positions);
     let (wall, outside) = forces.split_at(inside.positions.len());
     assert_eq!(longest(outside), 0.0);
-    for (force, place) in wall.iter().zip(inside.at()) {
-        // Outward, with a node's part of the surface times the pressure.
+    for (force, position) in wall.iter().zip(inside.at()) {
+        // The force points outward and is the node's share of the area times the pressure.
         assert!(
-            force.dot(place) > 0.999 * force.length() * place.length(),
-            "{force} at {place}"
+            force.dot(position) > 0.999 * force.length() * position.length(),
+            "{force} at {position}"
         );
     }
     let pushed: f64 = wall
         .iter()
         .zip(inside.at())
-        .map(|(force, place)| force.dot(place))
+        .map(|(force, position)| force.dot(position))
         .sum();
     assert!((pushed / (3.0 * 100.0 * within) - 1.0).abs() < 1e-5, "{pushed}");
 }
@@ -853,11 +861,11 @@ fn cells_and_tetrahedra_have_the_cavity_of_their_boundary() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn invalid_definitions_are_refused() {
     let surface = Surface::sphere(RADIUS, 1);
     let good = BodyDefinition {
         enclosed_stiffness: 7.0,
-        ..surface.loose()
+        ..surface.without_stiffness()
     };
     let refused = |definition: BodyDefinition, words: &str| {
         let mut world = World::new(FREE).expect("a world");
@@ -918,7 +926,7 @@ fn what_cannot_be_is_refused() {
         "it is flat",
     );
 
-    let mut plain = Scene::new(FREE, &surface.loose());
+    let mut plain = Scene::new(FREE, &surface.without_stiffness());
     assert_eq!(plain.body().enclosed(), sinew::EnclosedReport::default());
     let hash = plain.world.state_hash();
     assert!(matches!(
@@ -930,7 +938,7 @@ fn what_cannot_be_is_refused() {
         FREE,
         &BodyDefinition {
             pressure: 2.0,
-            ..surface.loose()
+            ..surface.without_stiffness()
         },
     );
     let hash = scene.world.state_hash();

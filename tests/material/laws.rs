@@ -1,5 +1,5 @@
-//! The hyperelastic laws of elements: curves against theory, forces against a difference of the energy, energy that is kept, small strains
-//! against the default law, every solver, and refusals.
+//! The hyperelastic laws of elements: curves against theory, forces against differences of the energy, energy
+//! conservation, small strains against the default law, every solver, and refusals.
 
 use crate::support::bodies::{FREE, Random};
 use crate::support::scene::{SOLVERS, Scene};
@@ -44,7 +44,7 @@ pub fn scene(mesh: &Mesh, world: WorldDefinition, law: ElementLaw, nu: f32, solv
     Scene::new(world, &definition)
 }
 
-/// The energy per volume as the documentation states it.
+/// Returns the energy density as the documentation states it.
 fn density(law: ElementLaw, nu: f64, gradient: DMat3) -> f64 {
     let e = f64::from(YOUNG);
     let (lambda, mu) = (e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu)));
@@ -66,7 +66,7 @@ fn density(law: ElementLaw, nu: f64, gradient: DMat3) -> f64 {
     own + 0.5 * lambda * (j - 1.0).powi(2)
 }
 
-/// The derivative of the energy with an entry of the deformation, Pa.
+/// Returns the derivative of the energy by an entry of the deformation gradient (Pa).
 pub fn stress(law: ElementLaw, nu: f64, gradient: DMat3, column: usize, row: usize) -> f64 {
     const STEP: f64 = 1e-5;
     let at = |by: f64| {
@@ -77,7 +77,7 @@ pub fn stress(law: ElementLaw, nu: f64, gradient: DMat3, column: usize, row: usi
     (at(STEP) - at(-STEP)) / (2.0 * STEP)
 }
 
-/// The stretch of the free axes that leaves no stress across them.
+/// Returns the stretch of the free axes at zero transverse stress.
 pub fn free_stretch(stress: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.2, 3.0);
     for _ in 0..100 {
@@ -91,14 +91,14 @@ pub fn free_stretch(stress: impl Fn(f64) -> f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// The force of the pins on a side along an axis, over its area at rest, Pa.
+/// Returns the pin forces on one side along an axis, divided by the side's area at rest (Pa).
 pub fn pull(mesh: &Mesh, scene: &Scene, side: usize, axis: usize) -> f64 {
     let nodes = (0..mesh.positions.len()).filter(|&node| mesh.positions[node][side] > 0.499 * SIDE);
     let force = |node: usize| f64::from(scene.body().pin_force(node as u32).expect("a pin")[axis]);
     nodes.map(force).sum::<f64>() / f64::from(SIDE * SIDE)
 }
 
-/// Holds the low sides of all axes and the high sides of some, which are stretched, and finds rest.
+/// Holds the low sides of all axes, stretches some of the high sides, and finds equilibrium.
 pub fn stretched(mesh: &Mesh, law: ElementLaw, nu: f32, stretches: [Option<f32>; 3]) -> Scene {
     let mut scene = scene(mesh, FREE, law, nu, Solver::Newton);
     let mut positions = mesh.positions.clone();
@@ -108,7 +108,7 @@ pub fn stretched(mesh: &Mesh, law: ElementLaw, nu: f32, stretches: [Option<f32>;
         }
     }
     let body = scene.body_mut();
-    body.set_positions(&positions).expect("places");
+    body.set_positions(&positions).expect("positions");
     for (node, rest) in mesh.positions.iter().enumerate() {
         let held =
             [0, 1, 2].map(|axis| rest[axis] < -0.499 * SIDE || rest[axis] > 0.499 * SIDE && stretches[axis].is_some());
@@ -122,7 +122,7 @@ pub fn stretched(mesh: &Mesh, law: ElementLaw, nu: f32, stretches: [Option<f32>;
 }
 
 #[test]
-fn uniaxial_and_biaxial_curves_are_those_of_theory() {
+fn uniaxial_and_biaxial_curves_agree_with_theory() {
     let mesh = block();
     for law in LAWS {
         for nu in [0.3, 0.49] {
@@ -152,19 +152,19 @@ fn uniaxial_and_biaxial_curves_are_those_of_theory() {
 }
 
 #[test]
-fn simple_shear_is_that_of_theory() {
+fn simple_shear_agrees_with_theory() {
     let mesh = block();
     for law in LAWS {
         for (nu, solver) in SOLVERS.into_iter().flat_map(|solver| [(0.3, solver), (0.49, solver)]) {
             for shear in [0.1_f32, 0.5, 1.0] {
                 let mut scene = scene(&mesh, FREE, law, nu, solver);
-                let places: Vec<Vec3> = mesh.positions.iter().map(|p| *p + Vec3::X * p.y * shear).collect();
+                let positions: Vec<Vec3> = mesh.positions.iter().map(|p| *p + Vec3::X * p.y * shear).collect();
                 let body = scene.body_mut();
-                (0..places.len() as u32).for_each(|node| body.pin(node).expect("a node"));
-                body.set_positions(&places).expect("places");
+                (0..positions.len() as u32).for_each(|node| body.pin(node).expect("a node"));
+                body.set_positions(&positions).expect("positions");
                 scene.step(1e-3);
                 let gradient = DMat3::from_cols(DVec3::X, DVec3::new(f64::from(shear), 1.0, 0.0), DVec3::Z);
-                // Along the shear, and across it (Poynting).
+                // Along the shear, and across it (Poynting effect).
                 let size = stress(law, f64::from(nu), gradient, 1, 0);
                 for axis in [0, 1] {
                     let expected = stress(law, f64::from(nu), gradient, 1, axis);
@@ -180,7 +180,7 @@ fn simple_shear_is_that_of_theory() {
 }
 
 #[test]
-fn forces_of_every_kernel_are_slopes_of_the_energy() {
+fn forces_of_every_kernel_are_gradients_of_the_energy() {
     const STEP: f64 = 1e-7;
     let mesh = block();
     let rest = |corner: u32| mesh.positions[corner as usize].as_dvec3();
@@ -197,18 +197,18 @@ fn forces_of_every_kernel_are_slopes_of_the_energy() {
             }
             let mut scene = scene(&mesh, world, law, 0.3, Solver::Verlet);
             // Some are inverted.
-            let places: Vec<Vec3> = mesh
+            let positions: Vec<Vec3> = mesh
                 .positions
                 .iter()
                 .map(|p| *p * 1.1 + random.vector() * 0.006)
                 .collect();
             let body = scene.body_mut();
-            (0..places.len() as u32).for_each(|node| body.pin(node).expect("a node"));
-            body.set_positions(&places).expect("places");
+            (0..positions.len() as u32).for_each(|node| body.pin(node).expect("a node"));
+            body.set_positions(&positions).expect("positions");
             scene.step(1e-5);
             let energy = |node: u32, by: DVec3| -> f64 {
                 let at =
-                    |corner: u32| places[corner as usize].as_dvec3() + if corner == node { by } else { DVec3::ZERO };
+                    |corner: u32| positions[corner as usize].as_dvec3() + if corner == node { by } else { DVec3::ZERO };
                 let near = mesh.tetrahedra.iter().filter(|corners| corners.contains(&node));
                 near.map(|corners| {
                     let before = edges(corners, &rest);
@@ -216,9 +216,11 @@ fn forces_of_every_kernel_are_slopes_of_the_energy() {
                 })
                 .sum()
             };
-            let of_axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * STEP);
-            let expected: Vec<DVec3> = (0..places.len() as u32)
-                .map(|node| DVec3::from_array(of_axes.map(|by| (energy(node, by) - energy(node, -by)) / (2.0 * STEP))))
+            let axis_steps = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * STEP);
+            let expected: Vec<DVec3> = (0..positions.len() as u32)
+                .map(|node| {
+                    DVec3::from_array(axis_steps.map(|by| (energy(node, by) - energy(node, -by)) / (2.0 * STEP)))
+                })
                 .collect();
             let size = expected.iter().map(|force| force.length()).fold(0.0, f64::max);
             for (node, expected) in expected.iter().enumerate() {
@@ -233,7 +235,7 @@ fn forces_of_every_kernel_are_slopes_of_the_energy() {
 }
 
 #[test]
-fn small_strains_are_those_of_the_default_law() {
+fn small_strains_agree_with_the_default_law() {
     let mesh = block();
     for (law, nu) in LAWS.into_iter().flat_map(|law| [(law, 0.0), (law, 0.3), (law, 0.45)]) {
         let sag = |law: ElementLaw| {
@@ -251,19 +253,19 @@ fn small_strains_are_those_of_the_default_law() {
             last.1 - last.0.as_dvec3()
         };
         let (found, expected) = (sag(law), sag(ElementLaw::StVenantKirchhoff));
-        let off = found.distance(expected) / expected.length();
-        assert!(off < 2e-3, "{law:?}, nu {nu}: {found} {expected}");
+        let error = found.distance(expected) / expected.length();
+        assert!(error < 2e-3, "{law:?}, nu {nu}: {found} {expected}");
     }
 }
 
 #[test]
-fn a_body_that_swings_keeps_its_energy_and_momentum() {
+fn a_swinging_body_keeps_its_energy_and_momentum() {
     let mesh = block();
     for (law, nu) in LAWS.into_iter().flat_map(|law| [(law, 0.3), (law, 0.45)]) {
         let mut scene = scene(&mesh, FREE, law, nu, Solver::Verlet);
         let stretched: Vec<Vec3> = mesh.positions.iter().map(|p| *p * Vec3::new(1.3, 0.9, 0.9)).collect();
         let turned: Vec<Vec3> = mesh.positions.iter().map(|p| p.cross(Vec3::Y) * 5.0).collect();
-        scene.body_mut().set_positions(&stretched).expect("places");
+        scene.body_mut().set_positions(&stretched).expect("positions");
         scene.body_mut().set_velocities(&turned).expect("velocities");
         let before = scene.energy();
         let momentum = |scene: &Scene| -> DVec3 {
@@ -279,7 +281,7 @@ fn a_body_that_swings_keeps_its_energy_and_momentum() {
             worst = worst.max((scene.energy() / before - 1.0).abs());
         }
         assert!(worst < 0.02, "{law:?}, nu {nu}: energy changed by {worst}");
-        // Beside 0.07 kg at 0.1 m/s.
+        // Compared with 0.07 kg at 0.1 m/s.
         let gained = momentum(&scene).distance(moves);
         assert!(gained < 1e-6, "{law:?}, nu {nu}: {gained} kg m/s");
     }
@@ -322,18 +324,18 @@ fn every_solver_comes_to_the_same_rest_of(laws: [ElementLaw; 2]) {
             }
             let positions = scene.positions();
             let expected = expected.get_or_insert(positions.clone());
-            let off = positions
+            let error = positions
                 .iter()
                 .zip(&*expected)
                 .map(|(a, b)| a.distance(*b))
                 .fold(0.0, f64::max);
-            assert!(off < 1e-6, "{law:?}, nu {nu}, {solver:?}: {off} m off");
+            assert!(error < 1e-6, "{law:?}, nu {nu}, {solver:?}: {error} m off");
         }
     }
 }
 
 #[test]
-fn what_a_law_cannot_have_is_refused() {
+fn invalid_parameters_are_refused() {
     let mesh = block();
     let plain = BodyDefinition {
         material: Some(tissue(0.3)),

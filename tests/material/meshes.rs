@@ -1,4 +1,4 @@
-//! What springs from Young's modulus make of meshes that are no lattices, and of a beam that bends. The figures are those of
+//! Springs from Young's modulus on irregular meshes, and a beam in bending. The figures are those of
 //! docs/methods/materials.md and of `Model::Springs`.
 
 use std::collections::BTreeSet;
@@ -12,7 +12,7 @@ use sinew::{BodyDefinition, BodyId, Material, RestStateDefinition, World};
 
 const YOUNG_MODULUS: f32 = 5000.0;
 
-/// Small enough that the modulus does not shift with it, large enough for f32.
+/// Small enough that the modulus does not change with it, large enough for `f32`.
 const STRAIN: f64 = 0.002;
 
 /// m
@@ -47,16 +47,16 @@ fn settle(world: &mut World, id: BodyId) -> Vec<DVec3> {
     body.positions().iter().map(|p| p.as_dvec3()).collect()
 }
 
-/// Cubes of side 10 mm cut in five tetrahedra each, or squares in two triangles; nodes moved by up to `amount` of that along
-/// each axis, on the outside along it.
-fn moved_about(mut mesh: Mesh, amount: f32) -> Mesh {
+/// Cubes of side 10 mm cut into five tetrahedra each, or squares cut into two triangles. Nodes are moved by up to
+/// `amount` times the side along each axis; outer nodes stay in the surface.
+fn shaken(mut mesh: Mesh, amount: f32) -> Mesh {
     let mut random = Random::new(7);
     let half = mesh.positions[0].abs();
     for position in &mut mesh.positions {
-        let way = random.vector() * (amount * 0.01);
+        let displacement = random.vector() * (amount * 0.01);
         for axis in 0..3 {
             if position[axis].abs() != half[axis] {
-                position[axis] += way[axis];
+                position[axis] += displacement[axis];
             }
         }
     }
@@ -64,23 +64,24 @@ fn moved_about(mut mesh: Mesh, amount: f32) -> Mesh {
 }
 
 fn block(amount: f32) -> Mesh {
-    moved_about(Mesh::block([0.08; 3], [8; 3]).expect("a block"), amount)
+    shaken(Mesh::block([0.08; 3], [8; 3]).expect("a block"), amount)
 }
 
 fn sheet(amount: f32) -> Mesh {
-    moved_about(Mesh::cloth([0.2; 2], [20; 2]).expect("a sheet"), amount)
+    shaken(Mesh::cloth([0.2; 2], [20; 2]).expect("a sheet"), amount)
 }
 
-/// Equilateral triangles of side 10 mm in the plane y = 0; inner nodes moved by up to `amount` of that.
+/// Equilateral triangles of side 10 mm in the plane y = 0; inner nodes are moved by up to `amount` times the side.
 fn equilateral(amount: f32) -> Mesh {
     let (cells, mut mesh, mut random) = (20_u32, Mesh::default(), Random::new(7));
     let corner = |x: u32, z: u32| z * (cells + 1) + x;
     for z in 0..=cells {
         for x in 0..=cells {
             let inside = x % cells > 0 && z % cells > 0;
-            let way = if inside { random.vector() * amount } else { Vec3::ZERO };
-            let place = Vec3::new(x as f32 + 0.5 * z as f32, 0.0, 0.75_f32.sqrt() * z as f32);
-            mesh.positions.push((place + way * Vec3::new(1.0, 0.0, 1.0)) * 0.01);
+            let displacement = if inside { random.vector() * amount } else { Vec3::ZERO };
+            let position = Vec3::new(x as f32 + 0.5 * z as f32, 0.0, 0.75_f32.sqrt() * z as f32);
+            mesh.positions
+                .push((position + displacement * Vec3::new(1.0, 0.0, 1.0)) * 0.01);
             if x < cells && z < cells {
                 mesh.triangles.push([corner(x, z), corner(x, z + 1), corner(x + 1, z)]);
                 mesh.triangles
@@ -91,13 +92,13 @@ fn equilateral(amount: f32) -> Mesh {
     mesh
 }
 
-/// How the volume of a body grows with the place of each node, the outside's share of it; and the volume.
+/// Returns the gradient of the volume by the position of each surface node, and the volume.
 fn outside(mesh: &Mesh) -> (Vec<DVec3>, f64) {
     let mut areas = vec![DVec3::ZERO; mesh.positions.len()];
-    let places = |t: [u32; 3]| t.map(|node| mesh.positions[node as usize].as_dvec3());
+    let positions = |t: [u32; 3]| t.map(|node| mesh.positions[node as usize].as_dvec3());
     if !mesh.tetrahedra.is_empty() {
         for triangle in mesh.surface().expect("a surface") {
-            let [a, b, c] = places(triangle);
+            let [a, b, c] = positions(triangle);
             for node in triangle {
                 areas[node as usize] += (b - a).cross(c - a) / 6.0;
             }
@@ -106,7 +107,7 @@ fn outside(mesh: &Mesh) -> (Vec<DVec3>, f64) {
     }
     let (t, mut volume) = (f64::from(THICKNESS), 0.0);
     for &triangle in &mesh.triangles {
-        let [a, b, c] = places(triangle);
+        let [a, b, c] = positions(triangle);
         let area = 0.5 * (b - a).cross(c - a);
         volume += area.length() * t;
         for (corner, side) in [b - c, c - a, a - b].into_iter().enumerate() {
@@ -116,7 +117,8 @@ fn outside(mesh: &Mesh) -> (Vec<DVec3>, f64) {
     (areas, volume)
 }
 
-/// The mean strain along two axes of a free body that is pulled evenly all over its outside, by these parts of E along them.
+/// Returns the mean strain along two axes of a free body under uniform tension on its surface, given as fractions of E
+/// along the axes.
 fn strains(mesh: &Mesh, axes: [usize; 2], tensions: [f64; 2]) -> [f64; 2] {
     let (mut world, id) = world_of(mesh);
     let (areas, volume) = outside(mesh);
@@ -129,32 +131,36 @@ fn strains(mesh: &Mesh, axes: [usize; 2], tensions: [f64; 2]) -> [f64; 2] {
     let body = world.body_mut(id).expect("the body");
     body.apply_forces(&nodes, &loads).expect("forces");
     let now = settle(&mut world, id);
-    // The mean of a strain over a body is an integral over its outside.
+    // The mean strain of a body is an integral over its surface.
     axes.map(|axis| {
-        let way = |node: usize| now[node][axis] - f64::from(mesh.positions[node][axis]);
-        (0..now.len()).map(|node| way(node) * areas[node][axis]).sum::<f64>() / volume
+        let displacement = |node: usize| now[node][axis] - f64::from(mesh.positions[node][axis]);
+        (0..now.len())
+            .map(|node| displacement(node) * areas[node][axis])
+            .sum::<f64>()
+            / volume
     })
 }
 
-/// E, over what was asked for, and nu, of a body pulled along the first of two axes, seen along both.
-fn pulled(mesh: &Mesh, axes: [usize; 2]) -> (f64, f64) {
+/// Returns E relative to the requested modulus, and nu, of a body pulled along the first of two axes.
+fn moduli_under_tension(mesh: &Mesh, axes: [usize; 2]) -> (f64, f64) {
     let [along, across] = strains(mesh, axes, [STRAIN, 0.0]);
     (STRAIN / along, -across / along)
 }
 
-/// The same of a sheet, which is under tension already: else it folds, since nothing resists bending.
-fn pulled_tighter(mesh: &Mesh, axes: [usize; 2]) -> (f64, f64) {
+/// Returns the same for a pre-stretched sheet: without tension it folds, since nothing resists bending.
+fn moduli_of_pretensioned_sheet(mesh: &Mesh, axes: [usize; 2]) -> (f64, f64) {
     let before = strains(mesh, axes, [STRAIN, STRAIN]);
     let after = strains(mesh, axes, [2.0 * STRAIN, STRAIN]);
     let [along, across] = [0, 1].map(|k| after[k] - before[k]);
     (STRAIN / along, -across / along)
 }
 
-/// E, over what was asked for, and nu, in the mean over all directions, of a body whose outside is led as an even strain would.
-fn led(mesh: &Mesh) -> (f64, f64) {
+/// Returns E relative to the requested modulus, and nu, averaged over all directions, of a body whose surface follows a
+/// uniform strain.
+fn moduli_under_uniform_strain(mesh: &Mesh) -> (f64, f64) {
     let volume = mesh.volume().expect("a volume");
     let outside: BTreeSet<u32> = mesh.surface().expect("a surface").into_iter().flatten().collect();
-    // The stiffnesses c_iijj and c_ijij, summed.
+    // The sums of the stiffnesses c_iijj and c_ijij.
     let (mut squeezed, mut sheared) = (0.0, 0.0);
     for i in 0..3 {
         for j in 0..=i {
@@ -163,8 +169,8 @@ fn led(mesh: &Mesh) -> (f64, f64) {
             deformation.col_mut(j)[i] += STRAIN / 2.0;
             let (mut world, id) = world_of(mesh);
             let body = world.body_mut(id).expect("the body");
-            let places = mesh.positions.iter().map(|p| (deformation * p.as_dvec3()).as_vec3());
-            body.set_positions(&places.collect::<Vec<_>>()).expect("positions");
+            let positions = mesh.positions.iter().map(|p| (deformation * p.as_dvec3()).as_vec3());
+            body.set_positions(&positions.collect::<Vec<_>>()).expect("positions");
             for &node in &outside {
                 body.pin(node).expect("a node");
             }
@@ -173,8 +179,8 @@ fn led(mesh: &Mesh) -> (f64, f64) {
             let mut stress = DMat3::ZERO;
             for &node in &outside {
                 let held = body.pin_force(node).expect("a pin").as_dvec3() / (volume * STRAIN);
-                let place = mesh.positions[node as usize].as_dvec3();
-                stress += DMat3::from_cols(held * place.x, held * place.y, held * place.z);
+                let position = mesh.positions[node as usize].as_dvec3();
+                stress += DMat3::from_cols(held * position.x, held * position.y, held * position.z);
             }
             let shear = 0.5 * (stress.col(i)[j] + stress.col(j)[i]);
             if i == j {
@@ -185,7 +191,7 @@ fn led(mesh: &Mesh) -> (f64, f64) {
             }
         }
     }
-    // Of an isotropic material: 9 lambda + 6 mu and 3 lambda + 12 mu.
+    // For an isotropic material: 9 lambda + 6 mu and 3 lambda + 12 mu.
     let mu = (3.0 * sheared - squeezed) / 30.0;
     let lambda = (squeezed - 6.0 * mu) / 9.0;
     let modulus = mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu);
@@ -200,36 +206,43 @@ fn assert_near((modulus, ratio): (f64, f64), expected: (f64, f64)) {
     );
 }
 
-/// Cut in five, cubes have the edges of a lattice, in other proportions: they are stiffer along the axes than across.
+/// Cubes cut into five tetrahedra have the edges of a lattice in other proportions: they are stiffer along the axes
+/// than across.
 #[test]
-fn cubes_cut_in_five_are_as_stiff_as_is_told() {
-    assert_near(led(&block(0.0)), (1.0, 0.25));
-    assert_near(pulled(&block(0.0), [0, 1]), (1.187, 0.186));
+fn cubes_cut_in_five_have_the_documented_stiffness() {
+    assert_near(moduli_under_uniform_strain(&block(0.0)), (1.0, 0.25));
+    assert_near(moduli_under_tension(&block(0.0), [0, 1]), (1.187, 0.186));
 }
 
 #[test]
-fn irregular_tetrahedra_are_as_stiff_as_is_told() {
-    assert_near(led(&block(0.1)), (0.988, 0.249));
-    assert_near(led(&block(0.2)), (0.952, 0.246));
-    assert_near(led(&block(0.3)), (0.900, 0.238));
+fn irregular_tetrahedra_have_the_documented_stiffness() {
+    assert_near(moduli_under_uniform_strain(&block(0.1)), (0.988, 0.249));
+    assert_near(moduli_under_uniform_strain(&block(0.2)), (0.952, 0.246));
+    assert_near(moduli_under_uniform_strain(&block(0.3)), (0.900, 0.238));
     for axis in 0..3 {
-        assert_near(pulled(&block(0.2), [axis, (axis + 1) % 3]), (1.076, 0.185));
+        assert_near(
+            moduli_under_tension(&block(0.2), [axis, (axis + 1) % 3]),
+            (1.076, 0.185),
+        );
     }
 }
 
 #[test]
-fn irregular_triangles_are_as_stiff_as_is_told() {
+fn irregular_triangles_have_the_documented_stiffness() {
     for axes in [[0, 2], [2, 0]] {
-        assert_near(pulled_tighter(&equilateral(0.0), axes), (1.0, 0.333));
-        assert_near(pulled_tighter(&equilateral(0.2), axes), (0.953, 0.341));
-        assert_near(pulled_tighter(&sheet(0.0), axes), (1.192, 0.191));
-        assert_near(pulled_tighter(&sheet(0.2), axes), (1.095, 0.218));
+        assert_near(moduli_of_pretensioned_sheet(&equilateral(0.0), axes), (1.0, 0.333));
+        assert_near(moduli_of_pretensioned_sheet(&equilateral(0.2), axes), (0.953, 0.341));
+        assert_near(moduli_of_pretensioned_sheet(&sheet(0.0), axes), (1.192, 0.191));
+        assert_near(moduli_of_pretensioned_sheet(&sheet(0.2), axes), (1.095, 0.218));
     }
 }
 
 #[test]
-fn organs_are_as_stiff_as_is_told() {
-    assert_near(led(&Mesh::organ(0.2, 0.01).expect("an organ")), (0.992, 0.251));
+fn organs_have_the_documented_stiffness() {
+    assert_near(
+        moduli_under_uniform_strain(&Mesh::organ(0.2, 0.01).expect("an organ")),
+        (0.992, 0.251),
+    );
     let Some(folder) = Path::new(env!("CARGO_MANIFEST_DIR"))
         .ancestors()
         .map(|above| above.join("shared/meshes"))
@@ -239,12 +252,15 @@ fn organs_are_as_stiff_as_is_told() {
     };
     let mesh = |name: &str| load(folder.join(name), MeshFormat::Auto, 0.01).expect("a mesh").mesh;
     let stomach = mesh("stomach.msh");
-    assert_near(pulled(&stomach, [0, 1]), (0.930, 0.252));
-    assert_near(led(&mesh("liver_volumetric.vtk")), (0.983, 0.252));
+    assert_near(moduli_under_tension(&stomach, [0, 1]), (0.930, 0.252));
+    assert_near(
+        moduli_under_uniform_strain(&mesh("liver_volumetric.vtk")),
+        (0.983, 0.252),
+    );
 }
 
-/// How far the end of a beam of cells goes down, led by a shear force at its end, over what beam theory gives; so many cells
-/// thick, eight times as long.
+/// Returns the deflection of a beam of cells under a shear force at its end, relative to beam theory. The beam is
+/// `thick` cells thick and eight times as long.
 fn deflection(thick: u32) -> f64 {
     let (side, long) = (0.02_f64, 0.16_f64);
     let edge = side / f64::from(thick);
@@ -258,7 +274,7 @@ fn deflection(thick: u32) -> f64 {
     let half = mesh.positions[0].abs();
     let body = world.body_mut(id).expect("the body");
     let share = |p: Vec3| {
-        let at = |place: f32, rim: f32| if place.abs() == rim { 0.5 } else { 1.0 };
+        let at = |position: f32, rim: f32| if position.abs() == rim { 0.5 } else { 1.0 };
         at(p.y, half.y) * at(p.z, half.z) / f64::from(thick * thick)
     };
     let mut end = Vec::new();
@@ -279,7 +295,7 @@ fn deflection(thick: u32) -> f64 {
 #[test]
 fn a_cantilever_of_cells_bends_as_a_beam_does() {
     let [coarse, middle, fine] = [2, 4, 8].map(deflection);
-    // Richardson: what it would be with cells without end, and how fast that is reached.
+    // Richardson extrapolation: the limit for infinitely fine cells, and the order of convergence.
     let order = ((middle - coarse) / (fine - middle)).log2();
     let refined = fine + (fine - middle) / (order.exp2() - 1.0);
     assert!((fine - 1.0).abs() < 0.04, "{fine}");

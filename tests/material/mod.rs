@@ -1,4 +1,4 @@
-//! What tissue is made of: springs, elements and terms, and what changes them.
+//! Materials of tissue: springs, elements and terms, and changes of them.
 
 mod enclosed;
 mod laws;

@@ -1,4 +1,4 @@
-//! Organs of tetrahedra scattered, flattened and collapsed come back to rest, and no tetrahedron stays inside out.
+//! Scattered, flattened and collapsed organs of tetrahedra return to rest, and no tetrahedron stays inverted.
 
 use crate::support::bodies::{FREE, Random};
 use crate::support::organ::of_elements;
@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, ElementLaw, Material, Solver, Values, World, WorldDefinition};
 
-/// How far the edges are from their lengths at rest, RMS, and how many tetrahedra are inside out.
+/// Returns the RMS relative error of the edge lengths, and the number of inverted tetrahedra.
 fn recovery(mesh: &Mesh, positions: &[Vec3]) -> (f64, usize) {
     let at = |node: u32| positions[node as usize].as_dvec3();
     let rest = |node: u32| mesh.positions[node as usize].as_dvec3();
@@ -41,8 +41,8 @@ fn starts(mesh: &Mesh) -> [(&'static str, Vec<Vec3>); 3] {
     ]
 }
 
-/// Steps a body until its edges are as long as at rest within a thousandth, for so many seconds at most.
-fn come_back(mesh: &Mesh, definition: &BodyDefinition, start: &[Vec3], step: f32, named: &str) {
+/// Steps a body until its edges have their rest lengths within a thousandth, for a limited time.
+fn recover(mesh: &Mesh, definition: &BodyDefinition, start: &[Vec3], step: f32, named: &str) {
     const LONGEST: f32 = 10.0;
     let mut world = World::new(WorldDefinition {
         max_substeps: 1_000_000,
@@ -54,7 +54,7 @@ fn come_back(mesh: &Mesh, definition: &BodyDefinition, start: &[Vec3], step: f32
         .body_mut(body)
         .expect("the body")
         .set_positions(start)
-        .expect("places");
+        .expect("positions");
     let mut end = (f64::INFINITY, usize::MAX);
     let mut time = 0.0;
     while (end.0 > 1e-3 || end.1 > 0) && time < LONGEST {
@@ -66,26 +66,26 @@ fn come_back(mesh: &Mesh, definition: &BodyDefinition, start: &[Vec3], step: f32
         end = recovery(mesh, world.body(body).expect("the body").positions());
     }
     assert!(end.0 <= 1e-3, "{named}: strain {:e} after {time} s", end.0);
-    assert_eq!(end.1, 0, "{named}: inside out after {time} s");
+    assert_eq!(end.1, 0, "{named}: inverted after {time} s");
 }
 
-/// VERLET takes long for what is scattered.
+/// VERLET takes long for scattered starts.
 fn is_long(start: &str, solver: Solver) -> bool {
     start == "scattered" && solver == Solver::Verlet
 }
 
 #[test]
-fn organs_of_tetrahedra_come_back_from_anywhere() {
-    organs_of_tetrahedra_come_back_of(|start, solver| !is_long(start, solver));
+fn organs_of_tetrahedra_recover_from_any_start() {
+    organs_of_tetrahedra_recover_of(|start, solver| !is_long(start, solver));
 }
 
 #[test]
 #[ignore = "long"]
-fn scattered_organs_of_tetrahedra_come_back_with_verlet() {
-    organs_of_tetrahedra_come_back_of(is_long);
+fn scattered_organs_of_tetrahedra_recover_with_verlet() {
+    organs_of_tetrahedra_recover_of(is_long);
 }
 
-fn organs_of_tetrahedra_come_back_of(is_tried: fn(&str, Solver) -> bool) {
+fn organs_of_tetrahedra_recover_of(is_selected: fn(&str, Solver) -> bool) {
     let mesh = Mesh::organ(0.1, 0.012).expect("an organ");
     for nu in [0.0, 0.3, 0.45] {
         for (solver, step) in [
@@ -93,13 +93,13 @@ fn organs_of_tetrahedra_come_back_of(is_tried: fn(&str, Solver) -> bool) {
             (Solver::Implicit, 0.1),
             (Solver::Verlet, 1e-3),
         ] {
-            for (name, start) in starts(&mesh).into_iter().filter(|start| is_tried(start.0, solver)) {
+            for (name, start) in starts(&mesh).into_iter().filter(|start| is_selected(start.0, solver)) {
                 let definition = BodyDefinition {
                     node_dampings: Values::Uniform(0.02),
                     solver,
                     ..of_elements(&mesh, [5000.0, nu, 1060.0])
                 };
-                come_back(
+                recover(
                     &mesh,
                     &definition,
                     &start,
@@ -112,17 +112,17 @@ fn organs_of_tetrahedra_come_back_of(is_tried: fn(&str, Solver) -> bool) {
 }
 
 #[test]
-fn scattered_and_flat_organs_of_hyperelastic_laws_come_back() {
-    organs_of_hyperelastic_laws_come_back_of(|start, solver| !is_long(start, solver));
+fn scattered_and_flat_organs_of_hyperelastic_laws_recover() {
+    organs_of_hyperelastic_laws_recover_of(|start, solver| !is_long(start, solver));
 }
 
 #[test]
 #[ignore = "long"]
-fn scattered_organs_of_hyperelastic_laws_come_back_with_verlet() {
-    organs_of_hyperelastic_laws_come_back_of(is_long);
+fn scattered_organs_of_hyperelastic_laws_recover_with_verlet() {
+    organs_of_hyperelastic_laws_recover_of(is_long);
 }
 
-fn organs_of_hyperelastic_laws_come_back_of(is_tried: fn(&str, Solver) -> bool) {
+fn organs_of_hyperelastic_laws_recover_of(is_selected: fn(&str, Solver) -> bool) {
     let mesh = Mesh::organ(0.1, 0.0125).expect("an organ");
     for (law, nu) in [
         (ElementLaw::NeoHookean, 0.3),
@@ -131,12 +131,12 @@ fn organs_of_hyperelastic_laws_come_back_of(is_tried: fn(&str, Solver) -> bool) 
         (ElementLaw::MooneyRivlin { ratio: 0.3 }, 0.45),
     ] {
         for (solver, step) in [(Solver::Implicit, 1.0 / 60.0), (Solver::Verlet, 1e-3)] {
-            for (name, start) in starts(&mesh).into_iter().filter(|start| is_tried(start.0, solver)) {
-                // All at one point is an equilibrium of these laws, and nearly one nearby.
+            for (name, start) in starts(&mesh).into_iter().filter(|start| is_selected(start.0, solver)) {
+                // All nodes at one point is an equilibrium of these laws; nearby starts are nearly in equilibrium.
                 if name == "collapsed" {
                     continue;
                 }
-                // Refused: as it comes together, the stable substep falls below 1e-6 s.
+                // Refused: as the body contracts, the stable substep falls below 1e-6 s.
                 if (name, solver, law, nu) == ("scattered", Solver::Verlet, ElementLaw::NeoHookean, 0.45) {
                     continue;
                 }
@@ -147,40 +147,40 @@ fn organs_of_hyperelastic_laws_come_back_of(is_tried: fn(&str, Solver) -> bool) 
                     ..of_elements(&mesh, [5000.0, nu, 1060.0])
                 };
                 let named = format!("{name}, {law:?}, nu {nu}, {solver:?}");
-                come_back(&mesh, &definition, &start, step, &named);
+                recover(&mesh, &definition, &start, step, &named);
             }
         }
     }
 }
 
 #[test]
-fn organs_of_springs_that_keep_their_volume_come_back_from_anywhere() {
-    organs_of_springs_that_keep_their_volume_come_back_of(|case| case % 2 == 0);
+fn organs_of_springs_with_volume_stiffness_recover_from_any_start() {
+    organs_of_springs_with_volume_stiffness_recover_of(|case| case % 2 == 0);
 }
 
 #[test]
 #[ignore = "long"]
-fn organs_of_springs_that_keep_their_volume_come_back_from_anywhere_with_the_other_solver() {
-    organs_of_springs_that_keep_their_volume_come_back_of(|case| case % 2 != 0);
+fn organs_of_springs_with_volume_stiffness_recover_from_any_start_with_the_other_solver() {
+    organs_of_springs_with_volume_stiffness_recover_of(|case| case % 2 != 0);
 }
 
-fn organs_of_springs_that_keep_their_volume_come_back_of(is_tried: fn(usize) -> bool) {
+fn organs_of_springs_with_volume_stiffness_recover_of(is_selected: fn(usize) -> bool) {
     let mesh = Mesh::organ(0.1, 0.012).expect("an organ");
-    for (way, (solver, step)) in (0..).zip([(Solver::Implicit, 1.0 / 60.0), (Solver::Verlet, 1e-3)]) {
-        for (_, (name, start)) in (way..).zip(starts(&mesh)).filter(|start| is_tried(start.0)) {
+    for (first_case, (solver, step)) in (0..).zip([(Solver::Implicit, 1.0 / 60.0), (Solver::Verlet, 1e-3)]) {
+        for (_, (name, start)) in (first_case..).zip(starts(&mesh)).filter(|start| is_selected(start.0)) {
             let definition = BodyDefinition {
                 material: Some(Material {
                     young_modulus: 5000.0,
                     density: 1060.0,
                     ..Material::default()
                 }),
-                // With ten times as much what is folded stays so: no tetrahedron gives way any more.
+                // With ten times as much, folded tetrahedra stay folded: none of them deforms any more.
                 volume_stiffness: 2000.0,
                 node_dampings: Values::Uniform(0.02),
                 solver,
                 ..BodyDefinition::of(&mesh)
             };
-            come_back(
+            recover(
                 &mesh,
                 &definition,
                 &start,

@@ -1,4 +1,5 @@
-//! Regions made stiffer, softer, larger and smaller while a body runs: what is scaled goes on as what was made so, what is not as before.
+//! Regions made stiffer, softer, larger and smaller during a run: a scaled region behaves as if created that way, and
+//! the remainder is unchanged.
 
 use crate::support::bodies::{FREE, Random, largest_difference};
 use crate::support::scene::{SOLVERS, STORAGES};
@@ -17,10 +18,10 @@ const RIGIDITY: f32 = 3e-5;
 const FIBRE: f32 = 2000.0;
 const VOLUME: f32 = 1500.0;
 
-/// What a body is made of.
+/// The material of a body.
 #[derive(Clone, Copy, Debug)]
-struct Asked {
-    /// Poisson's ratio of tetrahedra that are elements.
+struct Composition {
+    /// Poisson's ratio of tetrahedra that are finite elements.
     elements: Option<f32>,
     springs: bool,
     volume: bool,
@@ -28,35 +29,35 @@ struct Asked {
     terms: bool,
 }
 
-const SPRINGS: Asked = Asked {
+const SPRINGS: Composition = Composition {
     elements: None,
     springs: true,
     volume: false,
     home: false,
     terms: false,
 };
-const ELEMENTS: Asked = Asked {
+const ELEMENTS: Composition = Composition {
     elements: Some(0.3),
     springs: false,
     ..SPRINGS
 };
-const RINGS: Asked = Asked {
+const RINGS: Composition = Composition {
     elements: Some(0.45),
     ..ELEMENTS
 };
-const VOLUMES: Asked = Asked {
+const VOLUMES: Composition = Composition {
     volume: true,
     ..SPRINGS
 };
-const TERMS: Asked = Asked { terms: true, ..SPRINGS };
-const EVERYTHING: Asked = Asked {
+const TERMS: Composition = Composition { terms: true, ..SPRINGS };
+const EVERYTHING: Composition = Composition {
     home: true,
     springs: true,
     terms: true,
     ..ELEMENTS
 };
 
-/// A block whose nodes lie anyhow, and what is needed to make bodies of it.
+/// A block of irregularly placed nodes, with the data to create bodies of it.
 struct Block {
     mesh: Mesh,
     springs: Vec<[u32; 2]>,
@@ -70,7 +71,7 @@ impl Block {
         let mut mesh = Mesh::block(cells.map(|count| count as f32 * 0.01), cells).expect("a block");
         mesh.positions
             .iter_mut()
-            .for_each(|place| *place += 1e-3 * random.vector());
+            .for_each(|position| *position += 1e-3 * random.vector());
         let mut world = World::new(FREE).expect("a world");
         let body = world.create_body(&BodyDefinition {
             masses: Values::Uniform(MASS),
@@ -89,12 +90,12 @@ impl Block {
         }
     }
 
-    /// Both side by side, which nothing joins.
-    fn and(&self, other: &Self) -> Self {
+    /// Returns both blocks side by side, unconnected.
+    fn combined_with(&self, other: &Self) -> Self {
         let first = self.mesh.positions.len() as u32;
         let mut mesh = self.mesh.clone();
         mesh.positions
-            .extend(other.mesh.positions.iter().map(|place| *place + 0.125 * Vec3::X));
+            .extend(other.mesh.positions.iter().map(|position| *position + 0.125 * Vec3::X));
         let tetrahedra = other
             .mesh
             .tetrahedra
@@ -123,28 +124,35 @@ impl Block {
         (0..self.mesh.positions.len() as u32).collect()
     }
 
-    /// A body that is `stiffness` times as stiff and `length` times as long at rest.
-    fn make(&self, world: &mut World, asked: Asked, kept: (Storage, Solver), stiffness: f32, length: f32) -> BodyId {
-        let rest: Vec<Vec3> = self.mesh.positions.iter().map(|place| *place * length).collect();
-        let on = |asked: bool, value: f32| if asked { value * stiffness } else { 0.0 };
+    /// Creates a body that is `stiffness` times as stiff and has `length` times the rest lengths.
+    fn make(
+        &self,
+        world: &mut World,
+        composition: Composition,
+        kept: (Storage, Solver),
+        stiffness: f32,
+        length: f32,
+    ) -> BodyId {
+        let rest: Vec<Vec3> = self.mesh.positions.iter().map(|position| *position * length).collect();
+        let on = |composition: bool, value: f32| if composition { value * stiffness } else { 0.0 };
         let body = world.create_body(&BodyDefinition {
             positions: &self.mesh.positions,
             rest_positions: Some(&rest),
             masses: Values::Uniform(MASS),
-            springs: Some(if asked.springs { &self.springs } else { &[] }),
-            stiffnesses: Values::Uniform(on(asked.springs, STIFFNESS)),
+            springs: Some(if composition.springs { &self.springs } else { &[] }),
+            stiffnesses: Values::Uniform(on(composition.springs, STIFFNESS)),
             tetrahedra: &self.mesh.tetrahedra,
             triangles: &self.surface,
-            material: asked.elements.map(|poisson_ratio| Material {
+            material: composition.elements.map(|poisson_ratio| Material {
                 model: Model::Tetrahedra,
                 young_modulus: YOUNG * stiffness,
                 poisson_ratio,
                 ..Material::default()
             }),
-            volume_stiffness: on(asked.volume, VOLUME),
-            home_stiffnesses: Values::Uniform(on(asked.home, HOME)),
-            bending_stiffness: on(asked.terms, RIGIDITY),
-            spring_law: if asked.terms {
+            volume_stiffness: on(composition.volume, VOLUME),
+            home_stiffnesses: Values::Uniform(on(composition.home, HOME)),
+            bending_stiffness: on(composition.terms, RIGIDITY),
+            spring_law: if composition.terms {
                 SpringLaw::Exponential {
                     steepness: 6.0,
                     limit: 0.2,
@@ -152,11 +160,11 @@ impl Block {
             } else {
                 SpringLaw::Linear
             },
-            fibre_directions: if asked.terms { &self.directions } else { &[] },
-            fibre_stiffnesses: Values::Uniform(on(asked.terms, FIBRE)),
+            fibre_directions: if composition.terms { &self.directions } else { &[] },
+            fibre_stiffnesses: Values::Uniform(on(composition.terms, FIBRE)),
             storage: kept.0,
             solver: kept.1,
-            // Nothing of the steps before: bodies are put where another is.
+            // Order 1 uses no earlier steps: bodies are moved to another body's state.
             order: u32::from(kept.1 != Solver::Verlet),
             accuracy: if kept.1 == Solver::Implicit { 1e-4 } else { 0.0 },
             mass_scaling: 0.0,
@@ -166,21 +174,22 @@ impl Block {
     }
 }
 
-fn places(body: &Body) -> Vec<DVec3> {
-    body.positions().iter().map(|place| place.as_dvec3()).collect()
+fn positions_of(body: &Body) -> Vec<DVec3> {
+    body.positions().iter().map(|position| position.as_dvec3()).collect()
 }
 
-/// Two blocks in motion in one body, of which one is scaled: both go on as bodies that were made so, put where they are then.
-fn one_of_two_is_scaled(asked: Asked, kept: (Storage, Solver), stiffness: f32, length: f32) {
-    let label = format!("{asked:?} {kept:?} {stiffness} {length}");
+/// Scales one of two moving blocks of a body: both then move like bodies created with those parameters and placed in
+/// the same state.
+fn check_one_of_two_scaled(composition: Composition, kept: (Storage, Solver), stiffness: f32, length: f32) {
+    let label = format!("{composition:?} {kept:?} {stiffness} {length}");
     let (first, second) = (Block::new([3, 3, 4], 1), Block::new([4, 3, 3], 2));
-    let both = first.and(&second);
+    let both = first.combined_with(&second);
     let count = first.mesh.positions.len();
     let substeps = if kept.1 == Solver::Verlet { 50 } else { 0 };
     let definition = WorldDefinition { substeps, ..FREE };
     let mut random = Random::new(9);
     let mut world = World::new(definition).expect("a world");
-    let id = both.make(&mut world, asked, kept, 1.0, 1.0);
+    let id = both.make(&mut world, composition, kept, 1.0, 1.0);
     let velocities: Vec<Vec3> = both.mesh.positions.iter().map(|_| 0.2 * random.vector()).collect();
     world
         .body_mut(id)
@@ -193,7 +202,7 @@ fn one_of_two_is_scaled(asked: Asked, kept: (Storage, Solver), stiffness: f32, l
     }
     let body = world.body_mut(id).expect("it");
     let before = body.energy(Vec3::ZERO);
-    // In any order, some twice, and in two goes.
+    // In any order, some nodes twice, and in two calls.
     let mut nodes = first.nodes();
     nodes.reverse();
     nodes.extend(&[1, 2, 3]);
@@ -204,14 +213,14 @@ fn one_of_two_is_scaled(asked: Asked, kept: (Storage, Solver), stiffness: f32, l
     let (now, speeds) = (body.positions().to_vec(), body.velocities().to_vec());
     let mut apart = World::new(definition).expect("a world");
     let ids = [
-        first.make(&mut apart, asked, kept, stiffness, length),
-        second.make(&mut apart, asked, kept, 1.0, 1.0),
+        first.make(&mut apart, composition, kept, stiffness, length),
+        second.make(&mut apart, composition, kept, 1.0, 1.0),
     ];
     for (id, nodes) in ids.into_iter().zip([0..count, count..now.len()]) {
         let shift = if nodes.start == 0 { Vec3::ZERO } else { 0.125 * Vec3::X };
-        let there: Vec<Vec3> = now[nodes.clone()].iter().map(|place| *place - shift).collect();
+        let placed: Vec<Vec3> = now[nodes.clone()].iter().map(|position| *position - shift).collect();
         let body = apart.body_mut(id).expect("it");
-        body.set_positions(&there).expect("positions");
+        body.set_positions(&placed).expect("positions");
         body.set_velocities(&speeds[nodes]).expect("velocities");
     }
     let elastic = |world: &World| -> f64 {
@@ -238,50 +247,54 @@ fn one_of_two_is_scaled(asked: Asked, kept: (Storage, Solver), stiffness: f32, l
             world.step(dt).expect("a step");
         }
     }
-    let moved = places(world.body(id).expect("it"));
-    let start: Vec<DVec3> = now.iter().map(|place| place.as_dvec3()).collect();
+    let moved = positions_of(world.body(id).expect("it"));
+    let start: Vec<DVec3> = now.iter().map(|position| position.as_dvec3()).collect();
     for (id, nodes) in ids.into_iter().zip([0..count, count..now.len()]) {
         let shift = if nodes.start == 0 {
             DVec3::ZERO
         } else {
             0.125 * DVec3::X
         };
-        let expected: Vec<DVec3> = places(apart.body(id).expect("it"))
+        let expected: Vec<DVec3> = positions_of(apart.body(id).expect("it"))
             .iter()
-            .map(|place| *place + shift)
+            .map(|position| *position + shift)
             .collect();
-        let way = largest_difference(&expected, &start[nodes.clone()]);
-        let off = largest_difference(&moved[nodes.clone()], &expected);
-        // What the formula of IMPLICIT and NEWTON takes of the angular momentum is given back to a body as a whole: to both blocks together, or to each.
-        // (Without that they agree within 2e-3.)
+        let displacement = largest_difference(&expected, &start[nodes.clone()]);
+        let error = largest_difference(&moved[nodes.clone()], &expected);
+        // IMPLICIT and NEWTON restore the angular momentum that their formula loses to a body as a whole: to both
+        // blocks together, or to each. (Without that they agree within 2e-3.)
         let allowed = if kept.1 == Solver::Verlet { 2e-4 } else { 1e-2 };
-        assert!(off < allowed * way, "{label} from {}: {off} of {way} m", nodes.start);
+        assert!(
+            error < allowed * displacement,
+            "{label} from {}: {error} of {displacement} m",
+            nodes.start
+        );
     }
 }
 
 #[test]
-fn a_scaled_region_goes_on_as_one_that_was_made_so() {
+fn a_scaled_region_moves_as_one_created_that_way() {
     for solver in SOLVERS {
-        for asked in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS] {
-            one_of_two_is_scaled(asked, (Storage::Packed, solver), 2.5, 1.06);
-            one_of_two_is_scaled(asked, (Storage::Packed, solver), 0.4, 0.93);
+        for composition in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS] {
+            check_one_of_two_scaled(composition, (Storage::Packed, solver), 2.5, 1.06);
+            check_one_of_two_scaled(composition, (Storage::Packed, solver), 0.4, 0.93);
         }
-        one_of_two_is_scaled(EVERYTHING, (Storage::Packed, solver), 3.0, 1.0);
+        check_one_of_two_scaled(EVERYTHING, (Storage::Packed, solver), 3.0, 1.0);
     }
     for storage in STORAGES {
-        for asked in [SPRINGS, TERMS] {
-            one_of_two_is_scaled(asked, (storage, Solver::Verlet), 2.5, 1.06);
+        for composition in [SPRINGS, TERMS] {
+            check_one_of_two_scaled(composition, (storage, Solver::Verlet), 2.5, 1.06);
         }
     }
 }
 
 #[test]
-fn a_free_block_that_swells_is_as_much_larger_at_rest() {
+fn a_swollen_free_block_is_larger_at_rest() {
     let block = Block::new([4, 4, 4], 3);
-    for asked in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS] {
+    for composition in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS] {
         for (calls, by) in [(1, 1.25_f32), (20, 0.99)] {
             let mut world = World::new(FREE).expect("a world");
-            let id = block.make(&mut world, asked, (Storage::Packed, Solver::Verlet), 1.0, 1.0);
+            let id = block.make(&mut world, composition, (Storage::Packed, Solver::Verlet), 1.0, 1.0);
             for _ in 0..calls {
                 world
                     .body_mut(id)
@@ -292,19 +305,22 @@ fn a_free_block_that_swells_is_as_much_larger_at_rest() {
             world
                 .rest_state(id, &RestStateDefinition::default())
                 .expect("a state of rest");
-            let (now, factor) = (places(world.body(id).expect("it")), f64::from(by).powi(calls));
+            let (now, factor) = (positions_of(world.body(id).expect("it")), f64::from(by).powi(calls));
             for (a, b) in (0..now.len()).zip((0..now.len()).rev()) {
                 let rest = block.mesh.positions[a]
                     .as_dvec3()
                     .distance(block.mesh.positions[b].as_dvec3());
-                let off = now[a].distance(now[b]) - factor * rest;
-                assert!(off.abs() < 1e-5 * 0.04 * factor, "{asked:?} {by}: {off} of {rest} m");
+                let error = now[a].distance(now[b]) - factor * rest;
+                assert!(
+                    error.abs() < 1e-5 * 0.04 * factor,
+                    "{composition:?} {by}: {error} of {rest} m"
+                );
             }
         }
     }
 }
 
-/// The part of a block between some of its nodes, in its own numbers.
+/// Returns the part of a block between some of its nodes, renumbered.
 fn part(block: &Block, has: impl Fn(u32) -> bool) -> (Block, Vec<u32>) {
     let nodes: Vec<u32> = block.nodes().into_iter().filter(|&node| has(node)).collect();
     let number = |node: u32| nodes.binary_search(&node).expect("a node of the part") as u32;
@@ -314,8 +330,9 @@ fn part(block: &Block, has: impl Fn(u32) -> bool) -> (Block, Vec<u32>) {
         .iter()
         .zip(&block.directions)
         .filter(|(corners, _)| corners.iter().all(|&c| has(c)));
-    let (tetrahedra, directions): (Vec<[u32; 4]>, Vec<Vec3>) =
-        within.map(|(corners, way)| (corners.map(number), *way)).unzip();
+    let (tetrahedra, directions): (Vec<[u32; 4]>, Vec<Vec3>) = within
+        .map(|(corners, displacement)| (corners.map(number), *displacement))
+        .unzip();
     let springs = block.springs.iter().filter(|pair| pair.iter().all(|&node| has(node)));
     let mut mesh = block.mesh.clone();
     mesh.positions = nodes.iter().map(|&node| block.mesh.positions[node as usize]).collect();
@@ -330,44 +347,48 @@ fn part(block: &Block, has: impl Fn(u32) -> bool) -> (Block, Vec<u32>) {
 }
 
 #[test]
-fn only_what_lies_within_the_region_is_scaled() {
+fn only_springs_and_elements_within_the_region_are_scaled() {
     // Several tiles and parts.
     let block = Block::new([14, 9, 9], 4);
     let mut random = Random::new(5);
     let has = |node: u32| {
-        let place = block.mesh.positions[node as usize];
-        place.distance(Vec3::new(0.02, 0.0, 0.01)) < 0.032 || place.x < -0.05
+        let position = block.mesh.positions[node as usize];
+        position.distance(Vec3::new(0.02, 0.0, 0.01)) < 0.032 || position.x < -0.05
     };
     let (inside, nodes) = part(&block, has);
-    let there: Vec<Vec3> = block
+    let placed: Vec<Vec3> = block
         .mesh
         .positions
         .iter()
-        .map(|place| *place * 1.1 + 5e-4 * random.vector())
+        .map(|position| *position * 1.1 + 5e-4 * random.vector())
         .collect();
-    for asked in [SPRINGS, ELEMENTS, VOLUMES] {
+    for composition in [SPRINGS, ELEMENTS, VOLUMES] {
         let kept = (Storage::Packed, Solver::Verlet);
         let mut world = World::new(FREE).expect("a world");
         let (stiffness, length) = (7.0, 1.03);
-        let id = block.make(&mut world, asked, kept, 1.0, 1.0);
+        let id = block.make(&mut world, composition, kept, 1.0, 1.0);
         let [soft, stiff] = [(1.0, 1.0), (stiffness, length)].map(|(stiffness, length)| {
-            let id = inside.make(&mut world, asked, kept, stiffness, length);
-            let there: Vec<Vec3> = nodes.iter().map(|&node| there[node as usize]).collect();
+            let id = inside.make(&mut world, composition, kept, stiffness, length);
+            let placed: Vec<Vec3> = nodes.iter().map(|&node| placed[node as usize]).collect();
             world
                 .body_mut(id)
                 .expect("it")
-                .set_positions(&there)
+                .set_positions(&placed)
                 .expect("positions");
             world.body(id).expect("it").energy(Vec3::ZERO).elastic
         });
         let body = world.body_mut(id).expect("it");
-        body.set_positions(&there).expect("positions");
+        body.set_positions(&placed).expect("positions");
         let before = body.energy(Vec3::ZERO).elastic;
         body.scale_region(&nodes, stiffness, length).expect("a region");
         let change = body.energy(Vec3::ZERO).elastic - before;
-        let off = (change - (stiff - soft)).abs();
-        assert!(off < 1e-4 * stiff, "{asked:?}: {change}, not {} J", stiff - soft);
-        // Nothing lies between few nodes that nothing joins.
+        let error = (change - (stiff - soft)).abs();
+        assert!(
+            error < 1e-4 * stiff,
+            "{composition:?}: {change}, not {} J",
+            stiff - soft
+        );
+        // Nothing lies between a few unconnected nodes.
         let hash = world.state_hash();
         let body = world.body_mut(id).expect("it");
         body.scale_region(&[nodes[0]], 5.0, 2.0).expect("a region");
@@ -377,17 +398,17 @@ fn only_what_lies_within_the_region_is_scaled() {
 }
 
 #[test]
-fn a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up() {
-    a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_of(Solver::Verlet);
+fn stiffening_a_region_a_hundredfold_in_motion_is_stable() {
+    stiffening_a_region_a_hundredfold_in_motion_is_stable_of(Solver::Verlet);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_with_implicit() {
-    a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_of(Solver::Implicit);
+fn stiffening_a_region_a_hundredfold_in_motion_is_stable_with_implicit() {
+    stiffening_a_region_a_hundredfold_in_motion_is_stable_of(Solver::Implicit);
 }
 
-fn a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_of(solver: Solver) {
+fn stiffening_a_region_a_hundredfold_in_motion_is_stable_of(solver: Solver) {
     let block = Block::new([8, 6, 6], 6);
     let mut random = Random::new(7);
     let velocities: Vec<Vec3> = block.mesh.positions.iter().map(|_| 0.2 * random.vector()).collect();
@@ -396,9 +417,9 @@ fn a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_
         .into_iter()
         .filter(|&node| block.mesh.positions[node as usize].x < 0.0)
         .collect();
-    for asked in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS] {
+    for composition in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS] {
         let mut world = World::new(FREE).expect("a world");
-        let id = block.make(&mut world, asked, (Storage::Packed, solver), 1.0, 1.0);
+        let id = block.make(&mut world, composition, (Storage::Packed, solver), 1.0, 1.0);
         world
             .body_mut(id)
             .expect("it")
@@ -416,13 +437,13 @@ fn a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_
             let report = world.step(1e-2).expect("a step");
             assert_eq!(report.bodies_restored, 0);
             if solver == Solver::Verlet {
-                assert!(report.substeps > 4 * substeps, "{asked:?}: {}", report.substeps);
+                assert!(report.substeps > 4 * substeps, "{composition:?}: {}", report.substeps);
             }
             let now = world.body(id).expect("it").energy(Vec3::ZERO);
             let now = now.kinetic + now.elastic;
-            assert!(now < 1.05 * energy, "{asked:?} {solver:?}: {now} of {energy} J");
+            assert!(now < 1.05 * energy, "{composition:?} {solver:?}: {now} of {energy} J");
             if solver == Solver::Verlet {
-                assert!(now > 0.9 * energy, "{asked:?} {solver:?}: {now} of {energy} J");
+                assert!(now > 0.9 * energy, "{composition:?} {solver:?}: {now} of {energy} J");
             }
         }
     }
@@ -432,9 +453,9 @@ fn a_region_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blows_nothing_up_
 fn without_stiffness_nothing_is_held() {
     let block = Block::new([3, 3, 3], 8);
     for solver in SOLVERS {
-        for asked in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS, EVERYTHING] {
+        for composition in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS, EVERYTHING] {
             let mut world = World::new(FREE).expect("a world");
-            let id = block.make(&mut world, asked, (Storage::Packed, solver), 1.0, 1.0);
+            let id = block.make(&mut world, composition, (Storage::Packed, solver), 1.0, 1.0);
             let mut random = Random::new(1);
             let velocities: Vec<Vec3> = block.mesh.positions.iter().map(|_| random.vector()).collect();
             let body = world.body_mut(id).expect("it");
@@ -445,25 +466,25 @@ fn without_stiffness_nothing_is_held() {
             for _ in 0..3 {
                 world.step(1e-2).expect("a step");
             }
-            let now = places(world.body(id).expect("it"));
+            let now = positions_of(world.body(id).expect("it"));
             let free = block.mesh.positions.iter().zip(&velocities);
             let free: Vec<DVec3> = free
-                .map(|(place, velocity)| place.as_dvec3() + 0.03 * velocity.as_dvec3())
+                .map(|(position, velocity)| position.as_dvec3() + 0.03 * velocity.as_dvec3())
                 .collect();
-            let off = largest_difference(&now, &free);
-            assert!(off < 1e-7, "{asked:?} {solver:?}: {off} m");
+            let error = largest_difference(&now, &free);
+            assert!(error < 1e-7, "{composition:?} {solver:?}: {error} m");
         }
     }
 }
 
 #[test]
-fn what_is_refused_changes_nothing() {
+fn refused_changes_have_no_effect() {
     let block = Block::new([3, 3, 3], 10);
     let nodes = block.nodes();
     for solver in SOLVERS {
-        for asked in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS, EVERYTHING] {
+        for composition in [SPRINGS, ELEMENTS, RINGS, VOLUMES, TERMS, EVERYTHING] {
             let mut world = World::new(FREE).expect("a world");
-            let id = block.make(&mut world, asked, (Storage::Packed, solver), 1.0, 1.0);
+            let id = block.make(&mut world, composition, (Storage::Packed, solver), 1.0, 1.0);
             world.step(1e-3).expect("a step");
             let hash = world.state_hash();
             let mut beyond = nodes.clone();
@@ -482,9 +503,9 @@ fn what_is_refused_changes_nothing() {
                 let refused = world.body_mut(id).expect("it").scale_region(nodes, stiffness, length);
                 match refused {
                     Err(Error::InvalidArgument(message)) => assert!(message.contains(name), "{message}"),
-                    other => panic!("{asked:?} {name}: {other:?}"),
+                    other => panic!("{composition:?} {name}: {other:?}"),
                 }
-                assert_eq!(world.state_hash(), hash, "{asked:?} {name}");
+                assert_eq!(world.state_hash(), hash, "{composition:?} {name}");
             }
         }
     }

@@ -1,5 +1,5 @@
-//! Springs from Young's modulus and masses from density, against what the deformed lattice has (Cauchy-Born) and what a
-//! laboratory would measure.
+//! Springs from Young's modulus and masses from density, against the theory of a deformed lattice (Cauchy-Born) and
+//! against simulated laboratory tests.
 
 use std::collections::BTreeMap;
 
@@ -42,7 +42,7 @@ fn world_of(definition: &BodyDefinition) -> (World, BodyId) {
     (world, id)
 }
 
-/// m; its small multiples are numbers of `f32`, stretched by few binary digits too, so that no rounding enters.
+/// m; its small multiples are exact in `f32`, also stretched by a few binary digits, so that there is no rounding.
 const DYADIC: f32 = 0.03125;
 
 /// Equilateral triangles in the plane z = 0, to 20 binary digits.
@@ -64,7 +64,7 @@ fn triangle_sheet(cells: u32, side: f64) -> Mesh {
     mesh
 }
 
-/// What the springs do to each node when all are held where `deformation` puts them, N.
+/// Returns the spring force on each node when all nodes are held at positions given by `deformation` (N).
 fn forces(definition: &BodyDefinition, deformation: DMat3) -> Vec<DVec3> {
     let (mut world, id) = world_of(definition);
     let body = world.body_mut(id).expect("the body");
@@ -82,7 +82,7 @@ fn forces(definition: &BodyDefinition, deformation: DMat3) -> Vec<DVec3> {
     (0..definition.positions.len()).map(force).collect()
 }
 
-/// How far forces are from others, over the largest of those.
+/// Returns the largest difference of forces, relative to the largest expected force.
 fn error_of(found: &[DVec3], expected: &[DVec3]) -> f64 {
     assert_eq!(found.len(), expected.len());
     let largest = expected.iter().map(|force| force.length()).fold(0.0, f64::max);
@@ -93,7 +93,7 @@ fn error_of(found: &[DVec3], expected: &[DVec3]) -> f64 {
     errors.fold(0.0, f64::max) / largest
 }
 
-/// Stretches and shears, small and up to 0.2, that keep dyadic places exact.
+/// Stretches and shears, small and up to 0.2, that keep dyadic positions exact.
 fn deformations() -> [DMat3; 5] {
     let shear = DMat3::from_cols(DVec3::new(1.0, 0.0, 0.0), DVec3::new(0.125, 1.0, 0.0), DVec3::Z);
     [
@@ -105,18 +105,18 @@ fn deformations() -> [DMat3; 5] {
     ]
 }
 
-/// The stiffness of an inner spring of a lattice of cubes of edge `a`.
+/// Returns the stiffness of an inner spring of a lattice of cubes of edge `a`.
 fn lattice_stiffness(a: f64) -> f64 {
     0.4 * f64::from(YOUNG_MODULUS) * a
 }
 
 #[test]
-fn a_lattice_pulls_as_its_deformed_cells_do() {
+fn lattice_forces_agree_with_its_deformed_cells() {
     let mesh = Mesh::lattice(DYADIC, [4, 3, 2]).expect("a lattice");
     let a = f64::from(DYADIC);
     for deformation in deformations() {
         let stress = stress(deformation, &cubic_cell(a, lattice_stiffness(a)), a * a * a);
-        // Each cell pulls each of its corners as an even stress does: inside the body nothing is left.
+        // A uniform stress in each cell exerts forces on its corners: inside the body they cancel.
         let mut expected = vec![DVec3::ZERO; mesh.positions.len()];
         for cell in &mesh.cells {
             for (corner, &node) in cell.iter().enumerate() {
@@ -139,7 +139,7 @@ fn a_lattice_pulls_as_its_deformed_cells_do() {
 }
 
 #[test]
-fn a_lattice_is_as_stiff_as_asked_for_in_every_direction() {
+fn a_lattice_has_the_requested_stiffness_in_every_direction() {
     let a = 0.01;
     let springs = cubic_cell(a, lattice_stiffness(a));
     let stretched = |axis, strain| {
@@ -164,7 +164,7 @@ fn a_lattice_is_as_stiff_as_asked_for_in_every_direction() {
 }
 
 #[test]
-fn a_triangle_sheet_pulls_as_its_deformed_triangles_do() {
+fn triangle_sheet_forces_agree_with_its_deformed_triangles() {
     let mesh = triangle_sheet(4, f64::from(DYADIC));
     let stiffness = 0.75_f64.sqrt() * f64::from(YOUNG_MODULUS) * f64::from(THICKNESS);
     let (directions, area) = triangle_cell(f64::from(DYADIC), stiffness);
@@ -179,7 +179,7 @@ fn a_triangle_sheet_pulls_as_its_deformed_triangles_do() {
     for mut deformation in deformations() {
         deformation.z_axis = DVec3::Z;
         let stress = stress(deformation, &directions, area);
-        // What an even stress does to the corners of each triangle: P times half the opposite side's normal, inward.
+        // A uniform stress exerts on each corner of a triangle P times half the inward normal of the opposite side.
         let mut expected = vec![DVec3::ZERO; mesh.positions.len()];
         for triangle in &mesh.triangles {
             for corner in 0..3 {
@@ -202,7 +202,7 @@ fn a_triangle_sheet_pulls_as_its_deformed_triangles_do() {
     }
 }
 
-/// A block cut in tetrahedra whose inner nodes are moved about.
+/// A block cut into tetrahedra whose inner nodes are moved at random.
 fn irregular_block(seed: u64) -> Mesh {
     let mut mesh = Mesh::block([4.0 * DYADIC; 3], [4; 3]).expect("a block");
     let mut random = Random::new(seed);
@@ -214,20 +214,20 @@ fn irregular_block(seed: u64) -> Mesh {
     mesh
 }
 
-/// Evenly swollen, every spring is stretched alike: whatever the mesh, the tension is that of three times the bulk modulus,
-/// E / (1 - 2 nu), and in the plane E t / (1 - nu), at the nu that springs imply.
+/// Uniform swelling stretches all springs alike. On any mesh the tension follows from three times the bulk modulus, E /
+/// (1 - 2 nu), and in the plane from E t / (1 - nu), at the nu that springs imply.
 #[test]
-fn swollen_evenly_any_mesh_has_the_tension_of_its_material() {
+fn uniform_swelling_gives_the_tension_of_the_material() {
     let strain = 0.0625;
     let swollen = |mesh: &Mesh, material: Material| {
         let found = forces(
             &definition(mesh, material),
             DMat3::from_diagonal(DVec3::splat(1.0 + strain)),
         );
-        let places = mesh.positions.iter().map(|p| p.as_dvec3());
+        let positions = mesh.positions.iter().map(|p| p.as_dvec3());
         -found
             .iter()
-            .zip(places)
+            .zip(positions)
             .map(|(force, place)| force.dot(place))
             .sum::<f64>()
     };
@@ -255,7 +255,7 @@ fn swollen_evenly_any_mesh_has_the_tension_of_its_material() {
 }
 
 #[test]
-fn a_block_pulled_by_a_known_force_is_as_long_and_as_thin_as_its_numbers_say() {
+fn a_block_under_a_known_force_has_the_expected_length_and_width() {
     let (edge, cells) = (0.01_f32, [10_u32, 5, 5]);
     let mesh = Mesh::lattice(edge, cells).expect("a lattice");
     let section = (f64::from(edge) * 5.0).powi(2);
@@ -309,7 +309,8 @@ fn masses_are_density_times_volume() {
                 storage,
                 ..definition(mesh, material)
             });
-            // In a field of 1 m/s² along an axis, the potential energy of the body is its mass times where it is.
+            // In a field of 1 m/s² along an axis, the potential energy of the body is its mass times the position of
+            // its center.
             let body = world.body(id).expect("the body");
             let moment = |gravity: Vec3| -body.energy(gravity).gravitational;
             let (mut world, id) = world_of(&definition(mesh, material));
@@ -321,13 +322,13 @@ fn masses_are_density_times_volume() {
                 (mass / expected - 1.0).abs() < 1e-5,
                 "{storage:?}: {mass} kg for {expected}"
             );
-            // Their centre is the origin, but for some of the irregular one.
+            // Their center is the origin, except for a small offset of the irregular one.
             for axis in Vec3::AXES {
                 assert!(moment(axis).abs() < 1e-3 * expected);
             }
         }
     }
-    // A corner of a lattice has an eighth of a cell: falling with the pinned rest, it weighs that.
+    // A corner of a lattice has an eighth of a cell: falling with all other nodes pinned, it has that weight.
     let mut world = World::new(sinew::WorldDefinition {
         gravity: Vec3::NEG_Y * 10.0,
         ..FREE
@@ -343,9 +344,9 @@ fn masses_are_density_times_volume() {
     assert!((held.y / (1000.0 * 1e-6 / 8.0 * 10.0) - 1.0).abs() < 1e-5, "{held}");
 }
 
-/// A body does not know where its stiffnesses and masses came from.
+/// A body behaves the same whether its stiffnesses and masses were computed or given.
 #[test]
-fn a_body_with_a_material_is_the_body_of_its_springs() {
+fn a_body_with_a_material_equals_the_body_of_its_springs() {
     let mesh = Mesh::lattice(DYADIC, [3, 3, 3]).expect("a lattice");
     let stiffness = lattice_stiffness(f64::from(DYADIC));
     let cell_mass = 1000.0 * f64::from(DYADIC).powi(3);
@@ -378,12 +379,12 @@ fn a_body_with_a_material_is_the_body_of_its_springs() {
                 solver,
                 ..definition(&mesh, TISSUE)
             };
-            let asked = BodyDefinition {
+            let requested = BodyDefinition {
                 storage,
                 solver,
                 ..definition(&mesh, TISSUE)
             };
-            let [mut given, mut made] = [plain, asked].map(|definition| world_of(&definition));
+            let [mut given, mut made] = [plain, requested].map(|definition| world_of(&definition));
             for (world, id) in [&mut given, &mut made] {
                 let body = world.body_mut(*id).expect("the body");
                 body.pin(0).expect("a node");
@@ -397,7 +398,8 @@ fn a_body_with_a_material_is_the_body_of_its_springs() {
     }
 }
 
-/// Rounded positions make no kinds of spring: sheets and blocks of equal elements stay bodies of few kinds, wherever they are.
+/// Rounded positions create no extra spring types: sheets and blocks of equal elements stay bodies of few types,
+/// wherever they are.
 #[test]
 fn equal_elements_have_equal_springs() {
     let mut sheet = Mesh::cloth([1.0, 1.0], [50, 50]).expect("a sheet");
@@ -406,7 +408,7 @@ fn equal_elements_have_equal_springs() {
     }
     let made = world_of(&definition(&sheet, SHEET));
     let (young_modulus, t) = (YOUNG_MODULUS, THICKNESS);
-    // Legs lie between two triangles of half a square, or one; diagonals between two.
+    // Legs lie between two triangles of half a square, or belong to one; diagonals lie between two.
     let pairs = sheet.edges().expect("edges");
     let at_rim = |[a, b]: [u32; 2]| {
         let rim = |node: u32| {
@@ -440,7 +442,7 @@ fn cells_have_their_outer_faces_as_surface() {
     let (faces, inside) = (2 * (6 + 8 + 12), mesh.triangles.clone());
     assert_eq!(inside.len(), 2 * faces);
     assert!(is_closed(&mesh.triangles).expect("memory"));
-    // What the triangles enclose, outward, is the volume of the cells.
+    // The outward triangles enclose the volume of the cells.
     let enclosed = Mesh {
         cells: vec![],
         ..mesh.clone()
@@ -449,7 +451,7 @@ fn cells_have_their_outer_faces_as_surface() {
     mesh.triangles.clear();
     let (world, id) = world_of(&definition(&mesh, TISSUE));
     assert_eq!(world.body(id).expect("the body").surface(), inside);
-    // Without a material cells are springs too, each pair once.
+    // Without a material cells are also springs, each pair once.
     let (world, id) = world_of(&BodyDefinition {
         material: None,
         masses: Values::Uniform(1.0),
@@ -464,7 +466,7 @@ fn cells_have_their_outer_faces_as_surface() {
 }
 
 #[test]
-fn surfaces_face_outward_however_tetrahedra_are_turned() {
+fn surfaces_face_outward_for_any_tetrahedron_orientation() {
     let mut mesh = Mesh::block([0.2, 0.3, 0.4], [2, 3, 4]).expect("a block");
     mesh.positions.iter_mut().for_each(|place| place.x = -place.x);
     let bare = Mesh {
@@ -483,7 +485,7 @@ fn surfaces_face_outward_however_tetrahedra_are_turned() {
     }
 }
 
-/// The error of a definition that is refused.
+/// Returns the error of a refused definition.
 fn refusal(definition: &BodyDefinition) -> String {
     let mut world = World::new(FREE).expect("a world");
     match world.create_body(definition) {
@@ -567,7 +569,7 @@ fn numbers_out_of_range_are_named() {
 }
 
 #[test]
-fn what_does_not_go_with_a_material_is_named() {
+fn settings_that_conflict_with_a_material_are_named() {
     let mesh = irregular_block(2);
     let good = definition(&mesh, TISSUE);
     let light = Material { density: 0.0, ..TISSUE };
@@ -653,7 +655,7 @@ fn what_does_not_go_with_a_material_is_named() {
             assert!(message.contains(word), "{message}: {word}");
         }
     }
-    // Masses beside a material that has no density are the definition's.
+    // If the material has no density, the masses are those of the definition.
     world_of(&BodyDefinition {
         material: Some(light),
         masses: Values::Each(&masses),
@@ -662,7 +664,7 @@ fn what_does_not_go_with_a_material_is_named() {
 }
 
 #[test]
-fn elements_without_room_are_named() {
+fn degenerate_elements_are_named() {
     let mut flat = irregular_block(3);
     let [a, b, c, d] = flat.tetrahedra[7].map(|node| node as usize);
     flat.positions[d] = (flat.positions[a] + flat.positions[b] + flat.positions[c]) / 3.0;
@@ -672,7 +674,7 @@ fn elements_without_room_are_named() {
         message.contains("tetrahedra[7]") && message.contains("flat"),
         "{message}"
     );
-    // It is the shape at rest that counts.
+    // Validation uses the rest shape.
     let sound = irregular_block(3);
     let rested = BodyDefinition {
         rest_positions: Some(&sound.positions),
@@ -731,9 +733,9 @@ fn presets_have_figures_and_sources() {
     ));
 }
 
-/// Coordinates far from the origin are rounded by up to 0.5 mm at 8 km and from there on.
+/// Coordinates far from the origin are rounded by up to 0.5 mm at 8 km and beyond.
 #[test]
-fn a_lattice_far_from_the_origin_is_one_of_cubes() {
+fn a_lattice_far_from_the_origin_is_accepted_as_cubes() {
     const EDGE: f32 = 0.2;
     let mesh = Mesh::lattice(EDGE, [5, 3, 4]).expect("a lattice");
     for far in [0.0, 1000.0, 8000.0, 10_000.0] {
@@ -745,7 +747,7 @@ fn a_lattice_far_from_the_origin_is_one_of_cubes() {
                 ..definition(&mesh, TISSUE)
             };
             let (mut world, id) = world_of(&lattice);
-            // What a coordinate may be off by, twice: an edge.
+            // The rounding error of an edge: twice that of a coordinate.
             let rounding = f32::EPSILON * (far + 1.0);
             let body = world.body(id).expect("the body");
             let mass: f64 = (0..body.node_count() as u32)
@@ -757,7 +759,7 @@ fn a_lattice_far_from_the_origin_is_one_of_cubes() {
                 (mass / expected - 1.0).abs() < off,
                 "{mass} kg of {expected}, {far} m away"
             );
-            // It is at rest where it was put, to within that rounding.
+            // It is at rest where it was created, within that rounding.
             for _ in 0..50 {
                 world.step(0.01).expect("a step");
             }
@@ -765,7 +767,7 @@ fn a_lattice_far_from_the_origin_is_one_of_cubes() {
             let moved = now.iter().zip(&positions).map(|(now, then)| now.distance(*then));
             let moved = moved.fold(0.0, f32::max);
             assert!(moved <= 8.0 * rounding, "{moved} m in half a second, {far} m away");
-            // What is no cube is refused there too.
+            // Cells that are not cubes are refused there too.
             let mut skew = positions.clone();
             skew[7] += Vec3::new(0.05 * EDGE, 0.0, 0.0);
             let skew = BodyDefinition {

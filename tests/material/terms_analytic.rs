@@ -1,5 +1,5 @@
-//! Terms beside springs where the answer is known: a mass on its home spring, springs along their curve, strips and arcs that bend, and
-//! blocks pulled along their fibres and across.
+//! Terms beside springs with analytic solutions: a mass on its anchor spring, springs along their curve, strips and
+//! arcs in bending, and blocks pulled along and across their fibers.
 
 use crate::support::bodies::FREE;
 use crate::support::scene::Scene;
@@ -12,7 +12,7 @@ fn hung(gravity: Vec3, definition: &BodyDefinition) -> Scene {
 }
 
 #[test]
-fn a_mass_hangs_on_its_home_spring_by_its_weight_over_the_stiffness() {
+fn a_mass_on_its_anchor_spring_sags_by_weight_over_stiffness() {
     for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
         let positions = [Vec3::new(0.3, 0.2, 0.1), Vec3::new(0.4, 0.2, 0.1)];
         let definition = BodyDefinition {
@@ -27,11 +27,11 @@ fn a_mass_hangs_on_its_home_spring_by_its_weight_over_the_stiffness() {
         for _ in 0..300 {
             scene.world.step(0.01).expect("a step");
         }
-        for (node, sunk) in [0.02 * 9.81 / 5.0, 0.05 * 9.81 / 20.0].into_iter().enumerate() {
-            let way = f64::from(positions[node].z - scene.body().positions()[node].z);
+        for (node, sag) in [0.02 * 9.81 / 5.0, 0.05 * 9.81 / 20.0].into_iter().enumerate() {
+            let direction = f64::from(positions[node].z - scene.body().positions()[node].z);
             assert!(
-                (way / sunk - 1.0).abs() < 1e-5,
-                "{solver:?}, node {node}: {way} of {sunk}"
+                (direction / sag - 1.0).abs() < 1e-5,
+                "{solver:?}, node {node}: {direction} of {sag}"
             );
         }
     }
@@ -43,7 +43,7 @@ fn springs_pull_along_their_curve() {
     const STIFFNESS: f64 = 30.0;
     let exponential = |e: f64| if e < 0.0 { e } else { ((12.0 * e).exp() - 1.0) / 12.0 };
     let cubic = |e: f64| e - 2.0 * e * e + 5.0 * e * e * e;
-    // What it is at the limit, and how steep.
+    // The stress at the limit, and the slope there.
     let laws = [
         (
             SpringLaw::Exponential {
@@ -79,23 +79,23 @@ fn springs_pull_along_their_curve() {
         let mut scene = hung(Vec3::ZERO, &definition);
         for strain in [-0.9, -0.5, -0.1, 0.01, 0.05, 0.1, 0.2, 0.249, 0.4, 0.49, 0.6, 1.0, 3.0] {
             let end = Vec3::new(0.6, 0.0, -0.8) * (LENGTH * (1.0 + strain)) as f32;
-            scene.body_mut().set_positions(&[Vec3::ZERO, end]).expect("places");
+            scene.body_mut().set_positions(&[Vec3::ZERO, end]).expect("positions");
             scene.world.step(1e-4).expect("a step");
             let strain = end.as_dvec3().length() / f64::from(LENGTH as f32) - 1.0;
             let pull = law(strain.min(limit)) + slope * (strain - limit).max(0.0);
             let expected = DVec3::new(0.6, 0.0, -0.8) * (STIFFNESS * LENGTH * pull);
             let force = scene.body().pin_force(1).expect("a pin").as_dvec3();
-            let off = force.distance(expected) / expected.length();
-            assert!(off < 1e-5, "{spring_law:?}, strain {strain}: {force} {expected}");
+            let error = force.distance(expected) / expected.length();
+            assert!(error < 1e-5, "{spring_law:?}, strain {strain}: {force} {expected}");
         }
     }
 }
 
-/// A grid of quads, each cut in two, the other way from its neighbours along, and where it `checks` across too.
-fn strip(cells: [u32; 2], checks: bool, place: impl Fn(u32, u32) -> DVec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+/// A grid of quads, each cut in two. The cut direction alternates along the strip, and if `checks`, across it too.
+fn strip(cells: [u32; 2], checks: bool, position: impl Fn(u32, u32) -> DVec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let node = |i: u32, j: u32| i * (cells[1] + 1) + j;
     let columns = (0..=cells[0]).flat_map(|i| (0..=cells[1]).map(move |j| (i, j)));
-    let positions = columns.map(|(i, j)| place(i, j).as_vec3()).collect();
+    let positions = columns.map(|(i, j)| position(i, j).as_vec3()).collect();
     let mut triangles = Vec::new();
     for i in 0..cells[0] {
         for j in 0..cells[1] {
@@ -113,8 +113,8 @@ fn strip(cells: [u32; 2], checks: bool, place: impl Fn(u32, u32) -> DVec3) -> (V
 const RIGIDITY: f64 = 1e-5;
 const WIDTH: f64 = 0.02;
 
-/// How far the free end of a strip that is clamped at its first two columns gives way to forces on its nodes.
-fn give_way(positions: &[Vec3], triangles: &[[u32; 3]], rows: usize, load: impl Fn(usize) -> Vec3) -> DVec3 {
+/// Returns the deflection of the free end of a strip, clamped at its first two columns, under forces on its nodes.
+fn deflection(positions: &[Vec3], triangles: &[[u32; 3]], rows: usize, load: impl Fn(usize) -> Vec3) -> DVec3 {
     let mut scene = hung(
         Vec3::ZERO,
         &BodyDefinition {
@@ -141,14 +141,15 @@ fn give_way(positions: &[Vec3], triangles: &[[u32; 3]], rows: usize, load: impl 
     scene.rest();
     let rest = scene.positions();
     let end = positions.len() - rows..positions.len();
-    let ways = end.map(|node| rest[node] - positions[node].as_dvec3());
-    ways.sum::<DVec3>() / rows as f64
+    let displacements = end.map(|node| rest[node] - positions[node].as_dvec3());
+    displacements.sum::<DVec3>() / rows as f64
 }
 
 #[test]
 fn a_strip_bends_as_a_beam() {
-    // A strip that is free at its sides has D (1 - nu²): a lattice of equilateral triangles is a plate with a Poisson's ratio of -1/3
-    // (Seung, Nelson 1988). Where squares are cut alternately every other node gives way, so that 5/6 of D are left.
+    // A strip with free sides has D (1 - nu²): a lattice of equilateral triangles is a plate with a Poisson's ratio of
+    // -1/3 (Seung, Nelson 1988). Where squares are cut alternately every other node moves freely, so that 5/6 of D
+    // remain.
     for (is_equilateral, part) in [(true, 8.0 / 9.0), (false, 5.0 / 6.0)] {
         for columns in [24, 48] {
             let spacing = 0.12 / f64::from(columns);
@@ -163,22 +164,22 @@ fn a_strip_bends_as_a_beam() {
                 let shift = if is_equilateral && i % 2 == 1 { 0.5 } else { 0.0 };
                 DVec3::new(spacing * f64::from(i), 0.0, side * (f64::from(j) + shift))
             });
-            // The hinges at the second column stand for half a cell on either side.
+            // The hinges at the second column represent half a cell on either side.
             let length = 0.12 - 0.5 * spacing;
             let force = 1e-6;
-            let tip = give_way(&positions, &triangles, rows, |column| {
+            let tip = deflection(&positions, &triangles, rows, |column| {
                 let is_end = column == columns as usize;
                 Vec3::NEG_Y * if is_end { (force / rows as f64) as f32 } else { 0.0 }
             });
-            let of_tip = force * length.powi(3) / (3.0 * part * RIGIDITY * width);
+            let expected_by_tip = force * length.powi(3) / (3.0 * part * RIGIDITY * width);
             // N/m
             let weight = 2e-5;
-            let sunk = give_way(&positions, &triangles, rows, |column| {
+            let sag = deflection(&positions, &triangles, rows, |column| {
                 let part = if column == columns as usize { 0.5 } else { 1.0 };
                 Vec3::NEG_Y * (part * weight * spacing / rows as f64) as f32
             });
-            let of_weight = weight * length.powi(4) / (8.0 * part * RIGIDITY * width);
-            for (found, expected) in [(-tip.y, of_tip), (-sunk.y, of_weight)] {
+            let expected_by_weight = weight * length.powi(4) / (8.0 * part * RIGIDITY * width);
+            for (found, expected) in [(-tip.y, expected_by_tip), (-sag.y, expected_by_weight)] {
                 assert!(
                     (found / expected - 1.0).abs() < 0.03,
                     "equilateral {is_equilateral}, {columns} columns: {found} of {expected}"
@@ -189,10 +190,10 @@ fn a_strip_bends_as_a_beam() {
 }
 
 #[test]
-fn equilateral_triangles_have_the_rigidity_asked_for_whichever_way_they_are_rolled() {
+fn equilateral_triangles_have_the_requested_rigidity_for_any_rolling_direction() {
     const RADIUS: f64 = 0.1;
     let (columns, across, side) = (40_u32, 40_u32, 1e-3);
-    for way in [0.0, 0.3, 0.7, 1.1, 1.5_f64] {
+    for direction in [0.0, 0.3, 0.7, 1.1, 1.5_f64] {
         let flat = |i: u32, j: u32| {
             let shift = if i % 2 == 1 { 0.5 } else { 0.0 };
             DVec3::new(
@@ -204,7 +205,10 @@ fn equilateral_triangles_have_the_rigidity_asked_for_whichever_way_they_are_roll
         let (rest, triangles) = strip([columns, across], false, flat);
         let rolled = |at: &Vec3| {
             let at = at.as_dvec3();
-            let (along, beside) = (at.x * way.cos() + at.z * way.sin(), at.z * way.cos() - at.x * way.sin());
+            let (along, beside) = (
+                at.x * direction.cos() + at.z * direction.sin(),
+                at.z * direction.cos() - at.x * direction.sin(),
+            );
             let angle = along / RADIUS;
             DVec3::new(RADIUS * angle.sin(), RADIUS * angle.cos(), beside).as_vec3()
         };
@@ -221,8 +225,11 @@ fn equilateral_triangles_have_the_rigidity_asked_for_whichever_way_they_are_roll
         let energy = scene.body().energy(Vec3::ZERO).elastic;
         let area = 0.5 * side * side * 0.75_f64.sqrt() * triangles.len() as f64;
         let expected = 0.5 * RIGIDITY * area / (RADIUS * RADIUS);
-        // Sides of the border are no hinges.
-        assert!((energy / expected - 1.0).abs() < 0.04, "{way}: {energy} of {expected}");
+        // Border edges are no hinges.
+        assert!(
+            (energy / expected - 1.0).abs() < 0.04,
+            "{direction}: {energy} of {expected}"
+        );
     }
 }
 
@@ -233,17 +240,17 @@ fn an_arc_keeps_its_shape_and_bends_as_a_curved_beam() {
         let step = 0.5 * std::f64::consts::PI / (f64::from(columns) - 0.5);
         let across = (WIDTH / (RADIUS * step)).round().max(2.0) as u32;
         let (positions, triangles) = strip([columns, across], true, |i, j| {
-            // A quarter from half a cell before the second column to the end.
+            // A quarter circle from half a cell before the second column to the end.
             let angle = (f64::from(i) - 0.5) * step;
             let z = WIDTH * f64::from(j) / f64::from(across);
             DVec3::new(RADIUS * angle.sin(), RADIUS * angle.cos(), z)
         });
         let rows = across as usize + 1;
-        let still = give_way(&positions, &triangles, rows, |_| Vec3::ZERO);
+        let still = deflection(&positions, &triangles, rows, |_| Vec3::ZERO);
         assert!(still.length() < 1e-7, "{columns}: {still}");
         // Outward along the radius at the end.
         let force = 2e-6;
-        let tip = give_way(&positions, &triangles, rows, |column| {
+        let tip = deflection(&positions, &triangles, rows, |column| {
             Vec3::X
                 * if column == columns as usize {
                     (force / rows as f64) as f32
@@ -268,7 +275,7 @@ fn a_hinge_has_the_energy_of_its_angle() {
             Vec3::new(0.04 * cosine, 0.04 * sine, 0.02),
         ]
     };
-    // E: k (1 - cos) of the difference, k being the rigidity times the square of the edge over both areas.
+    // E: k (1 - cos) of the angle difference, with k the rigidity times the squared edge length over both areas.
     let stiffness = RIGIDITY * 0.03 * 0.03 / (0.5 * 0.03 * 0.06);
     for rest in [0.0, 0.5, -1.2, 3.0, std::f32::consts::PI] {
         let (positions, triangles) = (corners(rest), [[0, 1, 2], [1, 0, 3]]);
@@ -281,7 +288,7 @@ fn a_hinge_has_the_energy_of_its_angle() {
         };
         let mut scene = hung(Vec3::ZERO, &definition);
         for angle in [0.0, 0.4, -0.7, 2.0, 3.1, -3.1] {
-            scene.body_mut().set_positions(&corners(angle)).expect("places");
+            scene.body_mut().set_positions(&corners(angle)).expect("positions");
             let energy = scene.body().energy(Vec3::ZERO).elastic;
             let expected = stiffness * (1.0 - f64::from(angle - rest).cos());
             assert!(
@@ -293,12 +300,12 @@ fn a_hinge_has_the_energy_of_its_angle() {
 }
 
 #[test]
-fn fibres_resist_a_pull_along_them_and_nothing_else() {
+fn fibers_resist_only_tension_along_them() {
     const SIZE: [f32; 3] = [0.04, 0.02, 0.02];
     const YOUNG: f64 = 5000.0;
     const FIBRE: f64 = 15000.0;
     let mesh = Mesh::block(SIZE, [8, 4, 4]).expect("a block");
-    // Without a Poisson's ratio nothing but the strain along the pull is there.
+    // Without a Poisson's ratio the only strain is along the pull.
     let tissue = Material {
         model: Model::Tetrahedra,
         young_modulus: YOUNG as f32,

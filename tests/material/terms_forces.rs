@@ -1,5 +1,5 @@
-//! Terms beside springs: their forces against derivatives of formulas in `f64`, energy and momentum, the same in every solver, storage
-//! and number of threads, what a removed spring takes with it, and what is refused.
+//! Terms beside springs: forces against derivatives of formulas in `f64`, energy and momentum, agreement of every
+//! solver, storage and number of threads, removed springs, and refusals.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ const RIGIDITY: f64 = 3e-5;
 const FIBRE: f64 = 4000.0;
 const MASS: f32 = 1e-4;
 
-/// A block with a surface that has edges, faces and fibres.
+/// A block with a surface that has edges, faces and fibers.
 struct Tissue {
     mesh: Mesh,
     surface: Vec<[u32; 3]>,
@@ -23,9 +23,9 @@ struct Tissue {
     directions: Vec<Vec3>,
 }
 
-/// Which terms a body has.
+/// The terms of a body.
 #[derive(Clone, Copy, Debug, Default)]
-struct Asked {
+struct TermSet {
     home: bool,
     bending: bool,
     law: SpringLaw,
@@ -41,31 +41,31 @@ const CUBIC: SpringLaw = SpringLaw::Cubic {
     cubic: 4.0,
     limit: 0.25,
 };
-const ALL: Asked = Asked {
+const ALL: TermSet = TermSet {
     home: true,
     bending: true,
     law: EXPONENTIAL,
     fibres: true,
 };
 
-/// Each term alone, and all.
-fn each() -> [Asked; 6] {
-    let none = Asked::default();
+/// Returns each term alone, and all together.
+fn all_term_sets() -> [TermSet; 6] {
+    let none = TermSet::default();
     [
-        Asked { home: true, ..none },
-        Asked { bending: true, ..none },
-        Asked {
+        TermSet { home: true, ..none },
+        TermSet { bending: true, ..none },
+        TermSet {
             law: EXPONENTIAL,
             ..none
         },
-        Asked { law: CUBIC, ..none },
-        Asked { fibres: true, ..none },
+        TermSet { law: CUBIC, ..none },
+        TermSet { fibres: true, ..none },
         ALL,
     ]
 }
 
 impl Tissue {
-    /// Large enough for several tiles where `cells` are many.
+    /// With many `cells` it is large enough for several tiles.
     fn new(cells: [u32; 3]) -> Self {
         let size = cells.map(|count| count as f32 * 0.01);
         let mut mesh = Mesh::block(size, cells).expect("a block");
@@ -94,17 +94,17 @@ impl Tissue {
         }
     }
 
-    fn definition(&self, asked: Asked) -> BodyDefinition<'_> {
+    fn definition(&self, terms: TermSet) -> BodyDefinition<'_> {
         BodyDefinition {
             masses: Values::Uniform(MASS),
             springs: Some(&self.springs),
             stiffnesses: Values::Uniform(STIFFNESS as f32),
             triangles: &self.surface,
-            home_stiffnesses: Values::Uniform(if asked.home { HOME as f32 } else { 0.0 }),
-            bending_stiffness: if asked.bending { RIGIDITY as f32 } else { 0.0 },
-            spring_law: asked.law,
-            fibre_directions: if asked.fibres { &self.directions } else { &[] },
-            fibre_stiffnesses: Values::Uniform(if asked.fibres { FIBRE as f32 } else { 0.0 }),
+            home_stiffnesses: Values::Uniform(if terms.home { HOME as f32 } else { 0.0 }),
+            bending_stiffness: if terms.bending { RIGIDITY as f32 } else { 0.0 },
+            spring_law: terms.law,
+            fibre_directions: if terms.fibres { &self.directions } else { &[] },
+            fibre_stiffnesses: Values::Uniform(if terms.fibres { FIBRE as f32 } else { 0.0 }),
             ..BodyDefinition::of(&self.mesh)
         }
     }
@@ -113,7 +113,7 @@ impl Tissue {
         self.mesh.positions[node as usize].as_dvec3()
     }
 
-    /// The hinges: the edge, and the nodes opposite.
+    /// Returns the hinges: the nodes of the edge, and the opposite nodes.
     fn hinges(&self) -> Vec<[u32; 4]> {
         let mut sides = std::collections::BTreeMap::new();
         for &[a, b, c] in &self.surface {
@@ -125,26 +125,26 @@ impl Tissue {
         hinges.map(|([a, b], corners)| [a, b, corners[0], corners[1]]).collect()
     }
 
-    /// The elastic energy as the documentation states it.
-    fn energy(&self, asked: Asked, at: &[DVec3]) -> f64 {
+    /// Returns the elastic energy as the documentation states it.
+    fn energy(&self, terms: TermSet, at: &[DVec3]) -> f64 {
         let mut energy = 0.0;
         for &[a, b] in &self.springs {
             let rest_length = f64::from(self.rest(a).distance(self.rest(b)) as f32);
             let strain = at[a as usize].distance(at[b as usize]) / rest_length - 1.0;
-            energy += STIFFNESS * rest_length * rest_length * integral(asked.law, strain);
+            energy += STIFFNESS * rest_length * rest_length * integral(terms.law, strain);
         }
-        if asked.home {
+        if terms.home {
             for (place, rest) in at.iter().zip(&self.mesh.positions) {
                 energy += 0.5 * HOME * place.distance_squared(rest.as_dvec3());
             }
         }
-        if asked.bending {
+        if terms.bending {
             for nodes in self.hinges() {
                 let rest = nodes.map(|node| self.rest(node));
                 energy += RIGIDITY * hinge(rest, nodes.map(|node| at[node as usize]));
             }
         }
-        if asked.fibres {
+        if terms.fibres {
             for (corners, direction) in self.mesh.tetrahedra.iter().zip(&self.directions) {
                 let edges = |at: &dyn Fn(u32) -> DVec3| {
                     let [a, b, c, d] = corners.map(at);
@@ -159,22 +159,22 @@ impl Tissue {
         energy
     }
 
-    /// Minus the slope of that.
-    fn force(&self, asked: Asked, at: &mut [DVec3], node: usize) -> DVec3 {
+    /// Returns the negative gradient of the energy for a node.
+    fn force(&self, terms: TermSet, at: &mut [DVec3], node: usize) -> DVec3 {
         const STEP: f64 = 1e-7;
         DVec3::from_array([0, 1, 2].map(|axis| {
             let place = at[node][axis];
             at[node][axis] = place + STEP;
-            let more = self.energy(asked, at);
+            let more = self.energy(terms, at);
             at[node][axis] = place - STEP;
-            let less = self.energy(asked, at);
+            let less = self.energy(terms, at);
             at[node][axis] = place;
             (less - more) / (2.0 * STEP)
         }))
     }
 }
 
-/// The energy of a spring of stiffness and length 1: the integral of its pull over its strain.
+/// Returns the energy of a spring of unit stiffness and length: the integral of its force over its strain.
 fn integral(law: SpringLaw, strain: f64) -> f64 {
     let pull_to = |strain: f64| match law {
         SpringLaw::Linear => [strain, 0.5 * strain * strain, 1.0],
@@ -205,8 +205,8 @@ fn integral(law: SpringLaw, strain: f64) -> f64 {
     energy + pull * beyond + 0.5 * slope * beyond * beyond
 }
 
-/// The energy of a hinge of flexural rigidity 1, as the documentation of bending has it.
-fn hinge(rest: [DVec3; 4], places: [DVec3; 4]) -> f64 {
+/// Returns the energy of a hinge of unit flexural rigidity, as documented for bending.
+fn hinge(rest: [DVec3; 4], positions: [DVec3; 4]) -> f64 {
     let [a, b, opposite @ ..] = rest;
     let edge = b - a;
     let feet = opposite.map(|corner| (corner - a).dot(edge) / edge.length_squared());
@@ -219,12 +219,12 @@ fn hinge(rest: [DVec3; 4], places: [DVec3; 4]) -> f64 {
         ]
     };
     let [first, second] = arms(rest);
-    // The angle between the arms is half a turn less the angle of the hinge.
+    // The angle between the arms is half a turn minus the angle of the hinge.
     let angle = std::f64::consts::PI - first.cross(second).length().atan2(first.dot(second));
     let side = (first + second).dot(edge.cross(first - second)).signum();
     let (sine, cosine) = (0.5 * angle).sin_cos();
-    let [t, u] = arms(places);
-    let turn = (t + u) * cosine - (places[1] - places[0]).cross(t - u) * (side * sine / edge.length());
+    let [t, u] = arms(positions);
+    let turn = (t + u) * cosine - (positions[1] - positions[0]).cross(t - u) * (side * sine / edge.length());
     let areas = 0.5 * edge.length() * (heights[0] + heights[1]);
     0.5 * edge.length_squared() / areas * turn.length_squared()
 }
@@ -240,7 +240,7 @@ impl Scene {
     }
 }
 
-/// Far from rest, every spring, hinge and fibre otherwise.
+/// Far from rest, with a different deformation of every spring, hinge and fiber.
 fn deformed(mesh: &Mesh, seed: u64) -> Vec<Vec3> {
     let mut random = Random::new(seed);
     let turned = Quat::from_rotation_y(0.4) * Quat::from_rotation_x(0.3);
@@ -249,9 +249,9 @@ fn deformed(mesh: &Mesh, seed: u64) -> Vec<Vec3> {
 }
 
 #[test]
-fn forces_and_energy_are_those_of_the_formulas() {
+fn forces_and_energy_agree_with_the_formulas() {
     let tissue = Tissue::new([4, 3, 3]);
-    for asked in each() {
+    for terms in all_term_sets() {
         for storage in STORAGES {
             for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
                 if storage != Storage::Packed && solver != Solver::Verlet {
@@ -260,31 +260,31 @@ fn forces_and_energy_are_those_of_the_formulas() {
                 let definition = BodyDefinition {
                     storage,
                     solver,
-                    ..tissue.definition(asked)
+                    ..tissue.definition(terms)
                 };
                 let mut scene = Scene::new(FREE, &definition);
-                let places = deformed(&tissue.mesh, 4);
+                let positions = deformed(&tissue.mesh, 4);
                 let body = scene.body_mut();
-                for node in 0..places.len() as u32 {
+                for node in 0..positions.len() as u32 {
                     body.pin(node).expect("a node");
                 }
-                body.set_positions(&places).expect("places");
+                body.set_positions(&positions).expect("positions");
                 scene.world.step(1e-5).expect("a step");
-                let mut at: Vec<DVec3> = places.iter().map(|place| place.as_dvec3()).collect();
-                let forces: Vec<DVec3> = (0..at.len()).map(|node| tissue.force(asked, &mut at, node)).collect();
+                let mut at: Vec<DVec3> = positions.iter().map(|position| position.as_dvec3()).collect();
+                let forces: Vec<DVec3> = (0..at.len()).map(|node| tissue.force(terms, &mut at, node)).collect();
                 let size = forces.iter().map(|force| force.length()).fold(0.0, f64::max);
                 for (node, expected) in forces.iter().enumerate() {
                     let force = -scene.body().pin_force(node as u32).expect("a pin").as_dvec3();
-                    let off = force.distance(*expected) / size;
+                    let error = force.distance(*expected) / size;
                     assert!(
-                        off < 3e-6,
-                        "{asked:?}, {storage:?}, {solver:?}, node {node}: {force} {expected}, {off:e} off"
+                        error < 3e-6,
+                        "{terms:?}, {storage:?}, {solver:?}, node {node}: {force} {expected}, {error:e} off"
                     );
                 }
-                let (energy, expected) = (scene.energy(), tissue.energy(asked, &at));
+                let (energy, expected) = (scene.energy(), tissue.energy(terms, &at));
                 assert!(
                     (energy - expected).abs() < 1e-6 * expected,
-                    "{asked:?}: {energy} {expected}"
+                    "{terms:?}: {energy} {expected}"
                 );
             }
         }
@@ -312,8 +312,8 @@ fn the_shape_given_is_at_rest() {
 #[test]
 fn verlet_keeps_energy_and_momentum() {
     let tissue = Tissue::new([14, 6, 6]);
-    for asked in each() {
-        let mut scene = Scene::new(FREE, &tissue.definition(asked));
+    for terms in all_term_sets() {
+        let mut scene = Scene::new(FREE, &tissue.definition(terms));
         let mut random = Random::new(2);
         let spin = Vec3::new(1.0, 2.0, -1.0);
         let velocities: Vec<Vec3> = tissue
@@ -332,15 +332,15 @@ fn verlet_keeps_energy_and_momentum() {
         let substeps = scene.world.step(2e-3).expect("a step").substeps;
         assert!(
             most < 0.03,
-            "{asked:?}: {most} of the energy, in steps of {substeps} substeps"
+            "{terms:?}: {most} of the energy, in steps of {substeps} substeps"
         );
-        if !asked.home {
+        if !terms.home {
             let [then, turning] = scene.momentum();
             let size = f64::from(MASS) * 0.1 * tissue.mesh.positions.len() as f64;
-            assert!(then.distance(linear) < 2e-6 * size, "{asked:?}: {linear} {then}");
+            assert!(then.distance(linear) < 2e-6 * size, "{terms:?}: {linear} {then}");
             assert!(
                 turning.distance(angular) < 2e-6 * size,
-                "{asked:?}: {angular} {turning}"
+                "{terms:?}: {angular} {turning}"
             );
         }
     }
@@ -350,22 +350,22 @@ fn verlet_keeps_energy_and_momentum() {
 fn implicit_steps_keep_linear_momentum() {
     let tissue = Tissue::new([4, 3, 3]);
     for solver in [Solver::Implicit, Solver::Newton] {
-        let asked = Asked { home: false, ..ALL };
+        let terms = TermSet { home: false, ..ALL };
         let definition = BodyDefinition {
             solver,
-            ..tissue.definition(asked)
+            ..tissue.definition(terms)
         };
         let mut scene = Scene::new(FREE, &definition);
         scene
             .body_mut()
             .set_positions(&deformed(&tissue.mesh, 9))
-            .expect("places");
+            .expect("positions");
         let energy = scene.energy();
         for _ in 0..20 {
             scene.world.step(5e-3).expect("a step");
         }
         assert!(scene.energy() < energy, "{solver:?}: {energy} {}", scene.energy());
-        // Backward differences do not keep the angular momentum of motion that is not even.
+        // Backward differences do not conserve the angular momentum of accelerated motion.
         let [linear, _] = scene.momentum();
         let size = (2.0 * energy * f64::from(MASS) * tissue.mesh.positions.len() as f64).sqrt();
         assert!(linear.length() < 3e-5 * size, "{solver:?}: {linear} of {size}");
@@ -386,7 +386,7 @@ fn every_solver_comes_to_the_same_rest_under_each_term_alone() {
 fn every_solver_comes_to_the_same_rest_of(which: Range<usize>) {
     let tissue = Tissue::new([6, 3, 3]);
     let gravity = Vec3::new(0.0, -2.0, 0.0);
-    for &asked in &each()[which] {
+    for &terms in &all_term_sets()[which] {
         let mut rests = Vec::new();
         for solver in SOLVERS {
             for storage in STORAGES {
@@ -398,7 +398,7 @@ fn every_solver_comes_to_the_same_rest_of(which: Range<usize>) {
                     solver,
                     node_dampings: Values::Uniform(4e-3),
                     accuracy: if solver == Solver::Implicit { 1e-4 } else { 0.0 },
-                    ..tissue.definition(asked)
+                    ..tissue.definition(terms)
                 };
                 let mut scene = Scene::new(WorldDefinition { gravity, ..FREE }, &definition);
                 let pinned: Vec<u32> = (0..tissue.mesh.positions.len() as u32)
@@ -419,17 +419,17 @@ fn every_solver_comes_to_the_same_rest_of(which: Range<usize>) {
             }
         }
         let lowest = rests[0].iter().zip(&tissue.mesh.positions);
-        let sunk = lowest.map(|(at, rest)| f64::from(rest.y) - at.y).fold(0.0, f64::max);
-        assert!(sunk > 5e-5, "{asked:?}: it hangs {sunk} m");
+        let sag = lowest.map(|(at, rest)| f64::from(rest.y) - at.y).fold(0.0, f64::max);
+        assert!(sag > 5e-5, "{terms:?}: it hangs {sag} m");
         for (number, rest) in rests.iter().enumerate() {
-            let off = largest_difference(&rests[0], rest);
-            assert!(off < 0.003 * sunk, "{asked:?}, rest {number}: {off} m of {sunk}");
+            let error = largest_difference(&rests[0], rest);
+            assert!(error < 0.003 * sag, "{terms:?}, rest {number}: {error} m of {sag}");
         }
     }
 }
 
 #[test]
-fn threads_change_no_bit() {
+fn any_number_of_threads_is_bitwise_identical() {
     let tissue = Tissue::new([20, 8, 8]);
     for solver in [Solver::Verlet, Solver::Implicit] {
         let hashes = [1, 3].map(|thread_count| {
@@ -441,7 +441,7 @@ fn threads_change_no_bit() {
             scene
                 .body_mut()
                 .set_positions(&deformed(&tissue.mesh, 5))
-                .expect("places");
+                .expect("positions");
             for _ in 0..3 {
                 scene.world.step(1e-3).expect("a step");
             }
@@ -452,8 +452,8 @@ fn threads_change_no_bit() {
 }
 
 #[test]
-fn a_home_spring_goes_where_a_body_does() {
-    // Far from the origin, where the body counts from a place of its own, which moves after it.
+fn anchor_springs_move_with_the_body() {
+    // Far from the origin, where the body has a local origin that moves later.
     let far = Vec3::new(1000.0, -500.0, 250.0);
     let positions = [far, far + Vec3::X];
     let definition = BodyDefinition {
@@ -466,7 +466,7 @@ fn a_home_spring_goes_where_a_body_does() {
     scene
         .body_mut()
         .set_positions(&[far + Vec3::new(0.0, 25.0, 0.0), far])
-        .expect("places");
+        .expect("positions");
     let quarter = 0.5 * std::f32::consts::PI * (0.5_f32 / 8.0).sqrt();
     for _ in 0..2000 {
         scene.world.step(quarter / 2000.0).expect("a step");
@@ -479,7 +479,7 @@ fn a_home_spring_goes_where_a_body_does() {
 }
 
 #[test]
-fn what_a_removed_spring_had_goes_with_it() {
+fn terms_of_a_removed_spring_are_removed() {
     let tissue = Tissue::new([4, 3, 3]);
     for solver in SOLVERS {
         let definition = BodyDefinition {
@@ -487,15 +487,15 @@ fn what_a_removed_spring_had_goes_with_it() {
             ..tissue.definition(ALL)
         };
         let mut scene = Scene::new(FREE, &definition);
-        let places = deformed(&tissue.mesh, 4);
-        for node in 0..places.len() as u32 {
+        let positions = deformed(&tissue.mesh, 4);
+        for node in 0..positions.len() as u32 {
             scene.body_mut().pin(node).expect("a node");
         }
         let [a, b] = [tissue.surface[7][0], tissue.surface[7][1]];
         scene.body_mut().remove_spring(a, b).expect("a spring");
-        scene.body_mut().set_positions(&places).expect("places");
+        scene.body_mut().set_positions(&positions).expect("positions");
         scene.world.step(1e-5).expect("a step");
-        // What has the edge is left out.
+        // Springs and terms that contain the edge are left out.
         let has = |nodes: &[u32]| nodes.contains(&a) && nodes.contains(&b);
         let (mut tetrahedra, mut directions) = (Vec::new(), Vec::new());
         for (corners, direction) in tissue.mesh.tetrahedra.iter().zip(&tissue.directions) {
@@ -515,7 +515,7 @@ fn what_a_removed_spring_had_goes_with_it() {
         };
         left.springs.retain(|pair| !has(pair));
         left.surface.retain(|corners| !has(corners));
-        let mut at: Vec<DVec3> = places.iter().map(|place| place.as_dvec3()).collect();
+        let mut at: Vec<DVec3> = positions.iter().map(|position| position.as_dvec3()).collect();
         for node in [a, b, 0, 20] {
             let expected = left.force(ALL, &mut at, node as usize);
             let force = -scene.body().pin_force(node).expect("a pin").as_dvec3();
@@ -532,7 +532,7 @@ fn what_a_removed_spring_had_goes_with_it() {
 }
 
 #[test]
-fn whatever_becomes_of_a_body_is_finite() {
+fn every_outcome_is_finite() {
     let tissue = Tissue::new([4, 3, 3]);
     for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
         let definition = BodyDefinition {
@@ -543,7 +543,7 @@ fn whatever_becomes_of_a_body_is_finite() {
         let count = tissue.mesh.positions.len();
         let flat: Vec<Vec3> = tissue.mesh.positions.iter().map(|p| Vec3::new(p.x, 0.0, 0.0)).collect();
         let turned: Vec<Vec3> = tissue.mesh.positions.iter().map(|p| -3.0 * *p).collect();
-        for places in [vec![Vec3::ZERO; count], flat, turned] {
+        for positions in [vec![Vec3::ZERO; count], flat, turned] {
             let mut scene = Scene::new(
                 WorldDefinition {
                     max_substeps: 100_000,
@@ -551,13 +551,16 @@ fn whatever_becomes_of_a_body_is_finite() {
                 },
                 &definition,
             );
-            scene.body_mut().set_positions(&places).expect("places");
+            scene.body_mut().set_positions(&positions).expect("positions");
             let before = scene.energy();
             for _ in 0..20 {
                 let report = scene.world.step(1e-3).expect("a step");
                 assert_eq!(report.bodies_restored, 0, "{solver:?}");
             }
-            assert!(scene.positions().iter().all(|place| place.is_finite()), "{solver:?}");
+            assert!(
+                scene.positions().iter().all(|position| position.is_finite()),
+                "{solver:?}"
+            );
             assert!(
                 scene.energy() <= 1.05 * before,
                 "{solver:?}: {before} J, {} J",
@@ -568,7 +571,7 @@ fn whatever_becomes_of_a_body_is_finite() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_by_name() {
+fn invalid_terms_are_refused_by_name() {
     let tissue = Tissue::new([2, 2, 2]);
     let whole = tissue.definition(ALL);
     let count = tissue.mesh.positions.len();

@@ -1,5 +1,5 @@
-//! Terms that are worked out side by side: the same bits with every kernel and any number of threads, and the same motion whichever tiles
-//! their nodes lie in.
+//! Terms computed with SIMD: bitwise identical at every SIMD level and for any number of threads, and the same motion
+//! for every assignment of nodes to tiles.
 
 use crate::support::bodies::{FREE, largest_difference};
 use glam::{DVec3, Vec3};
@@ -57,11 +57,11 @@ fn block() -> Mesh {
     mesh
 }
 
-fn exact(places: &[Vec3]) -> Vec<DVec3> {
-    places.iter().map(|place| place.as_dvec3()).collect()
+fn as_f64(positions: &[Vec3]) -> Vec<DVec3> {
+    positions.iter().map(|position| position.as_dvec3()).collect()
 }
 
-/// The hash and the places of a body that was stretched, pressed and twisted as it was thrown.
+/// Returns the hash and the positions of a body that was stretched, compressed and twisted in flight.
 fn thrown(world: WorldDefinition, definition: &BodyDefinition) -> Result<(u64, Vec<DVec3>), Error> {
     let mut world = World::new(world)?;
     let body = world.create_body(definition)?;
@@ -73,7 +73,7 @@ fn thrown(world: WorldDefinition, definition: &BodyDefinition) -> Result<(u64, V
     world.body_mut(body)?.set_velocities(&velocities)?;
     for step in 0..STEPS {
         if step == STEPS / 2 {
-            // Gaps among those that lie side by side.
+            // Removed terms leave gaps in the SIMD batches.
             let last = definition.positions.len() as u32 - 1;
             for (a, b) in [(600, 601), (last - 600, last - 601)] {
                 world.body_mut(body)?.remove_spring(a, b)?;
@@ -81,32 +81,32 @@ fn thrown(world: WorldDefinition, definition: &BodyDefinition) -> Result<(u64, V
         }
         world.step(1e-3)?;
     }
-    let places = exact(world.body(body)?.positions());
-    Ok((world.state_hash(), places))
+    let positions = as_f64(world.body(body)?.positions());
+    Ok((world.state_hash(), positions))
 }
 
 #[test]
-fn kernels_and_threads_change_no_bit() {
-    kernels_and_threads_change_no_bit_of(|case| case == 1);
+fn kernels_and_threads_are_bitwise_identical() {
+    kernels_and_threads_are_bitwise_identical_of(|case| case == 1);
 }
 
 #[test]
 #[ignore = "long"]
-fn kernels_and_threads_change_no_bit_in_the_other_cases() {
-    kernels_and_threads_change_no_bit_of(|case| case != 1);
+fn kernels_and_threads_are_bitwise_identical_in_the_other_cases() {
+    kernels_and_threads_are_bitwise_identical_of(|case| case != 1);
 }
 
-fn kernels_and_threads_change_no_bit_of(is_tried: fn(usize) -> bool) {
+fn kernels_and_threads_are_bitwise_identical_of(is_selected: fn(usize) -> bool) {
     let mesh = block();
     for (number, solver) in (0..).zip([Solver::Verlet, Solver::Implicit]) {
-        for (which, body) in (number..).zip(&bodies(&mesh)).filter(|case| is_tried(case.0)) {
-            // A storage that is in plain numbers itself.
+        for (which, body) in (number..).zip(&bodies(&mesh)).filter(|case| is_selected(case.0)) {
+            // A storage that uses scalar code itself.
             let definition = BodyDefinition {
                 solver,
                 storage: Storage::Efficient,
                 ..*body
             };
-            let of = |kernel, thread_count| {
+            let result = |kernel, thread_count| {
                 let world = WorldDefinition {
                     kernel,
                     thread_count,
@@ -114,9 +114,9 @@ fn kernels_and_threads_change_no_bit_of(is_tried: fn(usize) -> bool) {
                 };
                 thrown(world, &definition)
             };
-            let (expected, _) = of(Kernel::Portable, 1).expect("a portable kernel");
+            let (expected, _) = result(Kernel::Portable, 1).expect("a portable kernel");
             for kernel in [Kernel::Portable, Kernel::Avx512, Kernel::Avx2, Kernel::Neon] {
-                match of(kernel, 3) {
+                match result(kernel, 3) {
                     Ok((hash, _)) => assert_eq!(hash, expected, "{solver:?}, body {which}, {kernel:?}"),
                     Err(error) => assert!(matches!(error, Error::Unsupported(_)), "{kernel:?}: {error}"),
                 }
@@ -126,8 +126,8 @@ fn kernels_and_threads_change_no_bit_of(is_tried: fn(usize) -> bool) {
 }
 
 #[test]
-fn the_order_of_nodes_changes_no_motion() {
-    // Counted from the other end, nodes have other neighbours in their tiles, and other springs lie across two of them.
+fn the_order_of_nodes_does_not_change_the_motion() {
+    // With nodes in reverse order, tiles have other nodes, and other springs cross two tiles.
     let mesh = block();
     let mut reversed = block();
     reversed.positions.reverse();
@@ -145,8 +145,8 @@ fn the_order_of_nodes_changes_no_motion() {
             thrown(world, &definition).expect("a motion").1
         });
         others.reverse();
-        let moved = largest_difference(&ours, &exact(&mesh.positions));
-        let off = largest_difference(&ours, &others);
-        assert!(moved > 0.01 && off < 1e-4 * moved, "body {which}: {off} of {moved}");
+        let moved = largest_difference(&ours, &as_f64(&mesh.positions));
+        let error = largest_difference(&ours, &others);
+        assert!(moved > 0.01 && error < 1e-4 * moved, "body {which}: {error} of {moved}");
     }
 }

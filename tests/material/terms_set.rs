@@ -1,4 +1,4 @@
-//! Springs that yield, and springs with a limit on their strain: forces along their curves, loops of work, and rest under loads.
+//! Springs that yield and springs with a strain limit: forces along their curves, work loops, and rest under loads.
 
 use crate::support::bodies::FREE;
 use crate::support::organ::of_elements;
@@ -15,11 +15,11 @@ const STIFFNESS: f64 = 30.0;
 const PAIR: [Vec3; 2] = [Vec3::ZERO, Vec3::new(0.1, 0.0, 0.0)];
 
 impl Scene {
-    /// The pull of the spring of a pair, with its far end led to a strain within a step.
+    /// Returns the force of the pair's spring when its far end moves to a strain within a step.
     fn pull_at(&mut self, strain: f64) -> f64 {
-        let place = Vec3::X * (LENGTH * (1.0 + strain)) as f32;
-        self.body_mut().move_pin(1, place).expect("a pin");
-        // The first leads it there; the second tells what it is there.
+        let position = Vec3::X * (LENGTH * (1.0 + strain)) as f32;
+        self.body_mut().move_pin(1, position).expect("a pin");
+        // The first step moves the end; the second reports the force there.
         for _ in 0..2 {
             self.world.step(0.01).expect("a step");
         }
@@ -45,10 +45,10 @@ fn pair(masses: &'static [f32; 2]) -> BodyDefinition<'static> {
     }
 }
 
-/// Elastic and perfectly plastic: the pull stays at its limit, goes back along the elastic slope, and a loop takes just the work that
-/// its corners enclose.
+/// Elastic and perfectly plastic: the force stays at its limit and unloads along the elastic slope. A loop takes
+/// exactly the work enclosed by its corners.
 #[test]
-fn a_spring_yields_and_stays_so() {
+fn a_spring_yields_permanently() {
     const YIELD: f64 = 0.1;
     const FAR: f64 = 0.25;
     for (solver, storage) in SOLVERS
@@ -70,10 +70,10 @@ fn a_spring_yields_and_stays_so() {
         near(scene.pull_at(0.08), 0.8 * most);
         near(scene.pull_at(0.0), 0.0);
         near(scene.pull_at(FAR), most);
-        // It is at rest where it is 15 % longer.
+        // It is at rest at 15 % elongation.
         near(scene.pull_at(FAR - YIELD), 0.0);
         near(scene.pull_at(FAR - 1.5 * YIELD), -0.5 * most);
-        // A loop between both ends, in small steps: four sides, of which two are flat.
+        // A loop between both ends in small steps: four sides, two of which are flat.
         scene.pull_at(FAR);
         let path = |from: f64, to: f64| (1..=50).map(move |i| from + (to - from) * f64::from(i) / 50.0);
         let mut work = 0.0;
@@ -90,10 +90,10 @@ fn a_spring_yields_and_stays_so() {
     }
 }
 
-/// Led far beyond at once, a spring pulls with no more than it yields at, whatever the solver and the step; and a weight that it cannot
-/// hold falls as it should.
+/// A spring stretched far beyond its limit at once has at most the yield force, for any solver and step. A weight that
+/// it cannot hold falls as expected.
 #[test]
-fn what_yields_does_not_hang_on_the_step() {
+fn yielding_does_not_depend_on_the_step() {
     let definition = BodyDefinition {
         yielding: yielding(0.1),
         ..pair(&[0.0, 0.0])
@@ -112,7 +112,7 @@ fn what_yields_does_not_hang_on_the_step() {
             );
         }
         for step in [1e-3_f32, 1.0 / 60.0] {
-            // Twice what it can hold: once it yields, half of the weight is left to fall with.
+            // Twice the weight that it can hold: once it yields, half of the weight accelerates the mass.
             let mass = 2.0 * most / 9.81;
             let masses = [0.0, mass as f32];
             let gravity = Vec3::X * 9.81;
@@ -129,24 +129,24 @@ fn what_yields_does_not_hang_on_the_step() {
             let steps = (0.1 / step).round();
             scene.run(step, steps as usize);
             let time = f64::from(step) * f64::from(steps);
-            // Until it yields it swings: y = y0 (1 - cos w t) with y0 = 2 most / k; then a = g / 2.
+            // Until it yields it oscillates: y = y0 (1 - cos w t) with y0 = 2 most / k; then a = g / 2.
             let (omega, deepest) = ((STIFFNESS / mass).sqrt(), 2.0 * most / STIFFNESS);
             let first = (1.0_f64 - 0.5).acos() / omega;
             let (speed, left) = (deepest * omega * (omega * first).sin(), time - first);
             let expected = 0.5 * deepest + speed * left + 0.25 * 9.81 * left * left;
-            let way = scene.positions()[1].x - LENGTH;
+            let displacement = scene.positions()[1].x - LENGTH;
             let tolerance = if step < 0.01 { 0.01 } else { 0.08 };
             assert!(
-                (way / expected - 1.0).abs() < tolerance,
-                "{solver:?}, step {step}: {way} of {expected}"
+                (displacement / expected - 1.0).abs() < tolerance,
+                "{solver:?}, step {step}: {displacement} of {expected}"
             );
         }
     }
 }
 
-/// The state of rest is one: springs yield until they hold, and what nothing holds is told.
+/// The static equilibrium is unique: springs yield until they balance the load, and a missing equilibrium is reported.
 #[test]
-fn the_state_of_rest_is_where_springs_have_yielded() {
+fn the_static_equilibrium_includes_yielding() {
     let definition = BodyDefinition {
         yielding: Yielding {
             strain: 0.1,
@@ -154,7 +154,7 @@ fn the_state_of_rest_is_where_springs_have_yielded() {
         },
         ..pair(&[0.0, 0.0458716])
     };
-    // One and a half times what it yields at.
+    // One and a half times the yield force.
     let mut scene = Scene::new(
         WorldDefinition {
             gravity: Vec3::X * 9.81,
@@ -164,7 +164,7 @@ fn the_state_of_rest_is_where_springs_have_yielded() {
     );
     scene.rest();
     let found = scene.positions()[1].x;
-    // At its largest set, and elastic again: 0.3 + 0.15 longer.
+    // At its maximum plastic strain it is elastic again: 0.3 + 0.15 longer.
     assert!((found - LENGTH * 1.45).abs() < 1e-5, "{found}");
     let damped = BodyDefinition {
         node_dampings: Values::Uniform(1.0),
@@ -181,7 +181,7 @@ fn the_state_of_rest_is_where_springs_have_yielded() {
     assert!((falling.positions()[1].x - found).abs() < 1e-5);
     scene.run(0.01, 10);
     assert!((scene.positions()[1].x - found).abs() < 1e-5);
-    // Tetrahedra of which this is not known are told of.
+    // For tetrahedra too, an equilibrium that is not found is reported.
     let mesh = Mesh::block([0.04, 0.02, 0.02], [4, 2, 2]).expect("a block");
     let tissue = BodyDefinition {
         yielding: yielding(0.02),
@@ -204,7 +204,7 @@ fn the_state_of_rest_is_where_springs_have_yielded() {
 }
 
 #[test]
-fn a_set_has_its_largest() {
+fn plastic_strain_has_a_maximum() {
     for solver in SOLVERS {
         let definition = BodyDefinition {
             yielding: Yielding {
@@ -222,7 +222,8 @@ fn a_set_has_its_largest() {
     }
 }
 
-/// A block that fell on its side keeps its new shape, loses energy and momentum to nobody, and its state of rest is where it stays.
+/// A block that fell on its side keeps its new shape and loses no energy or momentum afterwards; its static equilibrium
+/// is its final state.
 #[test]
 fn a_block_that_was_bent_stays_bent() {
     let mesh = Mesh::block([0.08, 0.02, 0.02], [8, 2, 2]).expect("a block");
@@ -269,16 +270,16 @@ fn a_block_that_was_bent_stays_bent() {
             let before = scene.positions();
             scene.rest();
             let (after, tip) = (scene.positions(), mesh.positions.len() - 1);
-            let off = before[tip].distance(after[tip]);
-            assert!(off < 2e-4, "{solver:?}, {yield_strain}: {off}");
+            let error = before[tip].distance(after[tip]);
+            assert!(error < 2e-4, "{solver:?}, {yield_strain}: {error}");
             ends.push(after[tip].distance(mesh.positions[tip].as_dvec3()));
         }
         assert!(ends[0] < 1e-6 && ends[1] > 2e-3, "{solver:?}: {ends:?}");
     }
 }
 
-/// A block of tetrahedra whose nodes are all led: sheared evenly, it yields at the stress of von Mises, whatever its Poisson's ratio,
-/// keeps that, and goes back elastically; volume does not yield.
+/// A block of tetrahedra whose nodes are all moved. Under uniform shear it yields at the von Mises stress for any
+/// Poisson's ratio, keeps the plastic strain, and unloads elastically; volumetric strain does not yield.
 #[test]
 fn tetrahedra_yield_at_the_stress_of_von_mises() {
     const YOUNG: f64 = 5000.0;
@@ -301,11 +302,11 @@ fn tetrahedra_yield_at_the_stress_of_von_mises() {
                 ..BodyDefinition::of(&mesh)
             };
             let mut scene = Scene::new(FREE, &definition);
-            // The shear stress on the upper side, in steps so small that the side does not turn.
+            // The shear stress on the upper side, in steps so small that the side does not rotate.
             let mut shear_at = |shear: f64| {
                 for (node, &p) in (0..).zip(&mesh.positions) {
-                    let place = p + Vec3::X * (shear as f32 * (p.y + 0.02));
-                    scene.body_mut().move_pin(node, place).expect("a pin");
+                    let position = p + Vec3::X * (shear as f32 * (p.y + 0.02));
+                    scene.body_mut().move_pin(node, position).expect("a pin");
                 }
                 for _ in 0..2 {
                     scene.world.step(0.01).expect("a step");
@@ -319,7 +320,7 @@ fn tetrahedra_yield_at_the_stress_of_von_mises() {
             let mu = YOUNG / (2.0 * (1.0 + f64::from(nu)));
             let yields = YOUNG * YIELD / 3.0_f64.sqrt();
             let near = |stress: f64, expected: f64| {
-                // Strains of a few hundredths squared: that is what small strains leave out.
+                // The squares of strains of a few hundredths, which small-strain theory neglects.
                 assert!(
                     (stress - expected).abs() < 0.05 * yields,
                     "{solver:?}, nu {nu}: {stress} {expected}"
@@ -333,7 +334,7 @@ fn tetrahedra_yield_at_the_stress_of_von_mises() {
             near(shear_at(2.0 * yields / mu), yields);
             near(shear_at(yields / mu), 0.0);
             near(shear_at(0.5 * yields / mu), -0.5 * yields);
-            // Swollen and back nothing is left.
+            // Swelling and shrinking back leaves no plastic strain.
             let mut other = Scene::new(FREE, &definition);
             for factor in [1.1, 1.0] {
                 for (node, &p) in (0..).zip(&mesh.positions) {
@@ -349,7 +350,8 @@ fn tetrahedra_yield_at_the_stress_of_von_mises() {
     }
 }
 
-/// What yields loses what it took to deform it: energy never rises while a block of tetrahedra swings, and falls at once.
+/// Yielding dissipates the work of deformation: energy never rises while a block of tetrahedra swings, and falls at
+/// once.
 #[test]
 fn tetrahedra_that_yield_lose_energy() {
     let mesh = Mesh::block([0.04, 0.02, 0.02], [4, 2, 2]).expect("a block");
@@ -383,7 +385,7 @@ fn tetrahedra_that_yield_lose_energy() {
 }
 
 #[test]
-fn a_limit_pulls_from_its_strain_on() {
+fn a_limit_stiffens_beyond_its_strain() {
     const STRAIN: f64 = 0.2;
     for (solver, storage) in SOLVERS
         .into_iter()
@@ -413,8 +415,7 @@ fn a_limit_pulls_from_its_strain_on() {
     }
 }
 
-/// A chain of springs that are too soft for its weight hangs at the strain that their limit leaves, wherever it begins and whatever the
-/// solver.
+/// A chain of springs too soft for its weight hangs at the strain of their limit, for any start and solver.
 #[test]
 fn a_heavy_chain_hangs_at_its_limit() {
     const NODES: usize = 10;
@@ -454,7 +455,7 @@ fn a_heavy_chain_hangs_at_its_limit() {
     }
 }
 
-/// What bounces on its limit keeps its energy, with substeps that are as short as that asks for.
+/// A mass that bounces on its strain limit keeps its energy, with the short substeps that the limit needs.
 #[test]
 fn energy_is_kept_at_the_limit() {
     let definition = BodyDefinition {
@@ -462,8 +463,8 @@ fn energy_is_kept_at_the_limit() {
         limit_stiffening: 100.0,
         ..pair(&[0.0, 1e-3])
     };
-    // Beyond the limit: with this frequency w a step h keeps energy to 1 / (1 - (h w)² / 4), and the kink in the law, where a step begins
-    // on one side and ends on the other, may give or take as much.
+    // Beyond the limit a step h at this frequency w keeps the energy within 1 / (1 - (h w)² / 4). A step across the
+    // kink of the law may add or remove as much.
     let highest = (STIFFNESS * 101.0 / 1e-3).sqrt();
     for step in [1e-4_f32, 4e-4] {
         let mut scene = Scene::new(FREE, &definition);
@@ -481,7 +482,7 @@ fn energy_is_kept_at_the_limit() {
             let energy = scene.energy();
             assert!(energy < bound, "step {step}: {energy} of {first}");
         }
-        // All of the energy at the largest stretch: E = k L²/2 (e² + 100 (e - 0.1)²), that is 101 e² - 20 e + 1 = 2 E / k L².
+        // All energy at the largest stretch: E = k L²/2 (e² + 100 (e - 0.1)²), that is 101 e² - 20 e + 1 = 2 E / k L².
         let farthest = |energy: f64| {
             let square = 2.0 * energy / (STIFFNESS * LENGTH * LENGTH);
             (20.0 + (400.0 - 404.0 * (1.0 - square)).sqrt()) / 202.0
@@ -523,7 +524,7 @@ fn a_refused_step_and_threads_change_nothing() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_by_name() {
+fn invalid_terms_are_refused_by_name() {
     let refused = |definition: &BodyDefinition, words: &[&str]| {
         let mut world = World::new(FREE).expect("a world");
         let message = world.create_body(definition).expect_err("refused").to_string();

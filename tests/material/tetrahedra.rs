@@ -1,5 +1,5 @@
-//! Tetrahedra as finite elements: their forces against the formula, the moduli they were asked for, what they do however they are
-//! thrown about, and the same in every solver, storage, kernel and number of threads.
+//! Tetrahedra as finite elements: forces against the formula, the requested moduli, arbitrary deformations, and
+//! agreement of every solver, storage, SIMD level and number of threads.
 
 use crate::support::bodies::{FREE, Random};
 use crate::support::scene::{SOLVERS, STORAGES};
@@ -23,7 +23,7 @@ fn tissue(nu: f32) -> Material {
     }
 }
 
-/// A block whose inner nodes lie anyhow.
+/// A block with irregular inner nodes.
 fn block(size: [f32; 3], cells: [u32; 3], seed: u64) -> Mesh {
     let mut mesh = Mesh::block(size, cells).expect("a block");
     let mut random = Random::new(seed);
@@ -79,7 +79,7 @@ impl Scene {
     }
 }
 
-/// The moduli as the documentation states them: what is left of lambda, mu, kappa.
+/// Returns lambda, mu and kappa as the documentation states them.
 fn moduli(nu: f64) -> [f64; 3] {
     let e = f64::from(YOUNG);
     let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
@@ -93,7 +93,7 @@ fn volume(corners: &[u32; 4], at: impl Fn(usize) -> DVec3) -> f64 {
     (b - a).cross(c - a).dot(d - a) / 6.0
 }
 
-/// The pressures of nodes, whose rings of tetrahedra resist their growth.
+/// Returns the nodal pressures, by which the tetrahedra around a node resist a change of their volume.
 fn pressures(mesh: &Mesh, positions: &[DVec3], kappa: f64) -> Vec<f64> {
     let mut volumes = vec![[0.0; 2]; positions.len()];
     for corners in &mesh.tetrahedra {
@@ -110,7 +110,8 @@ fn pressures(mesh: &Mesh, positions: &[DVec3], kappa: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The forces of the finite-element formula: minus the first Piola-Kirchhoff stress times the area vectors at rest.
+/// Returns the forces of the finite-element formula: minus the first Piola-Kirchhoff stress times the area vectors at
+/// rest.
 fn forces(mesh: &Mesh, positions: &[DVec3], nu: f64) -> Vec<DVec3> {
     let [lambda, mu, kappa] = moduli(nu);
     let mut forces = vec![DVec3::ZERO; positions.len()];
@@ -132,8 +133,8 @@ fn forces(mesh: &Mesh, positions: &[DVec3], nu: f64) -> Vec<DVec3> {
         };
         let stress = gradient * second + gradient.inverse().transpose() * (pressure * j);
         let volume = rest.determinant().abs() / 6.0;
-        let of_corners = stress * rest.inverse().transpose() * -volume;
-        let columns = [of_corners.x_axis, of_corners.y_axis, of_corners.z_axis];
+        let corner_forces = stress * rest.inverse().transpose() * -volume;
+        let columns = [corner_forces.x_axis, corner_forces.y_axis, corner_forces.z_axis];
         for (corner, force) in corners[1..].iter().zip(columns) {
             forces[*corner as usize] += force;
             forces[corners[0] as usize] -= force;
@@ -143,7 +144,7 @@ fn forces(mesh: &Mesh, positions: &[DVec3], nu: f64) -> Vec<DVec3> {
 }
 
 #[test]
-fn forces_are_those_of_the_finite_element_formula() {
+fn forces_agree_with_the_finite_element_formula() {
     let mesh = block([0.06, 0.04, 0.05], [6, 4, 5], 3);
     for nu in [0.0, 0.25, 0.35, 0.45, 0.49] {
         for storage in STORAGES {
@@ -168,23 +169,23 @@ fn forces_are_those_of_the_finite_element_formula() {
                 scene.pin(|_| true);
                 let mut random = Random::new(8);
                 let turned = glam::Quat::from_rotation_y(1.0) * glam::Quat::from_rotation_x(0.5);
-                let places: Vec<Vec3> = mesh
+                let positions: Vec<Vec3> = mesh
                     .positions
                     .iter()
                     .map(|position| turned * (*position * Vec3::new(1.2, 0.9, 1.0)) + random.vector() * 1e-3)
                     .collect();
                 let body = scene.world.body_mut(scene.body).expect("the body");
-                body.set_positions(&places).expect("places");
+                body.set_positions(&positions).expect("positions");
                 scene.world.step(1e-5).expect("a step");
                 let body = scene.world.body(scene.body).expect("the body");
-                let exact: Vec<DVec3> = places.iter().map(|place| place.as_dvec3()).collect();
+                let exact: Vec<DVec3> = positions.iter().map(|place| place.as_dvec3()).collect();
                 let expected = forces(&mesh, &exact, f64::from(nu));
                 let size = expected.iter().map(|force| force.length()).fold(0.0, f64::max);
                 for (node, expected) in expected.iter().enumerate() {
                     let force = -body.pin_force(node as u32).expect("a pin").as_dvec3();
-                    let off = force.distance(*expected) / size;
+                    let error = force.distance(*expected) / size;
                     assert!(
-                        off < 1e-5,
+                        error < 1e-5,
                         "nu {nu}, {storage:?}, {kernel:?}, node {node}: {force} {expected}"
                     );
                 }
@@ -194,8 +195,8 @@ fn forces_are_those_of_the_finite_element_formula() {
 }
 
 #[test]
-fn a_block_pulled_has_the_length_and_width_that_it_should() {
-    // Long, held and pulled at its ends so that these may get thinner.
+fn a_pulled_block_has_the_expected_length_and_width() {
+    // A long bar, held and pulled at its ends so that these can get thinner.
     const SIZE: [f32; 3] = [0.08, 0.02, 0.02];
     const STRAIN: f64 = 0.002;
     for (nu, stretch_error, width_error) in [
@@ -217,7 +218,7 @@ fn a_block_pulled_has_the_length_and_width_that_it_should() {
         );
         let force = f64::from(YOUNG) * STRAIN * f64::from(SIZE[1] * SIZE[2]);
         let body = scene.world.body_mut(scene.body).expect("the body");
-        // Each end node carries what the faces about it do.
+        // Each end node carries the share of the faces around it.
         for side in [-1.0, 1.0] {
             let cell = SIZE[1] / 4.0;
             for (node, position) in mesh.positions.iter().enumerate() {
@@ -253,7 +254,7 @@ fn a_block_pulled_has_the_length_and_width_that_it_should() {
             widths += before.y * before.y + before.z * before.z;
         }
         let (strain, across) = (longer / lengths, wider / widths);
-        // At finite strain the law is stiffer by 1.5 of the strain.
+        // At finite strain the law is stiffer by 1.5 times the strain.
         let expected = STRAIN * (1.0 - 1.5 * STRAIN);
         assert!(
             (strain / expected - 1.0).abs() < stretch_error,
@@ -317,15 +318,15 @@ fn every_solver_and_storage_comes_to_the_same_rest_of(ratios: &[f32]) {
                     .map(|(a, b)| f64::from(b.y) - a.y)
                     .fold(0.0, f64::max);
                 let expected = expected.get_or_insert(positions.clone());
-                let off = positions
+                let error = positions
                     .iter()
                     .zip(&*expected)
                     .map(|(a, b)| a.distance(*b))
                     .fold(0.0, f64::max);
                 assert!(sag > 0.005, "{sag}");
                 assert!(
-                    off < 2e-5 * sag,
-                    "{solver:?}, {storage:?}, nu {nu}: {off} m off of {sag}"
+                    error < 2e-5 * sag,
+                    "{solver:?}, {storage:?}, nu {nu}: {error} m off of {sag}"
                 );
             }
         }
@@ -362,7 +363,7 @@ fn a_free_body_keeps_its_energy_and_momentum() {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_bits() {
+fn any_number_of_threads_is_bitwise_identical() {
     // More than one part, and several tiles.
     let mesh = block([0.1, 0.1, 0.1], [11, 11, 11], 7);
     for (solver, nu) in [(Solver::Verlet, 0.3), (Solver::Verlet, 0.45), (Solver::Implicit, 0.45)] {
@@ -392,7 +393,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 }
 
 #[test]
-fn a_removed_edge_takes_its_tetrahedra_with_it() {
+fn removing_an_edge_removes_its_tetrahedra() {
     let mesh = block([0.06, 0.04, 0.04], [6, 4, 4], 10);
     let edge = [mesh.tetrahedra[200][1], mesh.tetrahedra[200][3]];
     let has_edge = |corners: &&[u32; 4]| edge.iter().all(|node| corners.contains(node));
@@ -430,29 +431,29 @@ fn a_removed_edge_takes_its_tetrahedra_with_it() {
                 }
             }
             // Sums are added up in another order.
-            let off = cut
+            let error = cut
                 .positions()
                 .iter()
                 .zip(fresh.positions())
                 .map(|(a, b)| a.distance(b))
                 .fold(0.0, f64::max);
-            assert!(off < 1e-6, "{solver:?}, nu {nu}: {off} m");
+            assert!(error < 1e-6, "{solver:?}, nu {nu}: {error} m");
         }
     }
 }
 
 #[test]
-fn a_plate_feels_the_same_whatever_the_solver() {
-    a_plate_feels_the_same_whatever_the_solver_of((Solver::Implicit, 1e-2));
+fn a_plate_gets_the_same_force_with_every_solver() {
+    a_plate_gets_the_same_force_with_every_solver_of((Solver::Implicit, 1e-2));
 }
 
 #[test]
 #[ignore = "long"]
-fn a_plate_feels_the_same_whatever_the_solver_with_newton() {
-    a_plate_feels_the_same_whatever_the_solver_of((Solver::Newton, 1.0 / 60.0));
+fn a_plate_gets_the_same_force_with_every_solver_with_newton() {
+    a_plate_gets_the_same_force_with_every_solver_of((Solver::Newton, 1.0 / 60.0));
 }
 
-fn a_plate_feels_the_same_whatever_the_solver_of(other: (Solver, f32)) {
+fn a_plate_gets_the_same_force_with_every_solver_of(other: (Solver, f32)) {
     const THICKNESS: f32 = 0.04;
     let mesh = block([THICKNESS; 3], [4; 3], 13);
     for nu in [0.3, 0.45] {
@@ -492,7 +493,7 @@ fn a_plate_feels_the_same_whatever_the_solver_of(other: (Solver, f32)) {
         for force in forces {
             assert!((force / forces[0] - 1.0).abs() < 0.01, "nu {nu}: {forces:?}");
         }
-        // As much as a bar of free sides would take, or more, since its foot is held.
+        // At least the force of a bar with free sides, since its foot is held.
         let least = YOUNG * 0.1 * THICKNESS * THICKNESS;
         assert!(
             forces[0] > 0.9 * least && forces[0] < 2.5 * least,
@@ -502,7 +503,7 @@ fn a_plate_feels_the_same_whatever_the_solver_of(other: (Solver, f32)) {
 }
 
 #[test]
-fn what_tetrahedra_cannot_be_is_refused() {
+fn invalid_tetrahedra_are_refused() {
     let mesh = block([0.06, 0.04, 0.04], [3, 2, 2], 1);
     let definition = BodyDefinition {
         material: Some(tissue(0.3)),
@@ -564,9 +565,9 @@ fn what_tetrahedra_cannot_be_is_refused() {
     }
 }
 
-/// A stiffness that would be nobody's is refused by name, and one of springs that are given beside elements is theirs.
+/// A stiffness that would have no effect is refused by name; springs given beside elements use theirs.
 #[test]
-fn what_only_springs_have_is_theirs_or_refused() {
+fn spring_settings_apply_to_springs_or_are_refused() {
     let mesh = Mesh::block([0.04; 3], [2; 3]).expect("a block");
     let elements = BodyDefinition {
         material: Some(tissue(0.3)),
@@ -592,7 +593,7 @@ fn what_only_springs_have_is_theirs_or_refused() {
         refused(&damped, "spring_damping");
         World::new(FREE).expect("a world").create_body(&body).expect("a body");
     }
-    // One spring beside the elements, twice as long at rest.
+    // One spring beside the elements, stretched to twice its rest length.
     let spring = [[0, mesh.positions.len() as u32 - 1]];
     let length = mesh.positions[0].distance(*mesh.positions.last().expect("a node"));
     let energy = |definition: &BodyDefinition| {

@@ -1,5 +1,5 @@
-//! Tetrahedra against the theory of elasticity, and against the same meshes in `f64`: sizes that are cheap. `cargo bench --bench accuracy`
-//! has the rest, and writes tables of all.
+//! Tetrahedra against the theory of elasticity, and against the same meshes in `f64`, in cheap sizes. `cargo bench
+//! --bench accuracy` runs the others, and writes tables of all.
 
 #[path = "../accuracy/mod.rs"]
 mod accuracy;
@@ -10,38 +10,39 @@ use accuracy::hertz::{DEEPEST, Layer, RADIUS};
 use accuracy::press::{Block, SIDE};
 use sinew::Solver;
 
-/// Poisson's ratio, and how far the end of a beam comes over what beam theory says, with cubes without end (Richardson, from beams 2, 4 and
-/// 8 cubes thick).
+/// Poisson's ratio, and the deflection of a beam relative to beam theory for infinitely fine cubes (Richardson
+/// extrapolation from beams 2, 4 and 8 cubes thick).
 const REFINED: [(f32, f64); 4] = [(0.0, 1.021), (0.25, 1.009), (0.4, 0.997), (0.49, 0.994)];
 
 #[test]
-fn a_cantilever_gives_way_as_its_mesh_in_f64_does() {
+fn a_cantilever_deflects_as_its_mesh_in_f64() {
     for (nu, _) in REFINED {
         for thick in [2, 4] {
             let cantilever = Cantilever::new(thick, nu);
             let (found, exact) = (cantilever.found(), cantilever.exact());
-            let off = (found / exact - 1.0).abs();
-            // Both are the least energy of one mesh; coordinates in f32 leave strains of 1e-6 of those here.
-            assert!(off < 2e-5, "nu {nu}, {thick} thick: {found} for {exact}");
+            let error = (found / exact - 1.0).abs();
+            // Both are the minimum energy of one mesh; coordinates in `f32` have strain errors of 1e-6 of the strains
+            // here.
+            assert!(error < 2e-5, "nu {nu}, {thick} thick: {found} for {exact}");
         }
     }
 }
 
 #[test]
-fn a_cantilever_nears_what_a_beam_does() {
-    a_cantilever_nears_what_a_beam_does_of([REFINED[0], REFINED[3]]);
+fn a_cantilever_converges_to_beam_theory() {
+    a_cantilever_converges_to_beam_theory_of([REFINED[0], REFINED[3]]);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_cantilever_nears_what_a_beam_does_in_the_other_cases() {
-    a_cantilever_nears_what_a_beam_does_of([REFINED[1], REFINED[2]]);
+fn a_cantilever_converges_to_beam_theory_in_the_other_cases() {
+    a_cantilever_converges_to_beam_theory_of([REFINED[1], REFINED[2]]);
 }
 
-fn a_cantilever_nears_what_a_beam_does_of(cases: [(f32, f64); 2]) {
+fn a_cantilever_converges_to_beam_theory_of(cases: [(f32, f64); 2]) {
     for (nu, limit) in cases {
         let [coarse, middle] = [2, 4].map(|thick| Cantilever::new(thick, nu).found());
-        // The theory of beams has no clamp that keeps its end from getting thinner: within 3 % of it.
+        // Beam theory has no clamp that keeps the beam's end from getting thinner: agreement within 3 %.
         assert!((limit - 1.0).abs() < 0.03);
         let order = ((limit - coarse) / (limit - middle)).log2();
         assert!(
@@ -57,32 +58,32 @@ fn a_cantilever_nears_what_a_beam_does_of(cases: [(f32, f64); 2]) {
     }
 }
 
-/// Tetrahedra of Poisson's ratio 0.49 lose 3.8 % of their volume where they are pressed to half their height, because that is what the law
-/// says: its bulk modulus is 50 times the shear modulus. To keep it to 1e-4 takes a ratio of 0.49997. So what they lose is compared with
-/// what the law says, to 1e-5.
+/// By its law a tetrahedral block of Poisson's ratio 0.49 loses 3.8 % of its volume when compressed to half its height:
+/// its bulk modulus is 50 times the shear modulus. A loss of 1e-4 needs a ratio of 0.49997. So the test compares the
+/// loss with the law, to 1e-5.
 #[test]
-fn a_block_between_sliding_plates_is_pressed_as_its_law_says() {
-    a_block_between_sliding_plates_is_pressed_as_its_law_says_of(&[(0.49, 0.5)]);
+fn a_block_between_sliding_plates_is_compressed_by_its_law() {
+    a_block_between_sliding_plates_is_compressed_by_its_law_of(&[(0.49, 0.5)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_block_between_sliding_plates_is_pressed_as_its_law_says_in_the_other_cases() {
-    a_block_between_sliding_plates_is_pressed_as_its_law_says_of(&[(0.3, 0.35), (0.49, 0.2)]);
+fn a_block_between_sliding_plates_is_compressed_by_its_law_in_the_other_cases() {
+    a_block_between_sliding_plates_is_compressed_by_its_law_of(&[(0.3, 0.35), (0.49, 0.2)]);
 }
 
-fn a_block_between_sliding_plates_is_pressed_as_its_law_says_of(cases: &[(f32, f64)]) {
+fn a_block_between_sliding_plates_is_compressed_by_its_law_of(cases: &[(f32, f64)]) {
     for &(nu, by) in cases {
         let block = Block::new(4, nu, by);
         let (side, force) = block.even();
         let expected = side * side * (1.0 - by);
         let found = block.sliding();
-        let (whole, off) = found.volume(&block, expected);
+        let (whole, error) = found.volume(&block, expected);
         assert!(
             (whole - expected).abs() < 1e-5,
             "nu {nu}, by {by}: {whole} for {expected}"
         );
-        assert!(off < 1e-5, "nu {nu}, by {by}: volumes about nodes are off by {off}");
+        assert!(error < 1e-5, "nu {nu}, by {by}: nodal volumes differ by {error}");
         let ratio = found.force / force;
         assert!(
             (ratio - 1.0).abs() < 1e-3,
@@ -93,12 +94,15 @@ fn a_block_between_sliding_plates_is_pressed_as_its_law_says_of(cases: &[(f32, f
 }
 
 #[test]
-fn a_block_bonded_to_plates_is_pressed_as_its_mesh_in_f64_is() {
+fn a_block_bonded_to_plates_is_compressed_as_its_mesh_in_f64() {
     for (nu, by) in [(0.3, 0.2), (0.3, 0.5), (0.49, 0.2), (0.49, 0.5)] {
         let block = Block::new(4, nu, by);
         let (found, exact) = (block.bonded(), block.exact());
-        let off = largest_difference(&found.at, &exact.at) / f64::from(SIDE);
-        assert!(off < 1e-6, "nu {nu}, by {by}: {off} of its side apart");
+        let error = largest_difference(&found.at, &exact.at) / f64::from(SIDE);
+        assert!(
+            error < 1e-6,
+            "nu {nu}, by {by}: positions differ by {error} of its side"
+        );
         let ratio = found.force / exact.force;
         assert!(
             (ratio - 1.0).abs() < 1e-4,
@@ -110,7 +114,7 @@ fn a_block_bonded_to_plates_is_pressed_as_its_mesh_in_f64_is() {
 }
 
 #[test]
-fn a_block_bonded_to_plates_nears_what_finer_ones_do() {
+fn a_block_bonded_to_plates_converges_to_finer_meshes() {
     let [coarse, middle, fine] = [2, 4, 8].map(|thick| Block::new(thick, 0.3, 0.2).bonded().force);
     let (limit, order) = refined([coarse, middle, fine]);
     assert!(
@@ -123,18 +127,18 @@ fn a_block_bonded_to_plates_nears_what_finer_ones_do() {
 }
 
 #[test]
-fn a_sphere_feels_what_the_same_mesh_in_f64_does() {
-    a_sphere_feels_what_the_same_mesh_in_f64_does_of(2);
+fn a_sphere_gets_the_force_of_the_same_mesh_in_f64() {
+    a_sphere_gets_the_force_of_the_same_mesh_in_f64_of(2);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_sphere_feels_what_the_same_finer_mesh_in_f64_does() {
-    a_sphere_feels_what_the_same_mesh_in_f64_does_of(3);
+fn a_sphere_gets_the_force_of_the_same_finer_mesh_in_f64() {
+    a_sphere_gets_the_force_of_the_same_mesh_in_f64_of(3);
 }
 
-/// A contact so many cells in radius. Eight of them, where theory is the measure, are in the bench.
-fn a_sphere_feels_what_the_same_mesh_in_f64_does_of(cells: u32) {
+/// A contact with a radius of this many cells. The bench runs eight cells and compares with theory.
+fn a_sphere_gets_the_force_of_the_same_mesh_in_f64_of(cells: u32) {
     let layer = Layer::new(cells, 0.3);
     let depth = DEEPEST * RADIUS;
     let found = layer.found(Solver::Verlet, &[depth])[0];
@@ -142,9 +146,9 @@ fn a_sphere_feels_what_the_same_mesh_in_f64_does_of(cells: u32) {
     assert!((found / exact - 1.0).abs() < 1e-3, "{found} N for {exact} N");
 }
 
-/// Linear tetrahedra and a contact of few faces are too stiff, by 11 % here, 7 % with four cells.
+/// Linear tetrahedra and a contact of few faces are too stiff, by 11 % here and by 7 % with four cells.
 #[test]
-fn a_sphere_feels_about_what_theory_says() {
+fn a_sphere_gets_about_the_force_of_theory() {
     let layer = Layer::new(3, 0.3);
     let depth = DEEPEST * RADIUS;
     let found = layer.found(Solver::Verlet, &[depth])[0];

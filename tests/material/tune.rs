@@ -1,5 +1,5 @@
-//! Springs and regions changed while a body runs: it goes on as one that was made so, nothing it knew is stale, energy changes by what is
-//! put in, and what is refused changes nothing.
+//! Springs and regions changed during a run: the body behaves as if created that way, no cached value is stale, energy
+//! changes by the energy added, and refused changes have no effect.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use crate::support::scene::{SOLVERS, STORAGES};
@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{Body, Error, Solver, SpringLaw, Storage, Values};
 
-/// An organ of springs that are all a little different, or all alike.
+/// An organ of springs that all differ slightly, or are all equal.
 fn organ(spacing: f32, is_even: bool, random: &mut Random) -> Parts {
     let mesh = Mesh::organ(0.1, spacing).expect("an organ");
     let mut parts = Parts::nodes(mesh.positions.clone(), 1e-3);
@@ -18,7 +18,7 @@ fn organ(spacing: f32, is_even: bool, random: &mut Random) -> Parts {
     parts
 }
 
-/// A block of a lattice: springs of two kinds, in runs.
+/// A block of a lattice: two types of springs, in runs.
 fn lattice() -> Parts {
     Parts::block([9, 9, 9], 0.01, 1e-3, 20.0)
 }
@@ -36,8 +36,8 @@ fn velocities(parts: &Parts, random: &mut Random) -> Vec<Vec3> {
     parts.positions.iter().map(|_| 0.05 * random.vector()).collect()
 }
 
-/// Changes every `stride`-th spring: which, and how.
-fn changed(parts: &mut Parts, stride: usize, random: &mut Random) -> (Vec<[u32; 2]>, Vec<f32>, Vec<f32>) {
+/// Changes every `stride`-th spring; returns their pairs and new values.
+fn change_springs(parts: &mut Parts, stride: usize, random: &mut Random) -> (Vec<[u32; 2]>, Vec<f32>, Vec<f32>) {
     let (mut pairs, mut stiffnesses, mut lengths) = (Vec::new(), Vec::new(), Vec::new());
     for index in (0..parts.springs.len()).step_by(stride) {
         parts.stiffnesses[index] *= 1.5 + random.signed();
@@ -50,14 +50,14 @@ fn changed(parts: &mut Parts, stride: usize, random: &mut Random) -> (Vec<[u32; 
     (pairs, stiffnesses, lengths)
 }
 
-/// The greatest distance that nodes of `parts` have gone since.
-fn way(parts: &Parts, positions: &[DVec3]) -> f64 {
+/// Returns the largest displacement of a node since `parts`.
+fn largest_displacement(parts: &Parts, positions: &[DVec3]) -> f64 {
     let start: Vec<DVec3> = parts.positions.iter().map(|p| p.as_dvec3()).collect();
     largest_difference(positions, &start)
 }
 
 #[test]
-fn a_body_whose_springs_are_set_goes_on_as_one_that_was_made_so() {
+fn a_body_with_changed_springs_moves_as_one_created_that_way() {
     let mut random = Random::new(3);
     for (parts, strides) in [
         (organ(0.012, false, &mut random), [1, 7, 150]),
@@ -67,7 +67,7 @@ fn a_body_whose_springs_are_set_goes_on_as_one_that_was_made_so() {
         let start = velocities(&parts, &mut random);
         for stride in strides {
             let mut new = parts.clone();
-            let (pairs, stiffnesses, lengths) = changed(&mut new, stride, &mut random);
+            let (pairs, stiffnesses, lengths) = change_springs(&mut new, stride, &mut random);
             for storage in STORAGES {
                 for solver in [Solver::Verlet, Solver::Implicit] {
                     let (dt, steps) = match solver {
@@ -90,12 +90,12 @@ fn a_body_whose_springs_are_set_goes_on_as_one_that_was_made_so() {
                         scene.body_mut().set_velocities(&start).expect("velocities");
                         scene.run(dt, steps);
                     }
-                    let gone = way(&parts, &made.positions());
-                    let off = largest_difference(&made.positions(), &set.positions());
+                    let displacement = largest_displacement(&parts, &made.positions());
+                    let error = largest_difference(&made.positions(), &set.positions());
                     let allowed = if solver == Solver::Verlet { 1e-5 } else { 1e-3 };
                     assert!(
-                        off < allowed * gone,
-                        "{storage:?} {solver:?} {stride}: {off} of {gone} m"
+                        error < allowed * displacement,
+                        "{storage:?} {solver:?} {stride}: {error} of {displacement} m"
                     );
                 }
             }
@@ -104,7 +104,7 @@ fn a_body_whose_springs_are_set_goes_on_as_one_that_was_made_so() {
 }
 
 #[test]
-fn springs_set_between_the_steps_of_a_motion_follow_a_reference_in_f64() {
+fn springs_changed_in_motion_follow_a_reference_in_f64() {
     const H: f32 = 5e-4;
     let mut random = Random::new(5);
     let parts = lattice();
@@ -120,7 +120,7 @@ fn springs_set_between_the_steps_of_a_motion_follow_a_reference_in_f64() {
             let (mut stiffnesses, mut lengths) = (Vec::new(), Vec::new());
             for _ in 0..count {
                 let index = random.below(parts.springs.len());
-                // A pair may come twice: the last counts.
+                // A pair may occur twice: the last value counts.
                 pairs.push(parts.springs[index]);
                 stiffnesses.push(parts.stiffnesses[index] * (1.0 + 0.5 * random.signed()));
                 lengths.push(parts.rest_lengths[index] * (1.0 + 0.05 * random.signed()));
@@ -133,29 +133,29 @@ fn springs_set_between_the_steps_of_a_motion_follow_a_reference_in_f64() {
             assert_eq!(scene.step(H).substeps, 1);
             reference.step(f64::from(H));
         }
-        let gone = way(&parts, &reference.positions);
-        let off = largest_difference(&scene.positions(), &reference.positions);
-        assert!(off < 1e-4 * gone, "{storage:?}: {off} of {gone} m");
+        let displacement = largest_displacement(&parts, &reference.positions);
+        let error = largest_difference(&scene.positions(), &reference.positions);
+        assert!(error < 1e-4 * displacement, "{storage:?}: {error} of {displacement} m");
         let fastest = reference.velocities.iter().map(|v| v.length()).fold(0.0, f64::max);
-        let off = largest_difference(&scene.velocities(), &reference.velocities);
-        assert!(off < 1e-4 * fastest, "{storage:?}: {off} of {fastest} m/s");
+        let error = largest_difference(&scene.velocities(), &reference.velocities);
+        assert!(error < 1e-4 * fastest, "{storage:?}: {error} of {fastest} m/s");
     }
 }
 
-/// The elastic energy of springs that `body` has at its positions, in `f64`.
+/// Returns the elastic energy of the body's springs at its positions, in `f64`.
 fn elastic(body: &Body) -> f64 {
     let pairs = body.spring_pairs().expect("springs");
     let springs = body.springs(&pairs).expect("springs");
     let at = |node: u32| body.positions()[node as usize].as_dvec3();
-    let of = pairs.iter().zip(&springs).map(|(&[a, b], spring)| {
+    let energies = pairs.iter().zip(&springs).map(|(&[a, b], spring)| {
         let stretch = at(a).distance(at(b)) - f64::from(spring.rest_length);
         0.5 * f64::from(spring.stiffness) * stretch * stretch
     });
-    of.sum()
+    energies.sum()
 }
 
 #[test]
-fn the_energy_changes_by_what_springs_hold_and_then_stays() {
+fn the_energy_changes_by_the_spring_energy_and_then_stays() {
     let mut random = Random::new(7);
     let parts = organ(0.012, false, &mut random);
     let start = velocities(&parts, &mut random);
@@ -167,7 +167,7 @@ fn the_energy_changes_by_what_springs_hold_and_then_stays() {
             scene.run(dt, 10);
             let before = scene.body().energy(Vec3::ZERO);
             let held = elastic(scene.body());
-            let (pairs, stiffnesses, lengths) = changed(&mut parts.clone(), 3, &mut random);
+            let (pairs, stiffnesses, lengths) = change_springs(&mut parts.clone(), 3, &mut random);
             scene
                 .body_mut()
                 .set_springs(&pairs, Some(Values::Each(&stiffnesses)), Some(Values::Each(&lengths)))
@@ -178,14 +178,17 @@ fn the_energy_changes_by_what_springs_hold_and_then_stays() {
             let kept = (after.kinetic - before.kinetic).abs();
             assert!(
                 kept < 1e-5 * before.kinetic,
-                "{storage:?} {solver:?}: {kept} J came or went"
+                "{storage:?} {solver:?}: {kept} J gained or lost"
             );
-            let off = (after.elastic - before.elastic - put_in).abs();
-            assert!(off < 1e-3 * put_in.abs(), "{storage:?} {solver:?}: {off} of {put_in} J");
+            let error = (after.elastic - before.elastic - put_in).abs();
+            assert!(
+                error < 1e-3 * put_in.abs(),
+                "{storage:?} {solver:?}: {error} of {put_in} J"
+            );
             scene.run(dt, 10);
             let then = scene.energy();
             let sum = after.kinetic + after.elastic;
-            // IMPLICIT loses some, VERLET's swings about a mean; neither gains.
+            // IMPLICIT loses energy, VERLET's oscillates about a mean; neither gains.
             assert!(then < 1.02 * sum, "{storage:?} {solver:?}: {then} of {sum} J");
             if solver == Solver::Verlet {
                 assert!(then > 0.98 * sum, "{storage:?} {solver:?}: {then} of {sum} J");
@@ -195,7 +198,7 @@ fn the_energy_changes_by_what_springs_hold_and_then_stays() {
 }
 
 #[test]
-fn springs_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blow_nothing_up() {
+fn stiffening_springs_a_hundredfold_in_motion_is_stable() {
     let mut random = Random::new(11);
     for (parts, few) in [
         (organ(0.012, false, &mut random), 3),
@@ -235,7 +238,7 @@ fn springs_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blow_nothing_up() 
                         let now = scene.energy();
                         assert!(now < 1.1 * energy, "{storage:?} {solver:?} {few}: {now} of {energy} J");
                     }
-                    // As soft as before they allow the substeps of before.
+                    // With their original stiffness they allow the original substeps.
                     let soft: Vec<f32> = stiff.iter().map(|stiffness| stiffness / 100.0).collect();
                     let body = scene.body_mut();
                     body.set_springs(pairs, Some(Values::Each(&soft)), None)
@@ -252,7 +255,7 @@ fn springs_a_hundred_times_as_stiff_in_the_middle_of_a_motion_blow_nothing_up() 
 }
 
 #[test]
-fn springs_of_no_stiffness_and_no_length_are_springs() {
+fn springs_of_zero_stiffness_and_length_are_valid() {
     let mut random = Random::new(13);
     let parts = organ(0.0125, true, &mut random);
     for storage in STORAGES {
@@ -283,7 +286,7 @@ fn springs_of_no_stiffness_and_no_length_are_springs() {
             for (now, then) in scene.positions().iter().zip(&parts.positions) {
                 assert!((now.x - f64::from(then.x) - 0.05).abs() < 1e-6, "no spring pulls");
             }
-            // What they were they are again, with the law by which they stiffen.
+            // They get their original values again, including the stiffening law.
             let body = scene.body_mut();
             body.set_positions(&parts.positions).expect("positions");
             body.set_velocities(&vec![Vec3::ZERO; parts.positions.len()])
@@ -302,17 +305,17 @@ fn springs_of_no_stiffness_and_no_length_are_springs() {
             assert!((a - b).abs() < 1e-6 * b, "{storage:?} {law:?}: {a} of {b} J");
             scene.run(1e-3, 5);
             made.run(1e-3, 5);
-            let off = largest_difference(&scene.positions(), &made.positions());
+            let error = largest_difference(&scene.positions(), &made.positions());
             assert!(
-                off < 1e-5 * way(&parts, &made.positions()),
-                "{storage:?} {law:?}: {off} m"
+                error < 1e-5 * largest_displacement(&parts, &made.positions()),
+                "{storage:?} {law:?}: {error} m"
             );
         }
     }
 }
 
 #[test]
-fn what_is_refused_changes_nothing() {
+fn refused_changes_have_no_effect() {
     let mut random = Random::new(17);
     let parts = organ(0.0125, false, &mut random);
     for storage in STORAGES {
@@ -356,7 +359,7 @@ fn what_is_refused_changes_nothing() {
 }
 
 #[test]
-fn mass_is_added_as_where_springs_were_removed_and_added_again() {
+fn added_mass_agrees_with_that_of_replaced_springs() {
     let mut parts = lattice();
     let indices = [7, 500, 900];
     for index in indices {
@@ -397,11 +400,11 @@ fn mass_is_added_as_where_springs_were_removed_and_added_again() {
 }
 
 #[test]
-fn terms_and_elements_see_that_springs_became_stiffer() {
+fn terms_and_elements_account_for_stiffer_springs() {
     let mesh = Mesh::block([0.06, 0.04, 0.04], [6, 4, 4]).expect("a block");
     let mut random = Random::new(19);
     let velocities: Vec<Vec3> = mesh.positions.iter().map(|_| 0.1 * random.vector()).collect();
-    // The law makes springs up to 400 times as stiff as their storage knows.
+    // The law makes springs up to 400 times as stiff as their stored stiffness.
     let steep = SpringLaw::Exponential {
         steepness: 30.0,
         limit: 0.2,

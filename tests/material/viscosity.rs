@@ -1,5 +1,5 @@
-//! Viscous springs and tetrahedra: relaxation and creep along the curves of the standard linear solid and of Kelvin and Voigt's, for every
-//! solver and storage, stable whatever the times and the step.
+//! Viscous springs and tetrahedra: relaxation and creep along the curves of the standard linear solid and of
+//! Kelvin-Voigt, for every solver and storage, stable for any relaxation time and step.
 
 use crate::support::bodies::{FREE, Random};
 use crate::support::hanging::nodes_at;
@@ -28,8 +28,8 @@ fn springs() -> Material {
     }
 }
 
-/// The times after which forces are looked at, as parts of the relaxation time, and how long the steps are.
-fn relaxes(solver: Solver, viscosity: Viscosity, scene: &mut Scene, held: &[u32], pull: impl Fn(&mut Scene)) {
+/// Checks forces at these fractions of the relaxation time, with these step lengths.
+fn check_relaxation(solver: Solver, viscosity: Viscosity, scene: &mut Scene, held: &[u32], pull: impl Fn(&mut Scene)) {
     let (retardation, relaxation) = (
         f64::from(viscosity.retardation_time),
         f64::from(viscosity.relaxation_time),
@@ -40,7 +40,7 @@ fn relaxes(solver: Solver, viscosity: Viscosity, scene: &mut Scene, held: &[u32]
             let force = |node: &u32| scene.body().pin_force(*node).expect("a pin").as_dvec3();
             held.iter().map(force).sum()
         };
-        // What the force is in the end: long steps later.
+        // The final force: long steps later.
         pull(scene);
         scene.step(step);
         let mut forces = vec![force(scene)];
@@ -52,12 +52,12 @@ fn relaxes(solver: Solver, viscosity: Viscosity, scene: &mut Scene, held: &[u32]
             scene.step(20.0 * viscosity.relaxation_time);
         }
         let rest = force(scene);
-        // The strain grew evenly within the first step.
+        // The strain grew linearly within the first step.
         let ratio = f64::from(step) / relaxation;
         let peak = retardation / f64::from(step) * (1.0 - (-ratio).exp());
         for (index, force) in forces.iter().enumerate().skip(1) {
             let after = |steps: usize| 1.0 + peak * (-ratio * steps as f64).exp();
-            // VERLET tells the mean of what it did with half kicks at both ends of the step.
+            // VERLET reports a mean that includes the half kicks at both ends of the step.
             let expected = match solver {
                 Solver::Verlet => 0.5 * (after(index - 1) + after(index)),
                 _ => after(index),
@@ -105,8 +105,8 @@ fn a_stretched_spring_relaxes_along_the_curve() {
             let mut scene = Scene::new(FREE, &definition);
             let lengths = [0.13, 0.15, 0.08];
             let next = std::cell::Cell::new(0);
-            // From one strain to another: what is told is of the change, so each pull begins at rest.
-            relaxes(solver, SOLID, &mut scene, &[1], |scene| {
+            // From one strain to another: each pull begins at rest, since the check is of the change.
+            check_relaxation(solver, SOLID, &mut scene, &[1], |scene| {
                 for _ in 0..10 {
                     scene.body_mut().move_pin(1, Vec3::X * 0.1).expect("a pin");
                     scene.step(2.0);
@@ -118,9 +118,9 @@ fn a_stretched_spring_relaxes_along_the_curve() {
     }
 }
 
-/// Every node of a block is led to where an even deformation has it.
+/// Moves every node of a block to the positions of a uniform deformation.
 #[test]
-fn tetrahedra_relax_along_the_curve_whatever_their_poisson_ratio() {
+fn tetrahedra_relax_along_the_curve_for_any_poisson_ratio() {
     let mesh = Mesh::block([0.04; 3], [2; 3]).expect("a block");
     let masses = vec![0.0; mesh.positions.len()];
     for (solver, storage) in SOLVERS.into_iter().zip(STORAGES) {
@@ -140,11 +140,11 @@ fn tetrahedra_relax_along_the_curve_whatever_their_poisson_ratio() {
             let side = nodes_at(&mesh, |p| p.x > 0.019);
             let lead = |scene: &mut Scene, stretch: Vec3, shear: f32| {
                 for (node, &p) in (0..).zip(&mesh.positions) {
-                    let place = p * stretch + Vec3::Y * (shear * p.x);
-                    scene.body_mut().move_pin(node, place).expect("a pin");
+                    let position = p * stretch + Vec3::Y * (shear * p.x);
+                    scene.body_mut().move_pin(node, position).expect("a pin");
                 }
             };
-            relaxes(solver, SOLID, &mut scene, &side, |scene| {
+            check_relaxation(solver, SOLID, &mut scene, &side, |scene| {
                 lead(scene, Vec3::ONE, 0.0);
                 scene.step(2.0);
                 for _ in 0..9 {
@@ -156,7 +156,7 @@ fn tetrahedra_relax_along_the_curve_whatever_their_poisson_ratio() {
     }
 }
 
-/// A light weight on a spring follows the curves of creep, of which inertia bends little.
+/// A light weight on a spring follows the creep curves with little effect of inertia.
 #[test]
 fn a_loaded_spring_creeps_along_the_curve() {
     const FORCE: f64 = 0.3;
@@ -174,7 +174,7 @@ fn a_loaded_spring_creeps_along_the_curve() {
                 masses: Values::Each(&[0.0, 1e-4]),
                 springs: Some(&[[0, 1]]),
                 stiffnesses: Values::Uniform(STIFFNESS as f32),
-                // So little that what swings at once is calm soon.
+                // So little that the initial oscillation soon decays.
                 node_dampings: Values::Uniform(0.02),
                 viscosity,
                 solver,
@@ -194,7 +194,7 @@ fn a_loaded_spring_creeps_along_the_curve() {
                     .expect("a force");
                 scene.step(step);
                 let time = f64::from(step) * f64::from(index);
-                // Zener's solid: at once F / (E + E1), in the end F / E, with the time tau (E + E1) / E between.
+                // Zener's solid: F / (E + E1) at first, F / E finally, with the time tau (E + E1) / E between.
                 let stiffening = if tau > 0.0 { t / tau } else { f64::INFINITY };
                 let lacks = if tau > 0.0 {
                     stiffening / (1.0 + stiffening)
@@ -202,11 +202,11 @@ fn a_loaded_spring_creeps_along_the_curve() {
                     1.0
                 };
                 let expected = FORCE / STIFFNESS * (1.0 - lacks * (-time / (tau + t)).exp());
-                let way = scene.positions()[1].x - 0.1;
+                let displacement = scene.positions()[1].x - 0.1;
                 if index > 60 {
                     assert!(
-                        (way - expected).abs() < 0.01 * FORCE / STIFFNESS,
-                        "{solver:?}, {viscosity:?}, {time} s: {way} {expected}"
+                        (displacement - expected).abs() < 0.01 * FORCE / STIFFNESS,
+                        "{solver:?}, {viscosity:?}, {time} s: {displacement} {expected}"
                     );
                 }
             }
@@ -214,12 +214,12 @@ fn a_loaded_spring_creeps_along_the_curve() {
     }
 }
 
-/// Kelvin and Voigt's solid of springs is damping along springs.
+/// A Kelvin-Voigt solid of springs is damping along springs.
 #[test]
 fn a_dashpot_alone_is_damping_along_the_spring() {
     for solver in SOLVERS {
         let mut hashes = Vec::new();
-        for of_springs in [false, true] {
+        for has_springs in [false, true] {
             let mesh = Mesh::block([0.04, 0.02, 0.02], [4, 2, 2]).expect("a block");
             let stiffnesses = 20.0;
             let definition = BodyDefinition {
@@ -227,9 +227,9 @@ fn a_dashpot_alone_is_damping_along_the_spring() {
                 tetrahedra: &mesh.tetrahedra,
                 masses: Values::Uniform(1e-4),
                 stiffnesses: Values::Uniform(stiffnesses),
-                spring_dampings: Values::Uniform(if of_springs { 0.25 * stiffnesses } else { 0.0 }),
+                spring_dampings: Values::Uniform(if has_springs { 0.25 * stiffnesses } else { 0.0 }),
                 viscosity: Viscosity {
-                    retardation_time: if of_springs { 0.0 } else { 0.25 },
+                    retardation_time: if has_springs { 0.0 } else { 0.25 },
                     relaxation_time: 0.0,
                 },
                 solver,
@@ -249,7 +249,7 @@ fn a_dashpot_alone_is_damping_along_the_spring() {
     }
 }
 
-/// A block as springs and as tetrahedra, swinging after a blow.
+/// A block as springs and as tetrahedra that swings after an impulse.
 fn block(nu: Option<f32>) -> (Mesh, Material) {
     let mesh = Mesh::block([0.04, 0.02, 0.02], [4, 2, 2]).expect("a block");
     (mesh, nu.map_or(springs(), tissue))
@@ -302,11 +302,14 @@ fn solvers_agree_on_the_motion() {
                 })
                 .collect();
             let start: Vec<DVec3> = block(nu).0.positions.iter().map(|p| p.as_dvec3()).collect();
-            let way = distance(&ends[0], &start);
-            assert!(way > 1e-4, "{way}");
+            let displacement = distance(&ends[0], &start);
+            assert!(displacement > 1e-4, "{displacement}");
             for (solver, end) in SOLVERS.iter().zip(&ends) {
-                let off = distance(end, &ends[0]) / way;
-                assert!(off < 0.01, "{solver:?}, {viscosity:?}, nu {nu:?}: {off} of {way} m");
+                let error = distance(end, &ends[0]) / displacement;
+                assert!(
+                    error < 0.01,
+                    "{solver:?}, {viscosity:?}, nu {nu:?}: {error} of {displacement} m"
+                );
             }
         }
     }
@@ -317,9 +320,10 @@ fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
     distances.fold(0.0, f64::max)
 }
 
-/// An arm that hardly relaxes is a spring: energy is kept, and goes up and down between nodes and arms. One that does loses it.
+/// A branch that hardly relaxes is a spring: energy is conserved and moves between nodes and branches. A branch that
+/// relaxes dissipates it.
 #[test]
-fn energy_is_kept_or_lost_and_never_made() {
+fn energy_is_kept_or_lost_and_never_gained() {
     for nu in [None, Some(0.3), Some(0.45)] {
         for (relaxation_time, kept) in [(1e5, true), (0.01, false)] {
             let viscosity = Viscosity {
@@ -396,8 +400,8 @@ fn scattered_bodies_stay_finite() {
                 ..FREE
             };
             let mut scene = swinging(nu, SOLID, solver, world);
-            let places: Vec<Vec3> = scene.positions().iter().map(|_| random.vector() * 0.03).collect();
-            scene.body_mut().set_positions(&places).expect("places");
+            let positions: Vec<Vec3> = scene.positions().iter().map(|_| random.vector() * 0.03).collect();
+            scene.body_mut().set_positions(&positions).expect("positions");
             for _ in 0..40 {
                 scene.step(1.0 / 60.0);
             }
@@ -406,9 +410,9 @@ fn scattered_bodies_stay_finite() {
     }
 }
 
-/// The state of rest has nothing to do with viscosity, and is one: arms hold nothing there.
+/// The static equilibrium is independent of viscosity, and unique: branches carry no force there.
 #[test]
-fn the_state_of_rest_is_that_of_what_is_elastic() {
+fn the_static_equilibrium_is_the_elastic_one() {
     for nu in [None, Some(0.3), Some(0.45)] {
         let mut shapes = Vec::new();
         for viscosity in [Viscosity::default(), SOLID] {
@@ -430,25 +434,29 @@ fn the_state_of_rest_is_that_of_what_is_elastic() {
     }
 }
 
-/// Bodies large enough to be shared out.
+/// Bodies large enough for several threads.
 #[test]
-fn threads_change_no_bit() {
-    threads_change_no_bit_of(|solver, nu| nu == [Some(0.45), Some(0.3)][usize::from(solver == Solver::Implicit)]);
+fn any_number_of_threads_is_bitwise_identical() {
+    any_number_of_threads_is_bitwise_identical_of(|solver, nu| {
+        nu == [Some(0.45), Some(0.3)][usize::from(solver == Solver::Implicit)]
+    });
 }
 
 #[test]
 #[ignore = "long"]
-fn threads_change_no_bit_in_the_other_cases() {
-    threads_change_no_bit_of(|solver, nu| nu != [Some(0.45), Some(0.3)][usize::from(solver == Solver::Implicit)]);
+fn any_number_of_threads_is_bitwise_identical_in_the_other_cases() {
+    any_number_of_threads_is_bitwise_identical_of(|solver, nu| {
+        nu != [Some(0.45), Some(0.3)][usize::from(solver == Solver::Implicit)]
+    });
 }
 
-fn threads_change_no_bit_of(is_tried: fn(Solver, Option<f32>) -> bool) {
+fn any_number_of_threads_is_bitwise_identical_of(is_selected: fn(Solver, Option<f32>) -> bool) {
     let mesh = Mesh::block([0.2, 0.2, 0.18], [20, 20, 18]).expect("a block");
     let thrown: Vec<Vec3> = mesh.positions.iter().map(|p| Vec3::new(3.0, -2.0, 1.0) * *p).collect();
     for solver in [Solver::Verlet, Solver::Implicit] {
         for nu in [None, Some(0.3), Some(0.45)]
             .into_iter()
-            .filter(|&nu| is_tried(solver, nu))
+            .filter(|&nu| is_selected(solver, nu))
         {
             let hashes = [1, 2, 5].map(|thread_count| {
                 let world = WorldDefinition { thread_count, ..FREE };
@@ -472,9 +480,10 @@ fn threads_change_no_bit_of(is_tried: fn(Solver, Option<f32>) -> bool) {
     }
 }
 
-/// A cut takes what it cuts, and what is left has no more energy than before, whatever the arms of its rings.
+/// A cut removes the energy of the springs it cuts, and the remaining energy does not rise, for any Maxwell branches of
+/// nodal pressures.
 #[test]
-fn a_cut_makes_no_energy() {
+fn a_cut_adds_no_energy() {
     for solver in SOLVERS {
         for nu in [None, Some(0.3), Some(0.45)] {
             let viscosity = Viscosity {
@@ -484,7 +493,7 @@ fn a_cut_makes_no_energy() {
             let mut scene = swinging(nu, viscosity, solver, FREE);
             scene.run(1e-3, 10);
             let before = scene.energy();
-            // An edge across the middle, and all that has it.
+            // An edge across the middle, and all elements that contain it.
             let mesh = block(nu).0;
             let mut pairs = mesh.edges().expect("edges").into_iter();
             let near = |node: u32| mesh.positions[node as usize].length() < 0.012;
@@ -501,17 +510,17 @@ fn a_cut_makes_no_energy() {
     }
 }
 
-/// Thrown beyond all numbers and brought back, a body is what it was.
+/// Moved beyond the range of `f32` and back, a body has its original state.
 #[test]
-fn what_was_beyond_all_numbers_is_forgotten() {
+fn non_finite_history_is_discarded() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         for nu in [None, Some(0.3), Some(0.45)] {
             let mut scene = swinging(nu, SOLID, solver, FREE);
-            let places = scene.body().positions().to_vec();
+            let positions = scene.body().positions().to_vec();
             for factor in [1e12, 1e20, 1e37] {
-                let far: Vec<Vec3> = places.iter().map(|place| *place * factor).collect();
-                scene.body_mut().set_positions(&far).expect("places");
-                scene.body_mut().set_positions(&places).expect("places");
+                let far: Vec<Vec3> = positions.iter().map(|position| *position * factor).collect();
+                scene.body_mut().set_positions(&far).expect("positions");
+                scene.body_mut().set_positions(&positions).expect("positions");
                 assert!(scene.energy().is_finite());
                 scene.run(1e-3, 3);
             }
@@ -519,20 +528,20 @@ fn what_was_beyond_all_numbers_is_forgotten() {
     }
 }
 
-/// NEWTON finds that nothing moves. What arms hold is rounded to `f32`, so that they are out of balance by a millionth of what positions are
-/// rounded by: it may not be able to tell the end of its way then, and says so.
+/// NEWTON detects that nothing moves. Branch forces are rounded to `f32`, so their imbalance is a millionth of the
+/// rounding of positions. The solver may be unable to converge then, and reports that.
 #[test]
-fn newton_finds_that_what_rests_rests() {
-    newton_finds_that_what_rests_rests_of(&[Some(0.45)]);
+fn newton_keeps_a_body_at_rest() {
+    newton_keeps_a_body_at_rest_of(&[Some(0.45)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn newton_finds_that_what_rests_rests_in_the_other_cases() {
-    newton_finds_that_what_rests_rests_of(&[None, Some(0.3)]);
+fn newton_keeps_a_body_at_rest_in_the_other_cases() {
+    newton_keeps_a_body_at_rest_of(&[None, Some(0.3)]);
 }
 
-fn newton_finds_that_what_rests_rests_of(ratios: &[Option<f32>]) {
+fn newton_keeps_a_body_at_rest_of(ratios: &[Option<f32>]) {
     for &nu in ratios {
         for viscosity in [
             SOLID,
@@ -561,7 +570,7 @@ fn newton_finds_that_what_rests_rests_of(ratios: &[Option<f32>]) {
     }
 }
 
-/// What a step that is refused or taken to a tolerance tries leaves no trace in the arms.
+/// The attempts of a refused step, or of a step to a tolerance, do not change the branches.
 #[test]
 fn a_refused_step_changes_nothing() {
     for nu in [None, Some(0.3), Some(0.45)] {
@@ -582,9 +591,9 @@ fn a_refused_step_changes_nothing() {
     }
 }
 
-/// A removed spring takes its arm along.
+/// Removing a spring removes its branch.
 #[test]
-fn what_was_removed_pulls_no_more() {
+fn removed_springs_pull_no_more() {
     for solver in SOLVERS {
         let definition = BodyDefinition {
             positions: &[Vec3::ZERO, Vec3::X * 0.1],
@@ -606,7 +615,7 @@ fn what_was_removed_pulls_no_more() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_by_name() {
+fn invalid_viscosity_is_refused_by_name() {
     let refused = |definition: &BodyDefinition, words: &[&str]| {
         let mut world = World::new(FREE).expect("a world");
         let message = world.create_body(definition).expect_err("refused").to_string();

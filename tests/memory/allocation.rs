@@ -1,6 +1,6 @@
-//! A step allocates nothing, taken or refused, nor does a detection in image space.
+//! A step allocates nothing, accepted or refused, nor does image-space detection.
 
-use super::allocator::asked;
+use super::allocator::allocator_calls;
 use glam::{Quat, Vec3};
 use sinew::capi::body::{sinew_body_create, sinew_body_set_positions};
 use sinew::capi::definition::{sinew_body_def, sinew_body_def_init};
@@ -19,8 +19,8 @@ use sinew::{
 };
 
 #[test]
-fn the_count_counts() {
-    assert!(asked(|| drop(vec![1_u8; 100])) >= 2);
+fn the_allocator_counts_calls() {
+    assert!(allocator_calls(|| drop(vec![1_u8; 100])) >= 2);
 }
 
 #[test]
@@ -54,7 +54,7 @@ fn a_blade_that_cuts_nothing_allocates_nothing() {
                 ..BladeDefinition::new(edge)
             })
             .expect("a blade");
-        // It comes later than the blade.
+        // The body is created after the blade.
         let cloth = BodyDefinition {
             masses: Values::Uniform(2e-4),
             stiffnesses: Values::Uniform(50.0),
@@ -64,17 +64,17 @@ fn a_blade_that_cuts_nothing_allocates_nothing() {
             ..BodyDefinition::of(&mesh)
         };
         let body = world.create_body(&cloth).expect("a body");
-        let mut feels = 0;
+        let mut contact_steps = 0;
         world.set_profiling(true).expect("room");
         for step in 0..40 {
-            // From beside the cloth against its border, and away.
+            // The blade moves from beside the cloth against its border, and back.
             let part = (1.0 - (step as f32 / 20.0 - 1.0).abs()) * 0.0205;
-            let place = Vec3::new(-0.07 + part, 0.0, 0.003);
-            world.set_blade_pose(blade, place, None).expect("a pose");
-            assert_eq!(asked(|| drop(world.step(1e-3))), 0, "{solver:?}, step {step}");
-            feels += usize::from(world.blade_report(blade).expect("a blade").force != Vec3::ZERO);
+            let target = Vec3::new(-0.07 + part, 0.0, 0.003);
+            world.set_blade_pose(blade, target, None).expect("a pose");
+            assert_eq!(allocator_calls(|| drop(world.step(1e-3))), 0, "{solver:?}, step {step}");
+            contact_steps += usize::from(world.blade_report(blade).expect("a blade").force != Vec3::ZERO);
         }
-        assert!(feels > 0);
+        assert!(contact_steps > 0);
         assert_eq!(world.body(body).expect("a body").topology_version(), 0);
     }
 }
@@ -85,7 +85,7 @@ fn tissue_against_tissue_allocates_nothing() {
         let mut mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
         mesh.positions
             .iter_mut()
-            .for_each(|place| *place += Vec3::new(0.3 * height, height, height));
+            .for_each(|position| *position += Vec3::new(0.3 * height, height, height));
         mesh
     });
     for detection in [Detection::Exact, Detection::ImageSpace] {
@@ -110,18 +110,22 @@ fn tissue_against_tissue_allocates_nothing() {
                 world.body_mut(cloth).and_then(|body| body.pin(node)).expect("a node");
             }
         }
-        // A step that is timed allocates nothing either.
+        // A step with profiling allocates nothing either.
         world.set_profiling(detection == Detection::Exact).expect("room");
         for step in 0..40 {
-            assert_eq!(asked(|| drop(world.step(0.002))), 0, "{detection:?}, step {step}");
+            assert_eq!(
+                allocator_calls(|| drop(world.step(0.002))),
+                0,
+                "{detection:?}, step {step}"
+            );
         }
-        // They met: it would have fallen three centimetres.
-        let places = world.body(first.expect("a body")).expect("a body").positions();
-        assert!(places.iter().all(|place| place.y > 0.001), "{detection:?}");
+        // The cloths collided: the upper one would have fallen three centimeters.
+        let new_positions = world.body(first.expect("a body")).expect("a body").positions();
+        assert!(new_positions.iter().all(|position| position.y > 0.001), "{detection:?}");
     }
 }
 
-/// Draws on nothing.
+/// A canvas that draws nothing.
 struct Nowhere;
 
 impl DebugCanvas for Nowhere {
@@ -150,13 +154,13 @@ fn debug_drawing_allocates_nothing() {
     }
     assert!(world.contacts(ball).expect("a tool").next().is_some());
     let draw = || world.debug_draw(&DebugDrawDefinition::default(), &mut Nowhere);
-    assert_eq!(asked(|| draw().expect("a drawing")), 0);
+    assert_eq!(allocator_calls(|| draw().expect("a drawing")), 0);
 }
 
 #[test]
 fn a_step_that_tears_nothing_allocates_nothing() {
     let mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
-    let taut: Vec<Vec3> = mesh.positions.iter().map(|place| 1.3 * *place).collect();
+    let taut: Vec<Vec3> = mesh.positions.iter().map(|position| 1.3 * *position).collect();
     for is_taut in [false, true] {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let cloth = BodyDefinition {
@@ -169,7 +173,7 @@ fn a_step_that_tears_nothing_allocates_nothing() {
             tearing: Tearing {
                 strain: 0.2,
                 most_per_step: 1000,
-                // None is to be torn off.
+                // No piece may be torn off.
                 smallest_piece: 1.0,
                 ..Tearing::default()
             },
@@ -180,28 +184,28 @@ fn a_step_that_tears_nothing_allocates_nothing() {
             world.body_mut(cloth).and_then(|body| body.pin(node)).expect("a node");
         }
         if is_taut {
-            // All have been tried, or the nodes are used up.
+            // All candidates have been tried, or the spare nodes are used up.
             for _ in 0..30 {
                 world.step(1e-5).expect("a step");
             }
         }
-        let mut without = 0;
+        let mut steps_without_tears = 0;
         for step in 0..40 {
-            let allocated = asked(|| drop(world.step(if is_taut { 1e-5 } else { 1e-3 })));
+            let allocated = allocator_calls(|| drop(world.step(if is_taut { 1e-5 } else { 1e-3 })));
             let report = world.body(cloth).expect("a body").tear_report();
             assert!(
                 allocated == 0 || report.tears > 0,
                 "taut: {is_taut}, step {step}, {report:?}"
             );
-            without += u32::from(report.tears == 0);
+            steps_without_tears += u32::from(report.tears == 0);
             assert_eq!(is_taut, report.no_room + report.small_pieces > 0, "{report:?}");
         }
-        assert!(without > 20, "taut: {is_taut}: {without}");
+        assert!(steps_without_tears > 20, "taut: {is_taut}: {steps_without_tears}");
     }
 }
 
 #[test]
-fn a_step_that_readers_see_allocates_nothing() {
+fn a_step_with_readers_allocates_nothing() {
     let mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let cloth = BodyDefinition {
@@ -221,11 +225,16 @@ fn a_step_that_readers_see_allocates_nothing() {
         };
         world.cut(cloth, &sweep).expect("a cut");
         for step in 0..9 {
-            assert_eq!(asked(|| drop(world.step(1e-3))), 0, "cut {cut}, step {step}");
-            // One reads each step, one every third, one holds a frame of before the last cut: frames of old topologies end too.
+            assert_eq!(allocator_calls(|| drop(world.step(1e-3))), 0, "cut {cut}, step {step}");
+            // One reader reads every step, one every third, and one holds a frame from before the last cut, so that
+            // frames of old topologies are released too.
             for (reader, every) in readers.iter_mut().zip([1, 3, 8]) {
                 if step % every == every - 1 {
-                    assert_eq!(asked(|| assert!(reader.read().is_new)), 0, "cut {cut}, step {step}");
+                    assert_eq!(
+                        allocator_calls(|| assert!(reader.read().is_new)),
+                        0,
+                        "cut {cut}, step {step}"
+                    );
                 }
             }
         }
@@ -234,14 +243,14 @@ fn a_step_that_readers_see_allocates_nothing() {
 }
 
 #[test]
-fn a_hand_at_a_kilohertz_allocates_nothing() {
+fn a_haptic_tick_allocates_nothing() {
     let mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
-    let rim = |place: &Vec3| place.x.abs().max(place.z.abs()) > 0.049;
+    let is_border = |rest: &Vec3| rest.x.abs().max(rest.z.abs()) > 0.049;
     let masses: Vec<f32> = mesh
         .positions
         .iter()
-        .map(|place| if rim(place) { 0.0 } else { 2e-4 })
+        .map(|rest| if is_border(rest) { 0.0 } else { 2e-4 })
         .collect();
     let cloth = BodyDefinition {
         masses: Values::Each(&masses),
@@ -264,35 +273,38 @@ fn a_hand_at_a_kilohertz_allocates_nothing() {
             pose,
         ))
     });
-    let mut felt = 0;
+    let mut contact_ticks = 0;
     for tick in 0..600 {
         for (handle, pose) in handles.iter_mut().flatten() {
             pose.position.y -= 5e-5;
-            let asked = asked(|| {
+            let allocator_calls = allocator_calls(|| {
                 let tick = handle.tick(*pose, None, None, 1e-3).expect("a tick");
-                felt += u32::from(tick.force.length() > 0.01);
+                contact_ticks += u32::from(tick.force.length() > 0.01);
             });
-            assert_eq!(asked, 0, "tick {tick}");
+            assert_eq!(allocator_calls, 0, "tick {tick}");
         }
         if tick == 500 {
-            // What is left behind is not cleared away in a step.
+            // The remains of the handle are not freed within a step.
             handles[1] = None;
         }
         if tick % 4 == 0 {
-            assert_eq!(asked(|| drop(world.step(4e-3))), 0, "tick {tick}");
+            assert_eq!(allocator_calls(|| drop(world.step(4e-3))), 0, "tick {tick}");
         }
     }
-    assert!(felt > 100, "{felt}");
+    assert!(contact_ticks > 100, "{contact_ticks}");
 }
 
 #[test]
 fn a_detection_in_image_space_allocates_nothing() {
     let mesh = Mesh::organ(0.1, 0.01).expect("an organ");
     let mut moved = mesh.positions.clone();
-    moved.iter_mut().for_each(|place| *place += Vec3::new(0.03, 0.01, 0.02));
+    moved
+        .iter_mut()
+        .for_each(|position| *position += Vec3::new(0.03, 0.01, 0.02));
     let surface = mesh.surface().expect("memory");
     for form in [SINEW_IMAGE_FORM_INTERVALS, SINEW_IMAGE_FORM_COUNTED] {
-        // SAFETY: definitions are filled by their init functions, pointers are to what lives, the detector ends before its world.
+        // SAFETY: definitions are filled by their init functions, pointers are to live objects, and the detector is
+        // destroyed before its world.
         unsafe {
             let mut world_def = std::mem::zeroed();
             assert_eq!(sinew_world_def_init(&mut world_def, size_of_val(&world_def)), 0);
@@ -318,11 +330,11 @@ fn a_detection_in_image_space_allocates_nothing() {
             let mut report: sinew_detector_report = std::mem::zeroed();
             report.struct_size = size_of_val(&report);
             for shift in [Vec3::ZERO, Vec3::new(-0.02, 0.0, -0.01)] {
-                let places: Vec<_> = moved.iter().map(|place| *place + shift).collect();
-                let (data, count) = (places.as_ptr().cast(), places.len());
+                let new_positions: Vec<_> = moved.iter().map(|position| *position + shift).collect();
+                let (data, count) = (new_positions.as_ptr().cast(), new_positions.len());
                 assert_eq!(sinew_body_set_positions(world, def.bodies[1], data, count), 0);
                 let find = || assert_eq!(sinew_detector_find(detector, world, &mut report), 0);
-                assert_eq!(asked(find), 0, "form {form}");
+                assert_eq!(allocator_calls(find), 0, "form {form}");
                 assert!(report.edge_counts.iter().all(|&count| count > 10), "they overlap");
             }
             sinew_detector_destroy(detector);
@@ -378,26 +390,26 @@ fn steps_allocate_nothing(storage: Storage, solver: Solver, tolerances: &[f32]) 
             Solver::Newton => 3,
         };
         for step in 0..steps {
-            let turned = Quat::from_rotation_x(0.05 * step as f32);
-            let place = Vec3::Y * (0.02 - 0.0005 * step as f32);
-            world.set_pose(tools[0], place, Some(turned)).expect("a pose");
+            let rotation = Quat::from_rotation_x(0.05 * step as f32);
+            let target = Vec3::Y * (0.02 - 0.0005 * step as f32);
+            world.set_pose(tools[0], target, Some(rotation)).expect("a pose");
             assert_eq!(
-                asked(|| drop(world.step(0.004))),
+                allocator_calls(|| drop(world.step(0.004))),
                 0,
                 "{storage:?}, {solver:?}, tolerance {tolerance}, step {step}"
             );
         }
         if solver != Solver::Verlet {
-            // They refuse none.
+            // These solvers refuse no step.
             continue;
         }
-        let refused = asked(|| assert!(matches!(world.step(1e6), Err(Error::Unstable { .. }))));
+        let refused = allocator_calls(|| assert!(matches!(world.step(1e6), Err(Error::Unstable { .. }))));
         assert_eq!(refused, 0);
     }
 }
 
 #[test]
-fn nor_does_one_with_dynamic_tools() {
+fn a_step_with_dynamic_tools_allocates_nothing() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let cloth = |world: &mut World, height: f32| {
@@ -423,20 +435,24 @@ fn nor_does_one_with_dynamic_tools() {
                 world.set_dynamic(tool, Some(&mass)).expect("a dynamic tool");
             }
         };
-        // Bodies and tools that come before and after the first dynamic one.
+        // Bodies and tools that are created before and after the first dynamic tool.
         cloth(&mut world, 0.0);
         tool(&mut world, Shape::Sphere { radius: 0.02 }, 0.03);
         cloth(&mut world, -0.005);
         tool(&mut world, Shape::Plane, -0.01);
         tool(&mut world, Shape::Sphere { radius: 0.01 }, 0.06);
         for step in 0..30 {
-            assert_eq!(asked(|| drop(world.step(0.008))), 0, "{solver:?}, step {step}");
+            assert_eq!(
+                allocator_calls(|| drop(world.step(0.008))),
+                0,
+                "{solver:?}, step {step}"
+            );
         }
     }
 }
 
 #[test]
-fn nor_does_one_of_what_is_under_pressure() {
+fn a_step_with_cavity_pressure_allocates_nothing() {
     let block = Mesh::block([0.05; 3], [3; 3]).expect("a block");
     for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
@@ -450,16 +466,20 @@ fn nor_does_one_of_what_is_under_pressure() {
         };
         let body = world.create_body(&body).expect("a body");
         for step in 0..4 {
-            assert_eq!(asked(|| drop(world.step(0.004))), 0, "{solver:?}, step {step}");
+            assert_eq!(
+                allocator_calls(|| drop(world.step(0.004))),
+                0,
+                "{solver:?}, step {step}"
+            );
             let body = world.body_mut(body).expect("the body");
-            assert_eq!(asked(|| drop(body.set_pressure(100.0 * step as f32))), 0);
+            assert_eq!(allocator_calls(|| drop(body.set_pressure(100.0 * step as f32))), 0);
             drop(body.remove_spring(0, step + 1));
         }
     }
 }
 
 #[test]
-fn nor_does_one_of_tissue_that_remembers() {
+fn a_step_with_internal_variables_allocates_nothing() {
     let block = Mesh::block([0.05; 3], [3; 3]).expect("a block");
     let plain = BodyDefinition {
         viscosity: Viscosity {
@@ -497,7 +517,11 @@ fn nor_does_one_of_tissue_that_remembers() {
             pinned.pin(0).expect("a node");
             pinned.pin_axes(5, [true, false, true]).expect("a node");
             for step in 0..4 {
-                assert_eq!(asked(|| drop(world.step(0.004))), 0, "{solver:?}, step {step}");
+                assert_eq!(
+                    allocator_calls(|| drop(world.step(0.004))),
+                    0,
+                    "{solver:?}, step {step}"
+                );
                 let body = world.body_mut(body).expect("the body");
                 drop(body.remove_spring(0, step + 1));
             }
@@ -522,7 +546,7 @@ fn detection_in_image_space_allocates_nothing() {
         thickness: 0.001,
     });
     for form in [Form::Intervals, Form::Counted] {
-        // Room for the coarser pixels alone.
+        // Capacity for the coarser pixels only.
         let definition = ImageSpaceDefinition {
             form,
             pixels: 2000,
@@ -531,7 +555,7 @@ fn detection_in_image_space_allocates_nothing() {
         };
         let mut detector = ImageSpace::new(&definition, &[&surface]).expect("a detector");
         let mut found = 0;
-        let count = asked(|| {
+        let count = allocator_calls(|| {
             let overlap = detector.detect(&bodies).expect("an overlap");
             assert!(overlap.pixel > 0.001);
             found = overlap.inside[0].edges.len() + overlap.inside[1].edges.len();
@@ -541,7 +565,7 @@ fn detection_in_image_space_allocates_nothing() {
     }
     let image = LayeredImage::new(&organ.positions, &triangles, 0.001).expect("an image");
     let mut near = 0;
-    let count = asked(|| {
+    let count = allocator_calls(|| {
         near = moved
             .iter()
             .filter(|&&point| image.distance(point, 0.01).is_some())
@@ -552,7 +576,7 @@ fn detection_in_image_space_allocates_nothing() {
 }
 
 #[test]
-fn nor_does_one_of_what_tools_hold_and_lose() {
+fn a_step_with_attachments_that_break_allocates_nothing() {
     let mesh = Mesh::cloth([0.2, 0.2], [12, 12]).expect("a cloth");
     for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
@@ -567,17 +591,21 @@ fn nor_does_one_of_what_tools_hold_and_lose() {
         let tool = ToolDefinition::new(Shape::Sphere { radius: 0.02 });
         let tool = world.create_tool(&tool).expect("a tool");
         world.attach_nodes(cloth, &[0, 5, 80], tool, 0.0).expect("attachments");
-        // The first step loses some of these, what comes later the rest.
+        // The first step breaks some of these attachments, later steps the rest.
         for (node, limit) in [(100, 1e-6), (101, 1e-6), (110, 0.05), (120, 0.1)] {
             world.attach_node(cloth, node, tool, limit).expect("an attachment");
         }
         let mut lost = 0;
         for step in 0..8 {
-            let place = Vec3::Y * (1e-3 * (step * step) as f32);
+            let position = Vec3::Y * (1e-3 * (step * step) as f32);
             world
-                .set_pose(tool, place, Some(Quat::from_rotation_x(0.02 * step as f32)))
+                .set_pose(tool, position, Some(Quat::from_rotation_x(0.02 * step as f32)))
                 .expect("a pose");
-            assert_eq!(asked(|| drop(world.step(0.004))), 0, "{solver:?}, step {step}");
+            assert_eq!(
+                allocator_calls(|| drop(world.step(0.004))),
+                0,
+                "{solver:?}, step {step}"
+            );
             lost += world.slipped().len();
         }
         assert!(lost >= 2, "{solver:?}: {lost} lost");

@@ -1,4 +1,5 @@
-//! The system's allocator, which counts what each thread asks of it and refuses a thread that has used up its requests.
+//! The system allocator with a count of each thread's calls, which refuses memory to a thread that has used up its
+//! requests.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -9,39 +10,39 @@ thread_local! {
     static LEFT: Cell<Option<usize>> = const { Cell::new(None) };
 }
 
-/// How often a call asks for memory or returns it, on this thread.
-pub fn asked(call: impl FnOnce()) -> u64 {
+/// Counts the allocator calls of `call` on this thread.
+pub fn allocator_calls(call: impl FnOnce()) -> u64 {
     let before = CALLS.get();
     call();
     CALLS.get() - before
 }
 
-/// What this thread has been given and has not returned [bytes].
+/// Returns the memory that this thread has allocated and not freed [bytes].
 pub fn held() -> isize {
     HELD.get()
 }
 
-/// Gives this thread memory for so many more requests; `None`: for as many as it has.
+/// Lets this thread make `requests` more successful requests; `None` removes the limit.
 pub fn allow(requests: Option<usize>) {
     LEFT.set(requests);
 }
 
-/// Does something with memory for so many requests of this thread.
+/// Calls `act` with memory for `requests` requests of this thread.
 pub fn with<T>(requests: usize, act: impl FnOnce() -> T) -> T {
     allow(Some(requests));
-    let done = act();
+    let result = act();
     allow(None);
-    done
+    result
 }
 
 pub struct Watched;
 
 impl Watched {
-    /// Uses up a request; whether there was one.
+    /// Uses up a request. Returns true if one was left.
     fn grants() -> bool {
-        let left = LEFT.get();
-        LEFT.set(left.map(|left| left.saturating_sub(1)));
-        left != Some(0)
+        let remaining = LEFT.get();
+        LEFT.set(remaining.map(|remaining| remaining.saturating_sub(1)));
+        remaining != Some(0)
     }
 
     fn note(bytes: isize) {
@@ -50,7 +51,7 @@ impl Watched {
     }
 }
 
-// SAFETY: what is not refused goes to the system's allocator unchanged.
+// SAFETY: every granted call goes to the system allocator unchanged.
 unsafe impl GlobalAlloc for Watched {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         if !Self::grants() {
@@ -61,7 +62,8 @@ unsafe impl GlobalAlloc for Watched {
         unsafe { System.alloc(layout) }
     }
 
-    /// What shrinks stays where it is, as with any allocator; but what is aligned by more than memory is anyway Rust has copied.
+    /// Shrinking succeeds in place, as with any allocator. With a larger alignment than the allocator's own, the
+    /// standard library copies instead.
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         if (size > layout.size() || layout.align() > 16) && !Self::grants() {
             return std::ptr::null_mut();

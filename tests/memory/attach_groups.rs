@@ -1,6 +1,7 @@
-//! Tissue attached to tissue: which bodies that binds together, what comes from far, and what changes nothing.
+//! Attachments between bodies: which bodies they couple, attachments over long distances, and calls that change
+//! nothing.
 
-use super::allocator::asked;
+use super::allocator::allocator_calls;
 use crate::support::hanging::*;
 use crate::support::tissue::*;
 use glam::{DVec3, Vec3};
@@ -16,17 +17,17 @@ const SOLVERS: [[Solver; 2]; 4] = [
     [Solver::Verlet, Solver::Implicit],
 ];
 
-/// The momentum of some of these bodies.
-fn sum_of(world: &World, parts: &[(BodyId, f32)]) -> DVec3 {
-    let of = |&(id, mass): &(BodyId, f32)| {
-        let part = body(world, id);
-        momentum(part, mass / part.node_count() as f32)
+/// Returns the total momentum of these bodies.
+fn sum_of(world: &World, bodies: &[(BodyId, f32)]) -> DVec3 {
+    let momentum_of = |&(id, mass): &(BodyId, f32)| {
+        let body = body(world, id);
+        momentum(body, mass / body.node_count() as f32)
     };
-    parts.iter().map(of).sum()
+    bodies.iter().map(momentum_of).sum()
 }
 
 #[test]
-fn what_is_far_apart_is_pulled_together_gently() {
+fn distant_points_are_pulled_together_gently() {
     for solvers in SOLVERS {
         for (distance, dt, seconds) in [
             (0.05, 1e-3, 0.4),
@@ -48,7 +49,7 @@ fn what_is_far_apart_is_pulled_together_gently() {
                         ..block
                     }
                     .mesh(),
-                    |place| place.x == side * SIZE,
+                    |position| position.x == side * SIZE,
                 )
             });
             world
@@ -60,25 +61,25 @@ fn what_is_far_apart_is_pulled_together_gently() {
                 let gaps = pairs.map(|(&a, &b)| left[a as usize].distance(right[b as usize]));
                 gaps.fold(0.0, f32::max)
             };
-            let parts = ids.map(|id| (id, left.mass));
-            let (first, mut most, mut fastest) = (gap(&world), 0.0_f32, 0.0_f32);
+            let bodies = ids.map(|id| (id, left.mass));
+            let (first, mut largest, mut fastest) = (gap(&world), 0.0_f32, 0.0_f32);
             for _ in 0..(seconds / dt) as u32 {
                 world.step(dt).expect("a step");
                 for id in ids {
                     let body = body(&world, id);
                     assert!(all_finite(body), "{solvers:?}, {distance} m");
                     let middle = centre(body);
-                    let far = |place: &Vec3| (place.as_dvec3() - middle).length() as f32;
+                    let distance_to_center = |position: &Vec3| (position.as_dvec3() - middle).length() as f32;
                     if distance < 1e3 {
-                        most = most.max(body.positions().iter().map(far).fold(0.0, f32::max));
+                        largest = largest.max(body.positions().iter().map(distance_to_center).fold(0.0, f32::max));
                     }
                     fastest = fastest.max(body.velocities().iter().map(|v| v.length()).fold(0.0, f32::max));
                 }
             }
-            let off = sum_of(&world, &parts).length();
-            assert!(most < 0.9 * SIZE, "{solvers:?}, {distance} m: {most} m");
+            let error = sum_of(&world, &bodies).length();
+            assert!(largest < 0.9 * SIZE, "{solvers:?}, {distance} m: {largest} m");
             assert!(fastest < 0.5, "{solvers:?}, {distance} m: {fastest} m/s");
-            assert!(off < 1e-6, "{solvers:?}, {distance} m: momentum {off}");
+            assert!(error < 1e-6, "{solvers:?}, {distance} m: momentum {error}");
             if distance < 0.1 {
                 assert!(gap(&world) < 1e-5, "{solvers:?}: {} m apart", gap(&world));
             } else if distance < 1.0 {
@@ -89,11 +90,11 @@ fn what_is_far_apart_is_pulled_together_gently() {
 }
 
 #[test]
-fn pairs_that_are_apart_do_not_change_each_other() {
+fn separate_pairs_do_not_affect_each_other() {
     let positions = [false, true].map(|has_other| {
         let mut hanging = Hanging::new(Block::CALM, Block::CALM, 4, DOWN);
         if has_other {
-            // In substeps of a quarter of a millisecond.
+            // This pair takes substeps of a quarter of a millisecond.
             let [first, second] = [2.0, 2.0 + SIZE].map(|x| Block {
                 at: Vec3::X * x,
                 solver: Solver::Implicit,
@@ -101,8 +102,8 @@ fn pairs_that_are_apart_do_not_change_each_other() {
             });
             let [left, right] = [first, second].map(|block| block.put(&mut hanging.world));
             let joint = [Anchor::Node(0)];
-            let made = hanging.world.attach_to_body(left, &joint, right, &joint, 0.0);
-            made.expect("an attachment");
+            let attached = hanging.world.attach_to_body(left, &joint, right, &joint, 0.0);
+            attached.expect("an attachment");
         }
         for _ in 0..30 {
             let report = hanging.world.step(4e-3).expect("a step");
@@ -113,48 +114,50 @@ fn pairs_that_are_apart_do_not_change_each_other() {
     assert_eq!(positions[0], positions[1]);
 }
 
-/// What meets others.
-const MEETING: BodyContact = BodyContact {
+/// Contact with other bodies.
+const COLLIDING: BodyContact = BodyContact {
     thickness: 0.2e-3,
     with_bodies: true,
     ..BodyContact::NOTHING
 };
 
 #[test]
-fn what_meets_one_goes_with_all_that_are_attached_to_it() {
+fn a_collision_moves_all_attached_bodies() {
     for solvers in SOLVERS {
         let mut world = world(Vec3::ZERO);
-        // The first flies at the second, on which the third hangs, on which the fourth does, which meets nothing.
+        // The first block flies at the second. The third is attached to the second, and the fourth, which collides with
+        // nothing, to the third.
         let ids = [0, 1, 2, 3].map(|index| {
             let gap = if index == 0 { 0.005 } else { 0.0 };
             let block = Block {
                 at: Vec3::X * (index as f32 * SIZE - gap),
                 solver: solvers[index % 2],
-                contact: if index < 3 { MEETING } else { BodyContact::NOTHING },
+                contact: if index < 3 { COLLIDING } else { BodyContact::NOTHING },
                 stiffness: 300.0,
                 ..Block::FREE
             };
             block.put(&mut world)
         });
         let faces = [0.5, -0.5].map(|side| {
-            let is_corner = |place: Vec3| place.x == side * SIZE && place.y.abs() > 0.009 && place.z.abs() > 0.019;
+            let is_corner =
+                |position: Vec3| position.x == side * SIZE && position.y.abs() > 0.009 && position.z.abs() > 0.019;
             nodes_at(&Block::FREE.mesh(), is_corner)
         });
         assert_eq!(faces[0].len(), 4);
         for [left, right] in [[1, 2], [2, 3]] {
-            let made = world.attach_to_body(ids[left], &anchors(&faces[0]), ids[right], &anchors(&faces[1]), 0.0);
-            made.expect("attachments");
+            let attached = world.attach_to_body(ids[left], &anchors(&faces[0]), ids[right], &anchors(&faces[1]), 0.0);
+            attached.expect("attachments");
         }
         let count = body(&world, ids[0]).node_count();
         let thrown = world.body_mut(ids[0]).expect("a body");
         thrown.set_velocities(&vec![Vec3::X; count]).expect("velocities");
-        let parts = ids.map(|id| (id, 0.1));
-        let first = sum_of(&world, &parts);
-        let (mut off, mut drift) = (0.0_f64, 0.0_f32);
+        let bodies = ids.map(|id| (id, 0.1));
+        let first = sum_of(&world, &bodies);
+        let (mut error, mut drift) = (0.0_f64, 0.0_f32);
         for _ in 0..60 {
             let report = world.step(2e-3).expect("a step");
             assert_eq!(report.crossings, 0, "{solvers:?}");
-            off = off.max((sum_of(&world, &parts) - first).length());
+            error = error.max((sum_of(&world, &bodies) - first).length());
             for [left, right] in [[1, 2], [2, 3]] {
                 let [left, right] = [left, right].map(|index| body(&world, ids[index]).positions());
                 for (&a, &b) in faces[0].iter().zip(&faces[1]) {
@@ -162,30 +165,30 @@ fn what_meets_one_goes_with_all_that_are_attached_to_it() {
                 }
             }
         }
-        let each = parts.map(|part| sum_of(&world, &[part]).x / first.x);
-        // Most of it is what sweeps over contacts round off.
-        assert!(off < 1e-5 * first.x, "{solvers:?}: off by {off} of {first}");
+        let fractions = bodies.map(|body| sum_of(&world, &[body]).x / first.x);
+        // Most of the error is rounding in contact sweeps.
+        assert!(error < 1e-5 * first.x, "{solvers:?}: off by {error} of {first}");
         assert!(drift < 1e-5, "{solvers:?}: {drift} m");
-        assert!(each[0] < 0.5 && each[3] > 0.1, "{solvers:?}: {each:?}");
+        assert!(fractions[0] < 0.5 && fractions[3] > 0.1, "{solvers:?}: {fractions:?}");
     }
 }
 
 #[test]
-fn a_step_that_is_begun_again_hands_on_as_much() {
+fn a_restarted_step_transfers_the_same_momentum() {
     for solvers in SOLVERS {
-        // From rest, one step of a force leads the pair into what waits.
+        // From rest, the force of one step drives the pair into the waiting third block.
         let mut world = world(Vec3::ZERO);
         let ids = [0, 1, 2].map(|index| {
             let gap = if index == 2 { 0.002 } else { 0.0 };
             let block = Block {
                 at: Vec3::X * (index as f32 * SIZE + gap),
                 solver: solvers[index % 2],
-                contact: MEETING,
+                contact: COLLIDING,
                 ..Block::FREE
             };
             block.put(&mut world)
         });
-        let faces = [0.5, -0.5].map(|side| nodes_at(&Block::FREE.mesh(), |place| place.x == side * SIZE));
+        let faces = [0.5, -0.5].map(|side| nodes_at(&Block::FREE.mesh(), |position| position.x == side * SIZE));
         world
             .attach_to_body(ids[0], &anchors(&faces[0]), ids[1], &anchors(&faces[1]), 0.0)
             .expect("attachments");
@@ -194,21 +197,21 @@ fn a_step_that_is_begun_again_hands_on_as_much() {
         let pushed = world.body_mut(ids[0]).expect("a body");
         pushed.apply_forces(&faces[0], &forces).expect("forces");
         world.step(dt).expect("a step");
-        let parts = ids.map(|id| (id, 0.1));
+        let bodies = ids.map(|id| (id, 0.1));
         let expected = force.as_dvec3() * f64::from(dt) * forces.len() as f64;
-        let off = (sum_of(&world, &parts) - expected).length() / expected.x;
-        let met = sum_of(&world, &parts[2..]).x / expected.x;
-        assert!(off < 2e-6, "{solvers:?}: off by {off}");
-        assert!(met > 0.01, "{solvers:?}: {met}");
-        // What was applied was applied once.
+        let error = (sum_of(&world, &bodies) - expected).length() / expected.x;
+        let impulse_fraction = sum_of(&world, &bodies[2..]).x / expected.x;
+        assert!(error < 2e-6, "{solvers:?}: off by {error}");
+        assert!(impulse_fraction > 0.01, "{solvers:?}: {impulse_fraction}");
+        // Applied forces act in one step only.
         world.step(1e-3).expect("a step");
-        let off = (sum_of(&world, &parts) - expected).length() / expected.x;
-        assert!(off < 2e-6, "{solvers:?}: off by {off} after another");
+        let error = (sum_of(&world, &bodies) - expected).length() / expected.x;
+        assert!(error < 2e-6, "{solvers:?}: off by {error} after another");
     }
 }
 
 #[test]
-fn what_is_refused_changes_nothing() {
+fn refused_calls_change_nothing() {
     let mut hanging = Hanging::new(
         Block::CALM,
         Block {
@@ -227,8 +230,8 @@ fn what_is_refused_changes_nothing() {
         below,
         ..
     } = hanging;
-    let gone = Block::CALM.put(&mut world);
-    world.destroy_body(gone).expect("destroyed");
+    let destroyed = Block::CALM.put(&mut world);
+    world.destroy_body(destroyed).expect("destroyed");
     let before = world.state_hash();
     let node = |node: u32| vec![Anchor::Node(node)];
     let point = |triangle: u32, weights: [f32; 3]| vec![Anchor::Point(SurfacePoint { triangle, weights })];
@@ -274,7 +277,7 @@ fn what_is_refused_changes_nothing() {
         assert!(message.contains(name), "{name}: {message}");
         assert_eq!(world.state_hash(), before, "{name}");
     }
-    for [body, other] in [[gone, below], [above, gone]] {
+    for [body, other] in [[destroyed, below], [above, destroyed]] {
         let refused = world.attach_to_body(body, &node(0), other, &node(0), 0.0);
         assert!(matches!(refused, Err(Error::StaleId(_))), "{refused:?}");
     }
@@ -284,7 +287,7 @@ fn what_is_refused_changes_nothing() {
 }
 
 #[test]
-fn a_world_without_goes_as_if_there_had_never_been_any() {
+fn released_attachments_leave_no_trace() {
     for solvers in SOLVERS {
         let hashes = [false, true].map(|was_attached| {
             let mut world = world(DOWN);
@@ -300,15 +303,15 @@ fn a_world_without_goes_as_if_there_had_never_been_any() {
             });
             if was_attached {
                 let joint = [Anchor::Node(0)];
-                let made = world.attach_to_body(ids[0], &joint, ids[1], &joint, 0.0);
-                for id in made.expect("attachments") {
+                let attached = world.attach_to_body(ids[0], &joint, ids[1], &joint, 0.0);
+                for id in attached.expect("attachments") {
                     world.release(id).expect("released");
                 }
             }
             let mut hashes = Vec::new();
             for _ in 0..20 {
                 let mut substeps = 0;
-                let calls = asked(|| substeps = world.step(4e-3).expect("a step").substeps);
+                let calls = allocator_calls(|| substeps = world.step(4e-3).expect("a step").substeps);
                 assert_eq!(calls, 0);
                 hashes.push((world.state_hash(), substeps));
             }
@@ -319,7 +322,7 @@ fn a_world_without_goes_as_if_there_had_never_been_any() {
 }
 
 #[test]
-fn a_state_of_rest_is_refused() {
+fn equilibrium_of_attached_bodies_is_refused() {
     let mut hanging = Hanging::new(Block::CALM, Block::CALM, 4, DOWN);
     let before = hanging.world.state_hash();
     for id in [hanging.above, hanging.below] {
@@ -337,10 +340,10 @@ fn a_state_of_rest_is_refused() {
 }
 
 #[test]
-fn the_hash_knows_of_it_and_threads_change_nothing() {
+fn the_state_hash_covers_attachments_and_threads_change_nothing() {
     let hashes = [1, 3].map(|thread_count| {
         let mut hashes = Vec::new();
-        // The large ones are shared by all threads.
+        // All threads share the large bodies.
         for (solvers, cells, steps) in [
             ([Solver::Verlet; 2], [4, 2, 4], 20),
             ([Solver::Verlet, Solver::Implicit], [4, 2, 4], 20),
@@ -365,7 +368,7 @@ fn the_hash_knows_of_it_and_threads_change_nothing() {
         hashes
     });
     assert_eq!(hashes[0], hashes[1]);
-    // What goes on alike but for what is attached: all, all but one, and nothing.
+    // The worlds differ only in their attachments: all, all but one, and none.
     let hashes = [0, 1, 4].map(|count| {
         let mut hanging = Hanging::new(Block::FREE, Block::FREE, 4, DOWN);
         for &id in &hanging.ids[..count] {
@@ -391,20 +394,20 @@ fn a_step_allocates_nothing() {
             1e-6,
         );
         weak.expect("an attachment");
-        // It is tightened until it is pulled through.
+        // The suture is tightened until it breaks.
         let [up, down] = [hanging.pairs[1][0], hanging.pairs[2][1]].map(Anchor::Node);
         let definition = SutureDefinition {
             length: Some(0.01),
             force_limit: 0.05,
             stiffness: 10.0,
         };
-        let made = hanging
+        let attached = hanging
             .world
             .suture(hanging.below, &down, hanging.above, &up, &definition);
-        made.expect("a suture");
+        attached.expect("a suture");
         let mut lost = 0;
         for step in 0..10 {
-            let calls = asked(|| drop(hanging.world.step(4e-3)));
+            let calls = allocator_calls(|| drop(hanging.world.step(4e-3)));
             assert_eq!(calls, 0, "{solvers:?}, step {step}");
             lost += hanging.world.slipped().len();
         }

@@ -1,4 +1,4 @@
-//! Where memory runs out, a cut is refused, and nothing has changed.
+//! A cut that runs out of memory is refused and changes nothing.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../cutting_solids/block.rs"]
@@ -27,13 +27,13 @@ fn a_cut_without_memory_changes_nothing() {
         body.surface.triangles(),
         body.surface.vertices()
     );
-    for times in 0.. {
-        let answer = with(times, || {
+    for allowed in 0.. {
+        let result = with(allowed, || {
             body.surface.cut(&sweep, &body.follower.positions, &near, Limits::NONE)
         });
-        match answer {
+        match result {
             Ok(changes) => {
-                assert!(times > 100, "it needs memory {times} times");
+                assert!(allowed > 100, "only {allowed} allocations");
                 body.apply(&changes);
                 assert_eq!(body.check(), 3);
                 return;
@@ -50,8 +50,8 @@ fn a_cut_without_memory_changes_nothing() {
     }
 }
 
-/// Cuts a body without memory after any number of allocations, and then with it; a step of it after that needs none.
-fn cut_while_memory_is_scarce(definition: &BodyDefinition, sweep: &Sweep, what: &str) {
+/// Cuts a body after every possible number of allocations, until the cut succeeds. Later steps need no memory.
+fn cut_while_memory_is_scarce(definition: &BodyDefinition, sweep: &Sweep, case: &str) {
     let mut world = World::new(WorldDefinition::default()).unwrap();
     let body = world.create_body(definition).unwrap();
     let mut tool = ToolDefinition::new(Shape::Sphere { radius: 1.0 });
@@ -61,35 +61,43 @@ fn cut_while_memory_is_scarce(definition: &BodyDefinition, sweep: &Sweep, what: 
     world.step(1e-3).unwrap();
     assert!(readers[0].read().is_new);
     let before = world.state_hash();
-    let mut times = 0;
+    let mut allowed = 0;
     loop {
-        let answer = with(times, || world.cut(body, sweep));
-        match answer {
+        let result = with(allowed, || world.cut(body, sweep));
+        match result {
             Ok(report) => {
-                assert!(times > 100, "it needs memory {times} times");
+                assert!(allowed > 100, "only {allowed} allocations");
                 assert!(report.new_nodes > 0);
                 break;
             }
             Err(error) => assert_eq!(error, Error::OutOfMemory),
         }
-        assert_eq!(world.state_hash(), before, "{what}: without memory after {times} times");
+        assert_eq!(
+            world.state_hash(),
+            before,
+            "{case}: out of memory after {allowed} allocations"
+        );
         assert_eq!(world.body(body).unwrap().changes_since(0).unwrap().version, 0);
         assert!(!readers[0].read().is_new);
-        // Nearly all of the ways that it may run out.
-        times += 1 + times / 200;
+        // Nearly all positions at which memory can run out.
+        allowed += 1 + allowed / 200;
     }
     world.step(1e-3).unwrap();
     let steps = with(0, || (0..20).try_for_each(|_| world.step(1e-3).map(|_| ())));
     steps.unwrap();
-    let it = world.body(body).unwrap();
+    let cut_body = world.body(body).unwrap();
     for reader in &mut readers {
         let frame = reader.read();
-        assert!(frame.positions == it.positions() && frame.triangles == it.surface() && frame.topology_version == 1);
+        assert!(
+            frame.positions == cut_body.positions()
+                && frame.triangles == cut_body.surface()
+                && frame.topology_version == 1
+        );
     }
-    assert!(it.positions().iter().all(|place| place.is_finite()));
+    assert!(cut_body.positions().iter().all(|position| position.is_finite()));
 }
 
-const MEETS_TISSUE: BodyContact = BodyContact {
+const COLLIDING: BodyContact = BodyContact {
     with_bodies: true,
     with_itself: true,
     ..BodyContact::NOTHING
@@ -100,12 +108,12 @@ fn blade(x: f32, y: f32) -> [Vec3; 2] {
 }
 
 #[test]
-fn a_body_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
+fn a_body_is_unchanged_if_memory_for_a_cut_is_missing() {
     let (rest, cells) = unstructured(8, 3);
     for (solver, storage, contact) in [
-        (Solver::Verlet, Storage::Packed, MEETS_TISSUE),
+        (Solver::Verlet, Storage::Packed, COLLIDING),
         (Solver::Verlet, Storage::Efficient, BodyContact::NOTHING),
-        (Solver::Implicit, Storage::DynamicBulk, MEETS_TISSUE),
+        (Solver::Implicit, Storage::DynamicBulk, COLLIDING),
         (Solver::Newton, Storage::FastLink, BodyContact::NOTHING),
     ] {
         let definition = BodyDefinition {
@@ -129,7 +137,7 @@ fn a_body_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
 }
 
 #[test]
-fn a_sheet_with_terms_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
+fn a_sheet_with_terms_is_unchanged_if_memory_for_a_cut_is_missing() {
     let (rest, cells) = unstructured(8, 3);
     for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
         let definition = BodyDefinition {
@@ -157,19 +165,19 @@ fn a_sheet_with_terms_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
 }
 
 #[test]
-fn a_solid_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
+fn a_solid_is_unchanged_if_memory_for_a_cut_is_missing() {
     let (rest, cells) = block::shaken([4, 4, 2], 3);
     let cells: Vec<[u32; 4]> = cells.iter().map(|&cell| block::upright(&rest, cell)).collect();
-    // Strained: what is nearly incompressible remembers how.
+    // Strained, because nearly incompressible tissue stores internal variables of its strain.
     let positions: Vec<Vec3> = rest.iter().map(|rest| *rest * vec3(1.1, 1.0, 0.95)).collect();
     for (solver, has_springs, poisson_ratio, contact) in [
-        (Solver::Verlet, true, 0.3, MEETS_TISSUE),
+        (Solver::Verlet, true, 0.3, COLLIDING),
         (Solver::Verlet, false, 0.3, BodyContact::NOTHING),
-        (Solver::Implicit, false, 0.3, MEETS_TISSUE),
+        (Solver::Implicit, false, 0.3, COLLIDING),
         (Solver::Newton, false, 0.3, BodyContact::NOTHING),
-        (Solver::Verlet, false, 0.45, MEETS_TISSUE),
+        (Solver::Verlet, false, 0.45, COLLIDING),
         (Solver::Implicit, false, 0.45, BodyContact::NOTHING),
-        (Solver::Newton, false, 0.45, MEETS_TISSUE),
+        (Solver::Newton, false, 0.45, COLLIDING),
     ] {
         let elements = Material {
             model: Model::Tetrahedra,

@@ -1,4 +1,4 @@
-//! What memory the library asks for, and what becomes of a call for which there is none; with an allocator that counts and refuses.
+//! The library's memory requests, and calls that run out of memory, with an allocator that counts and refuses.
 #![allow(unsafe_code)]
 
 #[path = "../support/mod.rs"]

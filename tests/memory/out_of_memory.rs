@@ -1,4 +1,4 @@
-//! Whatever is asked of a world is done or not, and nothing is lost, however little memory there is. Alone in its program.
+//! Every call on a world succeeds or changes nothing, and leaks nothing, with any amount of memory. A separate program.
 #![allow(unsafe_code)]
 #![allow(clippy::expect_used)]
 
@@ -15,42 +15,42 @@ use sinew::{
     Storage, TearReport, Tearing, Values, World, WorldDefinition,
 };
 
-/// What asking came to.
-struct Asked<T> {
+/// The result of a call that was repeated until memory sufficed.
+struct Outcome<T> {
     done: T,
-    /// How often there was too little memory.
+    /// The number of calls that ran out of memory.
     failed: usize,
-    /// Bytes that are held for it in the end.
+    /// The memory that the result holds [bytes].
     held: isize,
 }
 
-/// Asks with memory for 0, 1, 2 ... requests until there is enough; after each time that there was too little, `look` looks.
-fn ask<T>(mut act: impl FnMut() -> Result<T>, mut look: impl FnMut()) -> Asked<T> {
+/// Calls `act` with memory for 0, 1, 2 ... requests until it succeeds. Calls `look` after each failure.
+fn retry_until_done<T>(mut act: impl FnMut() -> Result<T>, mut after_failure: impl FnMut()) -> Outcome<T> {
     let before = held();
     let mut failed = 0;
     loop {
         match with(failed, &mut act) {
             Ok(done) => {
                 let held = held() - before;
-                return Asked { done, failed, held };
+                return Outcome { done, failed, held };
             }
             Err(error) => assert!(matches!(error, Error::OutOfMemory), "request {failed}: {error}"),
         }
-        look();
+        after_failure();
         failed += 1;
     }
 }
 
-/// The same with all the memory there is: what holds less than this has lost nothing on the way.
-fn do_at_once<T>(act: impl FnOnce() -> Result<T>) -> Asked<T> {
+/// Calls `act` with unlimited memory. A repeated call that holds no more than this has leaked nothing.
+fn call_once<T>(act: impl FnOnce() -> Result<T>) -> Outcome<T> {
     let before = held();
     let done = act().expect("memory for it");
     let held = held() - before;
-    Asked { done, failed: 0, held }
+    Outcome { done, failed: 0, held }
 }
 
 #[test]
-fn what_is_lost_on_the_way_is_noticed() {
+fn leaks_are_detected() {
     fn two_buffers(is_careless: bool) -> Result<[Vec<u8>; 2]> {
         let mut buffers = [Vec::new(), Vec::new()];
         for number in 0..2 {
@@ -64,10 +64,10 @@ fn what_is_lost_on_the_way_is_noticed() {
         Ok(buffers)
     }
     for is_careless in [false, true] {
-        let asked = ask(|| two_buffers(is_careless), || ());
-        let at_once = do_at_once(|| two_buffers(is_careless));
-        assert_eq!(asked.failed, 2);
-        assert_eq!(asked.held != at_once.held, is_careless);
+        let outcome = retry_until_done(|| two_buffers(is_careless), || ());
+        let at_once = call_once(|| two_buffers(is_careless));
+        assert_eq!(outcome.failed, 2);
+        assert_eq!(outcome.held != at_once.held, is_careless);
     }
 }
 
@@ -76,7 +76,7 @@ fn plain_world() -> World {
 }
 
 #[test]
-fn a_world_is_loaded_whole_or_not_at_all() {
+fn a_world_is_loaded_completely_or_not_at_all() {
     let mut failed = 0;
     for seed in [1, 4, 9] {
         let mut caller = Caller::new(seed);
@@ -101,7 +101,7 @@ fn a_world_is_loaded_whole_or_not_at_all() {
                 Ok(world) => break world,
                 Err(error) => assert!(matches!(error, Error::OutOfMemory), "request {requests}: {error}"),
             }
-            assert_eq!(held(), before, "what was loaded of it is given back");
+            assert_eq!(held(), before, "a failed load must free everything");
             requests += 1;
             failed += 1;
         };
@@ -111,7 +111,7 @@ fn a_world_is_loaded_whole_or_not_at_all() {
 }
 
 #[test]
-fn what_there_is_no_memory_for_changes_nothing() {
+fn calls_without_memory_change_nothing() {
     let mut failed = 0;
     let mut done = std::collections::BTreeMap::<&str, usize>::new();
     for seed in 10..18 {
@@ -129,11 +129,11 @@ fn what_there_is_no_memory_for_changes_nothing() {
             caller.step(&mut worlds);
         }
         failed += caller.failed;
-        for (what, count) in caller.done {
-            *done.entry(what).or_default() += count;
+        for (act, count) in caller.done {
+            *done.entry(act).or_default() += count;
         }
     }
-    for what in [
+    for act in [
         "a plainer body",
         "a tool",
         "a cut",
@@ -143,43 +143,43 @@ fn what_there_is_no_memory_for_changes_nothing() {
         "an attachment",
         "springs set",
     ] {
-        assert!(done.get(what).is_some_and(|&count| count > 0), "{what}: never");
+        assert!(done.get(act).is_some_and(|&count| count > 0), "{act}: never");
     }
     assert!(failed > 1000, "{failed}");
 }
 
 #[test]
-fn a_world_is_created_or_not() {
+fn a_world_is_created_completely_or_not_at_all() {
     use sinew::capi::status::{SINEW_STATUS_OK, SINEW_STATUS_OUT_OF_MEMORY};
     use sinew::capi::world::{sinew_world_create, sinew_world_def, sinew_world_def_init, sinew_world_destroy};
     let mut definition = std::mem::MaybeUninit::<sinew_world_def>::zeroed();
-    // SAFETY: there is a place of this size for it.
+    // SAFETY: the definition has this size.
     let status = unsafe { sinew_world_def_init(definition.as_mut_ptr(), size_of::<sinew_world_def>()) };
     assert_eq!(status, SINEW_STATUS_OK);
     let before = held();
     let mut failed = 0;
     loop {
         let mut world = std::ptr::null_mut();
-        // SAFETY: the definition was made above, and there is a place for the world.
+        // SAFETY: the definition was initialized above, and `world` can be written.
         let status = with(failed, || unsafe {
             sinew_world_create(definition.as_ptr(), &raw mut world)
         });
         if status == SINEW_STATUS_OK {
-            // SAFETY: it was made above.
+            // SAFETY: the world was created above.
             unsafe { sinew_world_destroy(world) };
             break;
         }
         assert!(status == SINEW_STATUS_OUT_OF_MEMORY && world.is_null());
         failed += 1;
     }
-    assert!(failed > 0, "a world that takes no memory");
+    assert!(failed > 0, "a world that needs no memory");
     assert_eq!(held(), before);
 }
 
-/// A name, and what it changes of a definition.
+/// A name, and its change of a definition.
 type Kind = (&'static str, fn(&mut BodyDefinition));
 
-/// What a body of a block may have beside springs.
+/// Optional features of a block besides springs.
 const KINDS: [Kind; 5] = [
     ("springs", |_| ()),
     ("damped springs that may be cut", |body| {
@@ -215,7 +215,7 @@ const KINDS: [Kind; 5] = [
 ];
 
 #[test]
-fn a_body_of_any_kind_is_created_or_not() {
+fn a_body_of_any_kind_is_created_completely_or_not_at_all() {
     let mesh = Mesh::block([0.1; 3], [2, 1, 2]).expect("a block");
     let mut all = 0;
     for storage in [
@@ -238,7 +238,8 @@ fn a_body_of_any_kind_is_created_or_not() {
                     ..BodyDefinition::default()
                 };
                 change(&mut definition);
-                // Beside one of its kind, with which it goes on afterwards as in a world that never lacked memory.
+                // The world has a body of the same kind. Afterwards it continues like a world that never ran out of
+                // memory.
                 let world = || {
                     let mut world = plain_world();
                     world.create_body(&definition).expect("a body");
@@ -247,7 +248,8 @@ fn a_body_of_any_kind_is_created_or_not() {
                 };
                 let [scarce, plenty] = [(); 2].map(|()| std::cell::RefCell::new(world()));
                 let hash = plenty.borrow().state_hash();
-                // One that was asked before has room left of it, and asks for less: so another each time, too.
+                // A world that was called before keeps spare capacity and requests less, so a new world is also tried
+                // each time.
                 let mut other = world();
                 let mut requests = 0;
                 while let Err(error) = with(requests, || other.create_body(&definition)) {
@@ -257,13 +259,13 @@ fn a_body_of_any_kind_is_created_or_not() {
                     requests += 1;
                 }
                 all += requests;
-                let asked = ask(
+                let outcome = retry_until_done(
                     || scarce.borrow_mut().create_body(&definition),
                     || assert_eq!(scarce.borrow().state_hash(), hash, "{storage:?}, {solver:?}, {kind}"),
                 );
-                all += asked.failed;
-                let at_once = do_at_once(|| plenty.borrow_mut().create_body(&definition));
-                assert_eq!(asked.held, at_once.held, "{storage:?}, {solver:?}, {kind}");
+                all += outcome.failed;
+                let at_once = call_once(|| plenty.borrow_mut().create_body(&definition));
+                assert_eq!(outcome.held, at_once.held, "{storage:?}, {solver:?}, {kind}");
                 for world in [&scarce, &plenty] {
                     world.borrow_mut().step(1e-3).expect("a step");
                 }
@@ -275,7 +277,7 @@ fn a_body_of_any_kind_is_created_or_not() {
 }
 
 #[test]
-fn a_surface_is_bound_or_not() {
+fn an_embedding_is_created_completely_or_not_at_all() {
     let block = Mesh::block([0.1; 3], [2, 2, 2]).expect("a block");
     let sheet = Mesh::cloth([0.1; 2], [4, 4]).expect("a sheet");
     let fine = Mesh::block([0.09; 3], [4, 4, 4]).expect("a fine block");
@@ -303,19 +305,19 @@ fn a_surface_is_bound_or_not() {
             triangles: &fine.triangles,
             tetrahedra: &mesh.tetrahedra,
         };
-        let bound = ask(|| world.create_embedding(body, &definition), || ());
-        let at_once = do_at_once(|| world.create_embedding(body, &definition));
+        let bound = retry_until_done(|| world.create_embedding(body, &definition), || ());
+        let at_once = call_once(|| world.create_embedding(body, &definition));
         assert_eq!(bound.held, at_once.held);
         let (mut embedding, mut other) = (bound.done, at_once.done);
         let back = Sweep {
             start: blade.end,
-            end: blade.end.map(|place| place + Vec3::Z * 0.1),
+            end: blade.end.map(|corner| corner + Vec3::Z * 0.1),
         };
         world.cut(body, &back).expect("a cut");
         world.step(1e-3).expect("a step");
-        // It follows the cut, or is where it was until there is memory for that.
-        let followed = ask(|| embedding.update(&world), || ());
-        do_at_once(|| other.update(&world));
+        // The embedding follows the cut, or stays unchanged until memory suffices.
+        let followed = retry_until_done(|| embedding.update(&world), || ());
+        call_once(|| other.update(&world));
         assert_eq!(embedding.positions(), other.positions());
         assert_eq!(embedding.triangles(), other.triangles());
         assert!(
@@ -328,7 +330,7 @@ fn a_surface_is_bound_or_not() {
 }
 
 #[test]
-fn tissue_is_made_of_a_surface_or_not() {
+fn a_body_is_created_from_a_surface_completely_or_not_at_all() {
     let surface = Mesh::block([0.1; 3], [2, 2, 2]).expect("a block");
     let definition = BodyDefinition {
         positions: &surface.positions,
@@ -352,7 +354,7 @@ fn tissue_is_made_of_a_surface_or_not() {
 }
 
 #[test]
-fn tissue_is_made_by_c_or_not() {
+fn a_body_is_created_from_a_surface_in_c_completely_or_not_at_all() {
     use sinew::capi::body::sinew_body_id;
     use sinew::capi::definition::{sinew_body_def, sinew_body_def_init};
     use sinew::capi::embedding::{sinew_body_create_from_surface, sinew_embedding_destroy};
@@ -362,7 +364,7 @@ fn tissue_is_made_by_c_or_not() {
     };
     let surface = Mesh::block([0.1; 3], [2, 2, 2]).expect("a block");
     let mut requests = 0;
-    // SAFETY: pointers to live variables and lists of the lengths stated, and a world used before its end alone.
+    // SAFETY: pointers are to live variables and lists of the lengths given, and the world is used only before its end.
     let mut attempt = || unsafe {
         let mut world_def = std::mem::zeroed::<sinew_world_def>();
         let done = sinew_world_def_init(&mut world_def, size_of_val(&world_def));
@@ -385,9 +387,9 @@ fn tissue_is_made_by_c_or_not() {
             index1: 0,
             generation: 0,
         };
-        let mut drawn = std::ptr::null_mut();
+        let mut new_embedding = std::ptr::null_mut();
         let status = with(requests, || {
-            sinew_body_create_from_surface(world, &def, 0.03, &mut body, &mut drawn)
+            sinew_body_create_from_surface(world, &def, 0.03, &mut body, &mut new_embedding)
         });
         let is_made = status == SINEW_STATUS_OK;
         if !is_made {
@@ -395,25 +397,21 @@ fn tissue_is_made_by_c_or_not() {
             assert_eq!(hash(), before, "request {requests}");
         }
         assert_eq!(body.index1 == 1, is_made, "request {requests}");
-        assert_eq!(!drawn.is_null(), is_made, "request {requests}");
-        sinew_embedding_destroy(drawn);
+        assert_eq!(!new_embedding.is_null(), is_made, "request {requests}");
+        sinew_embedding_destroy(new_embedding);
         sinew_world_destroy(world);
         requests += 1;
         is_made
     };
-    // In a world of its own each time: what a world keeps room for is not asked for again.
+    // In a new world each time, because a world keeps its capacity.
     while !attempt() {}
     assert!(requests > 50, "{requests} requests failed");
 }
 
-/// A sheet that is pulled apart, and tears.
-fn pulled() -> (World, BodyId) {
+/// Creates a sheet that is pulled apart and tears.
+fn pulled_sheet() -> (World, BodyId) {
     let mesh = Mesh::cloth([0.1; 2], [8, 4]).expect("a sheet");
-    let stretched: Vec<Vec3> = mesh
-        .positions
-        .iter()
-        .map(|place| *place * vec3(1.5, 1.0, 1.0))
-        .collect();
+    let stretched: Vec<Vec3> = mesh.positions.iter().map(|node| *node * vec3(1.5, 1.0, 1.0)).collect();
     let mut world = plain_world();
     let body = world.create_body(&BodyDefinition {
         positions: &stretched,
@@ -433,7 +431,7 @@ fn pulled() -> (World, BodyId) {
 }
 
 #[test]
-fn a_step_without_memory_leaves_tears_for_another_time() {
+fn a_step_without_memory_postpones_tears() {
     let mass = |world: &World, body| {
         let body = world.body(body).expect("a sheet");
         (0..body.node_count() as u32)
@@ -441,14 +439,14 @@ fn a_step_without_memory_leaves_tears_for_another_time() {
             .sum::<f64>()
     };
     let report = |world: &World, body| world.body(body).expect("a sheet").tear_report();
-    let (mut plenty, body) = pulled();
+    let (mut plenty, body) = pulled_sheet();
     let before = mass(&plenty, body);
     plenty.step(1e-3).expect("a step");
     let expected = report(&plenty, body);
     assert!(expected.tears > 0 && expected.no_room == 0, "{expected:?}");
     let mut failed = 0;
     loop {
-        let (mut world, body) = pulled();
+        let (mut world, body) = pulled_sheet();
         with(failed, || world.step(1e-3)).expect("a step");
         let first = report(&world, body);
         for _ in 0..3 {
@@ -462,9 +460,9 @@ fn a_step_without_memory_leaves_tears_for_another_time() {
         if first == expected {
             break;
         }
-        let left = |report: TearReport| report.tears + report.waiting + report.no_room + report.small_pieces;
+        let processed = |report: TearReport| report.tears + report.waiting + report.no_room + report.small_pieces;
         assert!(
-            left(first) >= left(expected),
+            processed(first) >= processed(expected),
             "request {failed}: {first:?} and {expected:?}"
         );
         failed += 1;

@@ -1,4 +1,4 @@
-//! A body pays for its own solver alone, and what is destroyed for nothing: bytes, counted at the allocator.
+//! A body holds memory for its own solver only, and destroyed objects hold none: bytes, counted at the allocator.
 
 use glam::Vec3;
 
@@ -9,7 +9,7 @@ use sinew::{
     BodyDefinition, Detection, Material, Shape, Solver, Storage, ToolDefinition, Values, World, WorldDefinition,
 };
 
-/// What a body of so many nodes without springs holds, bytes.
+/// Returns the memory of a body with `node_count` nodes without springs [bytes].
 fn held(solver: Solver, storage: Storage, node_count: usize) -> usize {
     let positions: Vec<Vec3> = (0..node_count).map(|i| Vec3::X * i as f32 * 0.01).collect();
     let mut world = World::new(WorldDefinition::default()).expect("a world");
@@ -28,7 +28,7 @@ fn held(solver: Solver, storage: Storage, node_count: usize) -> usize {
     (allocator::held() - before) as usize
 }
 
-/// What each node of a body takes beyond what it takes with VERLET, bytes.
+/// Returns the memory per node beyond that of VERLET [bytes].
 fn beyond_verlet(solver: Solver, storage: Storage) -> usize {
     let [few, many] =
         [1 << 14, 1 << 15].map(|count| held(solver, storage, count) - held(Solver::Verlet, storage, count));
@@ -36,31 +36,31 @@ fn beyond_verlet(solver: Solver, storage: Storage) -> usize {
 }
 
 #[test]
-fn a_body_pays_for_its_own_solver_alone() {
+fn a_body_holds_memory_for_its_own_solver_only() {
     /// Three numbers of single and of double precision.
     const SINGLE: usize = 12;
     const DOUBLE: usize = 24;
     for storage in [Storage::Packed, Storage::FastLink] {
-        // Two histories of two vectors each, and the pushes.
+        // Two histories of two vectors each, and the force displacements.
         let both = 5 * SINGLE;
-        // What positions lack, twice, as VERLET has it; anchors, ways, loads, drifts; masses and inertia; residuals; five vectors of the
-        // conjugate gradient; two diagonals of 3x3; where rows begin.
+        // Twice the position remainders, as in VERLET; anchors, displacements, loads, drifts; masses and inertia;
+        // residuals; five vectors of conjugate gradients; two diagonals of 3x3 blocks; row offsets.
         let newton = 4 * DOUBLE + 2 * 8 + DOUBLE + 5 * DOUBLE + 2 * 72 + 8;
         assert_eq!(beyond_verlet(Solver::Newton, storage), both + newton, "{storage:?}");
-        // Five vectors, what positions lack, twice, as VERLET has it, the inertia, two symmetric blocks, and a place in a cluster; each 256 nodes or
-        // fewer a few numbers more.
+        // Five vectors, twice the position remainders as in VERLET, the inertia, two symmetric blocks, and a cluster
+        // index. Each tile of up to 256 nodes adds a few numbers.
         let implicit = 5 * SINGLE + 4 + 2 * 24 + 4 * 4;
-        let found = beyond_verlet(Solver::Implicit, storage);
-        let records = 16 * usize::from(found > both + implicit + 16);
+        let bytes = beyond_verlet(Solver::Implicit, storage);
+        let records = 16 * usize::from(bytes > both + implicit + 16);
         assert!(
-            (both + implicit..both + implicit + records + 16).contains(&found),
-            "{storage:?}: {found}"
+            (both + implicit..both + implicit + records + 16).contains(&bytes),
+            "{storage:?}: {bytes}"
         );
     }
 }
 
 #[test]
-fn a_tool_that_is_destroyed_takes_nothing() {
+fn a_destroyed_tool_holds_no_memory() {
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let (positions, triangles) = solid::cuboid(Vec3::ZERO, Vec3::ONE);
     let before = allocator::held();
@@ -75,18 +75,18 @@ fn a_tool_that_is_destroyed_takes_nothing() {
         });
         let tool = tool.expect("a tool");
         world.step(0.001).expect("a step");
-        let with = allocator::held() - before;
+        let while_alive = allocator::held() - before;
         world.destroy_tool(tool).expect("a tool");
         let after = allocator::held() - before;
         assert!(
-            with > 1 << 17 && after < with / 8,
-            "{detection:?}: {after} bytes of {with}"
+            while_alive > 1 << 17 && after < while_alive / 8,
+            "{detection:?}: {after} bytes of {while_alive}"
         );
     }
 }
 
-/// What a small body holds that is alone in its world, bytes: a lattice of 27 nodes.
-fn held_by_a_small_one(solver: Solver) -> usize {
+/// Returns the memory of a small body alone in its world: a lattice of 27 nodes [bytes].
+fn small_body_memory(solver: Solver) -> usize {
     let mesh = Mesh::lattice(0.1, [2; 3]).expect("a lattice");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let before = allocator::held();
@@ -104,11 +104,12 @@ fn held_by_a_small_one(solver: Solver) -> usize {
     (allocator::held() - before) as usize
 }
 
-/// VERLET has about 12 vectors of its nodes, padded to whole lanes, and springs, surface and itself; IMPLICIT twice that.
+/// VERLET has about 12 vectors of nodes, padded to whole lanes, plus springs, surface and the body itself. IMPLICIT has
+/// twice that.
 #[test]
-fn a_small_body_takes_little() {
-    for (solver, most) in [(Solver::Verlet, 16 << 10), (Solver::Implicit, 38 << 10)] {
-        let held = held_by_a_small_one(solver);
-        assert!(held <= most, "{solver:?}: {held} bytes");
+fn a_small_body_holds_little_memory() {
+    for (solver, limit) in [(Solver::Verlet, 16 << 10), (Solver::Implicit, 38 << 10)] {
+        let held = small_body_memory(solver);
+        assert!(held <= limit, "{solver:?}: {held} bytes");
     }
 }

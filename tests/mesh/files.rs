@@ -1,4 +1,4 @@
-//! Mesh files: every format gives the same mesh, and nothing that stands in a file does harm.
+//! Mesh files: every format gives the same mesh, and no file content does harm.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use sinew::Error;
 use sinew::mesh::{LoadedMesh, MeshFormat, NO_NODE, is_closed, load};
 
-/// A unit cube, its corners numbered x + 2 y + 4 z, as five tetrahedra of positive volume and as six quads outward.
+/// A unit cube with corners numbered x + 2 y + 4 z, as five tetrahedra of positive volume and as six outward quads.
 const TETRAHEDRA: [[u32; 4]; 5] = [[0, 6, 5, 3], [1, 0, 5, 3], [2, 0, 3, 6], [4, 0, 6, 5], [7, 3, 5, 6]];
 const QUADS: [[u32; 4]; 6] = [
     [0, 4, 6, 2],
@@ -29,7 +29,7 @@ fn points() -> String {
     lines((0..8).map(|i| corner(i).map(|x| x.to_string())))
 }
 
-/// A file, and how many of its bytes are needed: cut before, it must be refused.
+/// A file, and the number of its bytes that are required. A shorter file must be refused.
 struct Fixture {
     name: &'static str,
     bytes: Vec<u8>,
@@ -47,7 +47,8 @@ fn text(name: &'static str, text: String, unneeded: usize, solid: bool) -> Fixtu
     }
 }
 
-/// The cube in every format that is one file. OBJ has no counts and no end, so cutting it may go unseen.
+/// Returns the cube in every single-file format. OBJ has neither counts nor an end marker, so truncation can go
+/// undetected.
 fn fixtures() -> Vec<Fixture> {
     let faces = lines(
         QUADS
@@ -76,7 +77,7 @@ fn fixtures() -> Vec<Fixture> {
     ascii_stl += "endsolid cube of mine\n";
     let name_length = " cube of mine\n".len();
 
-    // A vertex, a line and the tetrahedra; the point data must not be looked at.
+    // A vertex, a line and the tetrahedra. The reader must ignore the point data.
     let kinds = [1, 3, 10, 10, 10, 10, 10];
     let mut cells: Vec<Vec<u32>> = vec![vec![0], vec![0, 1]];
     cells.extend(TETRAHEDRA.iter().map(|t| t.to_vec()));
@@ -153,7 +154,7 @@ fn fixtures() -> Vec<Fixture> {
         points()
     );
 
-    // Tags neither dense nor in order.
+    // Tags are neither dense nor in order.
     let tag = |i: u32| 1000 - 7 * i;
     let tagged = lines((0..8).map(|i| {
         let [x, y, z] = corner(i);
@@ -180,11 +181,11 @@ fn fixtures() -> Vec<Fixture> {
     let (upper, lower): (Vec<u32>, Vec<u32>) = (0..8).partition(|&i| i >= 4);
     let block = |header: &str, nodes: &[u32], parameters: &str| {
         let tags: String = nodes.iter().map(|&i| format!("{}\n", tag(i))).collect();
-        let places: String = nodes
+        let coordinates: String = nodes
             .iter()
             .map(|&i| corner(i).map(|x| x.to_string()).join(" ") + parameters + "\n")
             .collect();
-        format!("{header} {}\n{tags}{places}", nodes.len())
+        format!("{header} {}\n{tags}{coordinates}", nodes.len())
     };
     let gmsh4 = format!(
         "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 0 0\n$EndEntities\n$Nodes\n2 8 951 1000\n{}{}$EndNodes\n$Elements\n2 6 1 9\n1 4 1 1\n9 {} {}\n3 1 4 5\n{}$EndElements\n",
@@ -199,7 +200,7 @@ fn fixtures() -> Vec<Fixture> {
         text("cube.obj", obj, usize::MAX, false),
         text("ascii.stl", ascii_stl, name_length, false),
         binary("binary.STL", binary_stl, false),
-        // "10" cut to "1" is a vertex, and nobody can tell.
+        // "10" truncated to "1" is a vertex, which cannot be detected.
         text("four.vtk", vtk4, tail.len() + 2, true),
         text("five.vtk", vtk5, tail.len() + 2, true),
         binary("four_binary.vtk", vtk4_binary, true),
@@ -211,7 +212,7 @@ fn fixtures() -> Vec<Fixture> {
     ]
 }
 
-/// TetGen's two files, numbered from 0 or 1; 10-node tetrahedra name further points that are not used.
+/// Returns TetGen's two files, numbered from 0 or 1. Elements have attributes, which are not used.
 fn tetgen(base: u32) -> (String, String) {
     let mut nodes = "# made by hand\n8 3 1 1\n".to_string();
     for i in 0..8 {
@@ -226,7 +227,7 @@ fn tetgen(base: u32) -> (String, String) {
     (nodes, elements + "# end\n")
 }
 
-/// A folder of its own for each test.
+/// Returns a separate folder for each test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mesh_files").join(test);
     std::fs::create_dir_all(&folder).unwrap();
@@ -235,7 +236,7 @@ fn folder(test: &str) -> PathBuf {
 
 fn write(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
     let path = folder.join(name);
-    // A new file each time: some file systems wait for the disk when one is overwritten.
+    // A new file each time, because some file systems wait for the disk when a file is overwritten.
     let _ = std::fs::remove_file(&path);
     std::fs::write(&path, bytes).unwrap();
     path
@@ -245,7 +246,7 @@ fn load_bytes(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) -> sinew::Resu
     load(write(folder, name, bytes), MeshFormat::Auto, 1.0)
 }
 
-/// What holds for every mesh that was loaded, whatever stood in the file.
+/// Checks what holds for every loaded mesh, whatever the file contained.
 fn check_sound(loaded: &LoadedMesh) {
     let LoadedMesh {
         mesh,
@@ -260,9 +261,9 @@ fn check_sound(loaded: &LoadedMesh) {
     );
     let dropped = node_of_vertex.iter().filter(|&&node| node == NO_NODE).count();
     assert_eq!(dropped, report.dropped_vertices);
-    let mut seen = vec![false; nodes];
+    let mut referenced = vec![false; nodes];
     for &node in node_of_vertex.iter().filter(|&&node| node != NO_NODE) {
-        seen[node as usize] = true;
+        referenced[node as usize] = true;
     }
     let mut used = vec![false; nodes];
     let elements = mesh.triangles.iter().map(|t| t.to_vec());
@@ -272,7 +273,7 @@ fn check_sound(loaded: &LoadedMesh) {
             assert!(!element[..i].contains(&node));
         }
     }
-    assert!(seen.iter().chain(&used).all(|&yes| yes));
+    assert!(referenced.iter().chain(&used).all(|&yes| yes));
 }
 
 fn check_cube(loaded: &LoadedMesh, solid: bool, side: f64) {
@@ -282,13 +283,13 @@ fn check_cube(loaded: &LoadedMesh, solid: bool, side: f64) {
     let surface = mesh.surface().unwrap();
     assert_eq!(surface.len(), 12);
     assert!(is_closed(&surface).unwrap());
-    // Twelve edges of the cube and a diagonal on each of six faces.
+    // Twelve edges of the cube and a diagonal on each of its six faces.
     assert_eq!(mesh.edges().unwrap().len(), 18);
     let volume = mesh.volume().unwrap();
     assert!((volume / side.powi(3) - 1.0).abs() < 1e-6, "{volume}");
     assert_eq!(mesh.tetrahedra.len(), if solid { 5 } else { 0 });
     assert_eq!(mesh.triangles.len(), if solid { 0 } else { 12 });
-    // Every vertex of the file is where its node is, if the file has one for each corner.
+    // Every vertex of the file is at its node, if the file has one vertex per corner.
     if loaded.node_of_vertex.len() == 8 {
         for (i, &node) in loaded.node_of_vertex.iter().enumerate() {
             let expected = corner(i as u32).map(|x| (f64::from(x) * side) as f32);
@@ -342,7 +343,7 @@ fn stl_corners_are_welded_to_the_first() {
 }
 
 #[test]
-fn a_file_cut_short_is_refused() {
+fn a_truncated_file_is_refused() {
     let folder = folder("cut");
     for fixture in fixtures() {
         let whole = load_bytes(&folder, fixture.name, &fixture.bytes).unwrap();
@@ -379,7 +380,7 @@ fn a_file_cut_short_is_refused() {
     }
 }
 
-/// Numbers that look random and are the same on every run.
+/// A generator of pseudo-random numbers (xorshift).
 struct Random(u64);
 
 impl Random {
@@ -390,8 +391,8 @@ impl Random {
         (self.0 % limit.max(1) as u64) as usize
     }
 
-    /// A file with a few bytes changed, taken out or doubled.
-    fn spoil(&mut self, bytes: &[u8]) -> Vec<u8> {
+    /// Returns the bytes with a few changed, removed or repeated.
+    fn corrupt(&mut self, bytes: &[u8]) -> Vec<u8> {
         const LIKELY: &[u8] = b"0123456789-+.eE \n#/$naif\\\xff\x00\x7f";
         let mut bytes = bytes.to_vec();
         for _ in 0..=self.below(3) {
@@ -414,7 +415,7 @@ impl Random {
 }
 
 #[test]
-fn spoilt_files_do_no_harm() {
+fn corrupted_files_do_no_harm() {
     let folder = folder("spoilt");
     let mut random = Random(0x5eed_0001);
     let mut refused = 0;
@@ -428,19 +429,19 @@ fn spoilt_files_do_no_harm() {
         }
     };
     for fixture in fixtures() {
-        rounds(&mut |random| load_bytes(&folder, fixture.name, random.spoil(&fixture.bytes)));
+        rounds(&mut |random| load_bytes(&folder, fixture.name, random.corrupt(&fixture.bytes)));
     }
     let (nodes, elements) = tetgen(1);
     rounds(&mut |random| {
-        write(&folder, "cube.node", random.spoil(nodes.as_bytes()));
-        load_bytes(&folder, "cube.ele", random.spoil(elements.as_bytes()))
+        write(&folder, "cube.node", random.corrupt(nodes.as_bytes()));
+        load_bytes(&folder, "cube.ele", random.corrupt(elements.as_bytes()))
     });
     assert!(refused > 3000, "only {refused} of 36000 were refused");
 }
 
-/// Each file is refused with a message that names it and the place.
+/// Each file is refused with a message that names the file and the location of the fault.
 #[test]
-fn faults_are_named_with_their_place() {
+fn faults_are_reported_with_their_location() {
     let folder = folder("faults");
     let tetra_vtk = |points: &str, cells: &str, kind: &str| {
         format!(
@@ -574,7 +575,7 @@ fn faults_are_named_with_their_place() {
 }
 
 #[test]
-fn what_is_no_mesh_file_is_refused() {
+fn invalid_mesh_files_are_refused() {
     let folder = folder("refused");
     let cube = write(&folder, "cube.obj", &fixtures().remove(0).bytes);
     for scale in [0.0, -1.0, f32::NAN, f32::INFINITY] {
@@ -599,7 +600,7 @@ fn what_is_no_mesh_file_is_refused() {
         load("", MeshFormat::Auto, 1.0),
         Err(Error::InvalidArgument(_))
     ));
-    // A folder, nothing at all, and each format read as every other.
+    // A folder, a missing file, and each format read as every other.
     std::fs::create_dir_all(folder.join("folder.stl")).unwrap();
     for path in ["folder.stl", "absent.vtk"] {
         assert!(matches!(
@@ -628,15 +629,15 @@ fn what_is_no_mesh_file_is_refused() {
 }
 
 #[test]
-fn obj_in_all_its_ways() {
+fn all_obj_variants_are_read() {
     let folder = folder("obj");
-    // A pentagon that is written over two lines and named backwards, then a triangle of later vertices.
+    // A pentagon written over two lines with negative indices, then a triangle of later vertices.
     let content = "v 0 0 0 1 0.5 0.5 0.5\r\nv 2 0 0\r\nv 3 1 0\r\nv 1 2 0\r\nv -1 1 0\r\nf -5 -4//1 -3/2 \\\r\n -2 5\r\nf 6 7 8 # later\r\nv 5 0 0\nv 6 0 0\nv 5 1 0";
     let loaded = load_bytes(&folder, "ways.obj", content).unwrap();
     assert_eq!(loaded.mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4], [5, 6, 7]]);
 }
 
-/// What an independent reader makes of the same file.
+/// Compares the result with that of an independent reader.
 #[test]
 fn obj_agrees_with_tobj() {
     let folder = folder("tobj");
@@ -644,14 +645,14 @@ fn obj_agrees_with_tobj() {
     let mut paths = vec![path];
     paths.extend(shared("tissue_surface.obj"));
     for path in paths {
-        let ours = load(&path, MeshFormat::Obj, 1.0).unwrap().mesh;
+        let loaded = load(&path, MeshFormat::Obj, 1.0).unwrap().mesh;
         let options = tobj::LoadOptions {
             triangulate: true,
             ignore_lines: true,
             ..Default::default()
         };
         let text = std::fs::read_to_string(&path).unwrap();
-        // Only positions are compared; looks would need their own indices.
+        // Only positions are compared. Other attributes would need their own indices.
         let plain: String = text
             .lines()
             .filter(|line| line.starts_with("v ") || line.starts_with("f "))
@@ -665,19 +666,19 @@ fn obj_agrees_with_tobj() {
             .collect();
         let (models, _) =
             tobj::load_obj_buf(&mut plain.as_bytes(), &options, |_| Err(tobj::LoadError::ReadError)).unwrap();
-        let theirs = &models[0].mesh;
-        assert_eq!(theirs.indices.len(), 3 * ours.triangles.len());
-        for (&a, &b) in ours.triangles.iter().flatten().zip(&theirs.indices) {
+        let reference = &models[0].mesh;
+        assert_eq!(reference.indices.len(), 3 * loaded.triangles.len());
+        for (&a, &b) in loaded.triangles.iter().flatten().zip(&reference.indices) {
             let b = b as usize;
             assert_eq!(
-                ours.positions[a as usize].to_array(),
-                theirs.positions[3 * b..3 * b + 3]
+                loaded.positions[a as usize].to_array(),
+                reference.positions[3 * b..3 * b + 3]
             );
         }
     }
 }
 
-/// A real file, or nothing where the folder is missing.
+/// Returns a real file, or `None` if it is missing.
 fn shared(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../shared/meshes")
@@ -689,7 +690,7 @@ fn shared(name: &str) -> Option<PathBuf> {
     None
 }
 
-/// Counts and volumes were found by another program, which joined corners by comparing all pairs.
+/// The counts and volumes come from another program, which joins corners by comparing all pairs.
 #[test]
 fn real_files() {
     struct Facts {
@@ -711,15 +712,15 @@ fn real_files() {
         volume,
     };
     for expected in [
-        // Every triangle stands there twice, forwards and backwards: 186 on the surface, and two inner walls.
+        // Every triangle is contained twice, forward and backward: 186 on the surface, and two inner walls.
         facts("liver_volumetric.vtk", 98, 186 + 4, 273, 186, 464, 1_179_442.283_165),
-        // The same, and a point that nothing uses.
+        // The same, and an unused point.
         facts("gallbladder_volumetric.vtk", 366, 728, 1063, 728, 1792, 34_122.545_207),
         facts("tissue_volume.msh", 493, 892, 1432, 892, 2370, 1.152_024_829_7e-4),
         facts("tissue_surface.obj", 448, 892, 0, 892, 1338, 1.152_004_892_7e-4),
-        // 479 facets, of which 153 collapse; the rest is a closed surface without holes: 2 = 165 - 489 + 326.
+        // 479 facets, of which 153 collapse. The rest is a closed surface without holes: 2 = 165 - 489 + 326.
         facts("liver_collision.stl", 165, 326, 0, 326, 489, 1_752_086.272_3),
-        // Two of the facets are back to back; both stay, or the surface would be open.
+        // Two of the facets are back to back. Both stay, because the surface would be open otherwise.
         facts("forceps_jaw_left.stl", 541, 1082, 0, 1082, 1622, 110.284_772),
         facts("stomach.stl", 4864, 9724, 0, 9724, 14586, 289_353.484_87),
         facts("stomach.msh", 8599, 0, 34613, 11132, 48777, 289_353.402_27),

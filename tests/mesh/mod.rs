@@ -1,4 +1,4 @@
-//! Meshes and pictures.
+//! Meshes and rendered images.
 
 mod files;
 mod filled;

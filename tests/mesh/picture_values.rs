@@ -1,11 +1,11 @@
-//! Bodies coloured by numbers: the colours of both ends and the middle, what is in between, and what is refused.
+//! Bodies colored by values: the colors at both ends and the middle, interpolation, and refused arguments.
 
 use crate::support::bodies::FREE;
 use glam::Vec3;
 use sinew::raster::{ColourScale, Colours, Image};
 use sinew::{BodyDefinition, BodyId, BodyValues, Error, PictureDefinition, Values, World};
 
-/// Pixels: springs are seen.
+/// Pixels, enough to show springs.
 const HEIGHT: u32 = 480;
 
 const SCALE: ColourScale = ColourScale {
@@ -14,7 +14,7 @@ const SCALE: ColourScale = ColourScale {
     high: 6.0,
 };
 
-/// A square that faces the eye, as a surface or as two springs along x.
+/// Creates a square that faces the eye, as a surface or as two springs along x.
 fn square(is_surface: bool) -> (World, BodyId) {
     let mut world = World::new(FREE).expect("a world");
     let positions = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| Vec3::new(x, y, 0.0));
@@ -39,8 +39,8 @@ fn draw(world: &World, coloured: &[BodyValues]) -> Result<Image, Error> {
     world.picture_of_values(&definition, coloured)
 }
 
-/// Red, green and blue of the body at this part of its width.
-fn seen(image: &Image, part: f32, row: u32) -> [i32; 3] {
+/// Returns red, green and blue of the body at this fraction of its width.
+fn color_at(image: &Image, part: f32, row: u32) -> [i32; 3] {
     // The square is 2 m wide, and the picture 2 * 5 tan(0.3) m high.
     let pixels_per_metre = HEIGHT as f32 / (10.0 * 0.3_f32.tan());
     let column = 0.75 * HEIGHT as f32 + (2.0 * part - 1.0) * pixels_per_metre;
@@ -49,36 +49,36 @@ fn seen(image: &Image, part: f32, row: u32) -> [i32; 3] {
 }
 
 #[test]
-fn a_surface_goes_from_blue_by_grey_to_red() {
+fn a_surface_is_colored_from_blue_over_gray_to_red() {
     let (world, body) = square(true);
     let values = [-2.0, 6.0, 6.0, -2.0];
-    let of = |values, scale| BodyValues { body, values, scale };
-    let image = draw(&world, &[of(&values, SCALE)]).expect("a picture");
-    let [red, _, blue] = seen(&image, 0.03, HEIGHT / 2);
+    let body_values = |values, scale| BodyValues { body, values, scale };
+    let image = draw(&world, &[body_values(&values, SCALE)]).expect("a picture");
+    let [red, _, blue] = color_at(&image, 0.03, HEIGHT / 2);
     assert!(blue > red + 60, "{red} {blue}");
-    let [red, green, blue] = seen(&image, 0.5, HEIGHT / 2);
+    let [red, green, blue] = color_at(&image, 0.5, HEIGHT / 2);
     assert!(
         (red - blue).abs() < 20 && (red - green).abs() < 20 && red > 150,
         "{red} {green} {blue}"
     );
-    let [red, _, blue] = seen(&image, 0.97, HEIGHT / 2);
+    let [red, _, blue] = color_at(&image, 0.97, HEIGHT / 2);
     assert!(red > blue + 60, "{red} {blue}");
-    // Red grows over blue all the way.
+    // Red increases relative to blue along the whole width.
     let balance: Vec<i32> = (1..20)
-        .map(|part| seen(&image, part as f32 / 20.0, HEIGHT / 2))
+        .map(|part| color_at(&image, part as f32 / 20.0, HEIGHT / 2))
         .map(|c| c[0] - c[2])
         .collect();
     assert!(balance.windows(2).all(|pair| pair[0] < pair[1] + 3), "{balance:?}");
-    // Beyond the range are the colours of its ends.
+    // Values outside the range have the colors of its ends.
     let narrow = ColourScale {
         low: 1.9,
         high: 2.1,
         ..SCALE
     };
-    let ends = draw(&world, &[of(&values, narrow)]).expect("a picture");
-    assert!(seen(&ends, 0.2, HEIGHT / 2)[2] > seen(&ends, 0.2, HEIGHT / 2)[0] + 60);
-    assert!(seen(&ends, 0.8, HEIGHT / 2)[0] > seen(&ends, 0.8, HEIGHT / 2)[2] + 60);
-    // Without values it looks as it always did.
+    let ends = draw(&world, &[body_values(&values, narrow)]).expect("a picture");
+    assert!(color_at(&ends, 0.2, HEIGHT / 2)[2] > color_at(&ends, 0.2, HEIGHT / 2)[0] + 60);
+    assert!(color_at(&ends, 0.8, HEIGHT / 2)[0] > color_at(&ends, 0.8, HEIGHT / 2)[2] + 60);
+    // Without values, the picture is the plain one.
     let plain = draw(&world, &[]).expect("a picture");
     assert_ne!(plain, image);
     let definition = PictureDefinition {
@@ -91,7 +91,7 @@ fn a_surface_goes_from_blue_by_grey_to_red() {
 }
 
 #[test]
-fn lightness_alone_tells_the_larger_of_a_sequential_scale() {
+fn lightness_increases_along_a_sequential_scale() {
     let (world, body) = square(true);
     let values = [0.0, 1.0, 1.0, 0.0];
     let scale = ColourScale {
@@ -109,7 +109,7 @@ fn lightness_alone_tells_the_larger_of_a_sequential_scale() {
     )
     .expect("a picture");
     let light = |part: f32| {
-        let [red, green, blue] = seen(&image, part, HEIGHT / 2);
+        let [red, green, blue] = color_at(&image, part, HEIGHT / 2);
         2 * red + 7 * green + blue
     };
     let light: Vec<i32> = (1..20).map(|part| light(part as f32 / 20.0)).collect();
@@ -118,7 +118,7 @@ fn lightness_alone_tells_the_larger_of_a_sequential_scale() {
 }
 
 #[test]
-fn springs_of_a_body_without_a_surface_are_coloured_too() {
+fn springs_of_a_body_without_a_surface_are_colored_too() {
     let (world, body) = square(false);
     let values = [-2.0, 6.0, 6.0, -2.0];
     let scale = SCALE;
@@ -134,20 +134,20 @@ fn springs_of_a_body_without_a_surface_are_coloured_too() {
     // The springs lie along the upper and the lower side.
     for row in 0..HEIGHT {
         let [left, right] = [0.1, 0.9]
-            .map(|part| seen(&image, part, row))
+            .map(|part| color_at(&image, part, row))
             .map(|[red, _, blue]| red - blue);
-        let background = seen(&image, -0.2, row);
+        let background = color_at(&image, -0.2, row);
         let background = background[0] - background[2];
         if (left - background).abs() + (right - background).abs() > 10 {
             assert!(left < right, "row {row}: {left} {right}");
         }
     }
     let left: Vec<i32> = (0..HEIGHT)
-        .map(|row| seen(&image, 0.1, row))
+        .map(|row| color_at(&image, 0.1, row))
         .map(|[red, _, blue]| red - blue)
         .collect();
     let right: Vec<i32> = (0..HEIGHT)
-        .map(|row| seen(&image, 0.9, row))
+        .map(|row| color_at(&image, 0.9, row))
         .map(|[red, _, blue]| red - blue)
         .collect();
     assert!(left.iter().min().expect("rows") < &-40, "{left:?}");
@@ -155,7 +155,7 @@ fn springs_of_a_body_without_a_surface_are_coloured_too() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused_by_name() {
+fn invalid_values_are_refused_by_name() {
     let (mut world, body) = square(true);
     let refused = |world: &World, values: &[f32], low, high, name: &str| {
         let scale = ColourScale { low, high, ..SCALE };
@@ -171,7 +171,7 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         refused(&world, &good, low, high, "low");
     }
     world.destroy_body(body).expect("the body");
-    let gone = draw(
+    let stale = draw(
         &world,
         &[BodyValues {
             body,
@@ -179,5 +179,5 @@ fn what_cannot_be_drawn_is_refused_by_name() {
             scale: SCALE,
         }],
     );
-    assert!(matches!(gone, Err(Error::StaleId(_))), "{gone:?}");
+    assert!(matches!(stale, Err(Error::StaleId(_))), "{stale:?}");
 }

@@ -1,4 +1,4 @@
-//! The rasteriser and the pictures, through the public API.
+//! The rasterizer and rendered images, through the public API.
 
 use glam::{DVec3, Vec3};
 use sinew::raster::{
@@ -6,7 +6,7 @@ use sinew::raster::{
 };
 use std::collections::BTreeSet;
 
-/// A small generator with a fixed seed (xorshift64*).
+/// A generator of pseudo-random numbers with a fixed seed (xorshift64*).
 struct Random(u64);
 
 impl Random {
@@ -35,7 +35,7 @@ fn flat(x: f64, y: f64) -> PixelVertex {
     }
 }
 
-/// The triangles of a square, refined by splitting random triangles at random points and random edges.
+/// Returns the triangles of a square, refined by splits of random triangles at random points.
 fn triangulation(random: &mut Random, size: f64, splits: usize) -> Vec<[(f64, f64); 3]> {
     let corners = [(0.0, 0.0), (size, 0.0), (size, size), (0.0, size)];
     let mut triangles = vec![
@@ -49,7 +49,7 @@ fn triangulation(random: &mut Random, size: f64, splits: usize) -> Vec<[(f64, f6
         if u + v > 1.0 {
             (u, v) = (1.0 - u, 1.0 - v);
         }
-        // Onto a grid of 1/4096 pixel and often onto pixel centres, where the fill rule has to decide.
+        // Snaps to a grid of 1/4096 pixel, and often to pixel centers, where the fill rule decides.
         let snap = |value: f64, steps: f64| (value * steps).round() / steps;
         let steps = if random.next() < 0.5 { 2.0 } else { 4096.0 };
         let middle = (
@@ -79,7 +79,7 @@ fn a_triangulation_covers_each_pixel_once() {
         let mut counts = vec![0; size * size];
         for (i, triangle) in triangulation(&mut random, size as f64, 400).into_iter().enumerate() {
             let [a, b, c] = triangle.map(|(x, y)| flat(x, y));
-            // Both orientations: the fill rule must not depend on it.
+            // Both orientations, because the fill rule must not depend on them.
             let vertices = if i % 2 == 0 { [a, b, c] } else { [b, a, c] };
             rasterise_triangle(&Window::new(size as u32, size as u32), &vertices, |f| {
                 counts[f.y as usize * size + f.x as usize] += 1;
@@ -91,7 +91,7 @@ fn a_triangulation_covers_each_pixel_once() {
 
 #[test]
 fn clipped_triangles_still_cover_each_pixel_once() {
-    // A plane of random triangles that passes under the camera, through the near plane and far out to the sides.
+    // A plane of random triangles that passes below the camera, through the near plane and far out to the sides.
     let camera = Camera {
         eye: Vec3::new(0.0, 0.02, 0.0),
         target: Vec3::new(0.0, 0.01, -1.0),
@@ -116,11 +116,11 @@ fn clipped_triangles_still_cover_each_pixel_once() {
     assert!((9000..10_800).contains(&covered), "{covered}");
 }
 
-/// Depth along `forward` where the ray meets the plane of a triangle.
+/// Returns the depth along `forward` at which a ray hits the plane of a triangle.
 fn plane_depth(origin: DVec3, direction: DVec3, corners: [DVec3; 3], eye: DVec3, forward: DVec3) -> f64 {
     let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    let way = normal.dot(corners[0] - origin) / normal.dot(direction);
-    (origin + way * direction - eye).dot(forward)
+    let distance = normal.dot(corners[0] - origin) / normal.dot(direction);
+    (origin + distance * direction - eye).dot(forward)
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn depths_and_weights_agree_with_rays() {
         let points = [0; 3].map(|_| random.point(0.9));
         let corners = points.map(|point| point.as_dvec3());
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        // Seen edge-on, depth changes by more than 1e-5 within the rounding of a pixel coordinate.
+        // For a triangle seen edge-on, depth changes by more than 1e-5 within the rounding of a pixel coordinate.
         if normal.length() < 0.2 || normal.normalize().dot(forward).abs() < 0.2 {
             continue;
         }
@@ -169,11 +169,11 @@ fn depths_and_weights_agree_with_rays() {
                 "{} {expected}",
                 fragment.depth
             );
-            let place = (0..3)
+            let position = (0..3)
                 .map(|i| f64::from(fragment.weights[i]) * corners[i])
                 .sum::<DVec3>();
             let ray = origin + direction * expected;
-            assert!((place - ray).length() < 1e-5, "{place} {ray}");
+            assert!((position - ray).length() < 1e-5, "{position} {ray}");
             assert_eq!(fragment.front, normal.dot(direction) < 0.0);
             checked += 1;
         };
@@ -193,12 +193,12 @@ fn lines_have_the_depth_of_their_points() {
     let view = camera.view(400, 300).expect("a valid camera");
     let mut random = Random(8);
     for _ in 0..100 {
-        // Some begin behind the camera.
+        // Some lines begin behind the camera.
         let points = [random.point(0.5), random.point(3.0)];
         view.line(&Window::new(400, 300), points, |fragment| {
-            let place = points[0] * fragment.weights[0] + points[1] * fragment.weights[1];
-            assert!((2.0 - place.z - fragment.depth).abs() < 1e-5);
-            let pixel = view.project(place).expect("in front of the camera");
+            let point = points[0] * fragment.weights[0] + points[1] * fragment.weights[1];
+            assert!((2.0 - point.z - fragment.depth).abs() < 1e-5);
+            let pixel = view.project(point).expect("in front of the camera");
             assert!((pixel.x - f64::from(fragment.x) - 0.5).abs() < 0.51);
             assert!((pixel.y - f64::from(fragment.y) - 0.5).abs() < 0.51);
         });
@@ -274,21 +274,22 @@ fn a_sphere_covers_the_area_of_its_silhouette() {
     scene.shapes.push((Shape::Sphere { centre, radius }, Look::INSTRUMENT));
     let image = scene.draw(&camera, width, height).expect("a picture");
     let changed = image.pixels.iter().zip(&empty.pixels).filter(|(a, b)| a != b).count();
-    // The outline of a sphere is where a cone about the line to its centre meets the image plane: an ellipse with
-    // semi-axes f r sqrt(d^2 - r^2) / (z^2 - r^2) and f r / sqrt(z^2 - r^2), d and z the centre's distance and depth.
+    // The outline of a sphere is the intersection of a cone about the line to its center with the image plane. It is an
+    // ellipse with semi-axes f r sqrt(d^2 - r^2) / (z^2 - r^2) and f r / sqrt(z^2 - r^2), where d and z are the
+    // distance and depth of the center.
     let offset = (centre - eye).as_dvec3();
     let (d2, z2, r2) = (offset.length_squared(), offset.z * offset.z, f64::from(radius).powi(2));
     let focal = f64::from(height) / 2.0 / 0.35_f64.tan();
     let major = focal * (r2 * (d2 - r2)).sqrt() / (z2 - r2);
     let minor = focal * (r2 / (z2 - r2)).sqrt();
     let area = std::f64::consts::PI * major * minor;
-    // A pixel at the outline counts even if a quarter of it is covered: at this size 0.3 % too much.
+    // A pixel at the outline counts even if only a quarter of it is covered, which adds 0.3 % at this size.
     let error = (changed as f64 - area).abs() / area;
     assert!(error < 0.01, "{changed} {area}");
 }
 
 #[test]
-fn a_fitted_camera_has_all_points_and_no_more() {
+fn a_fitted_camera_shows_all_points_tightly() {
     let mut random = Random(21);
     let mut close = 0;
     for round in 0..200 {
@@ -320,7 +321,7 @@ fn a_fitted_camera_has_all_points_and_no_more() {
         }
         assert!(x < 0.945 && y < 0.945, "{x} {y}");
         if x.max(y) < 0.935 {
-            // Only where the camera is as close as it may be: 2 % of at most 2 sqrt(3) times the stretch.
+            // Only when the camera is at its minimum distance: 2 % of at most 2 sqrt(3) times the stretch.
             assert!(nearest < 0.07 * f64::from(stretch.max_element()), "{nearest} {x} {y}");
             close += 1;
         }
@@ -331,7 +332,7 @@ fn a_fitted_camera_has_all_points_and_no_more() {
 }
 
 #[test]
-fn a_camera_is_found_for_degenerate_scenes() {
+fn a_camera_fits_degenerate_scenes() {
     let fit = |points: &[Vec3]| Camera::fitted(points.iter().copied(), Vec3::Z, Vec3::Z, 0.6, 1.0);
     for points in [&[][..], &[Vec3::ONE], &[Vec3::NAN, Vec3::ONE], &[Vec3::ZERO, Vec3::Z]] {
         let camera = fit(points).expect("a camera");
@@ -420,7 +421,7 @@ fn broken_triangles_neither_draw_nor_hang() {
 }
 
 #[test]
-fn wrong_arguments_are_refused() {
+fn invalid_arguments_are_refused() {
     let camera = Camera {
         eye: Vec3::Z,
         target: Vec3::ZERO,
@@ -530,8 +531,8 @@ mod files {
             };
             assert!(message.contains(&path.display().to_string()), "{message}");
         }
-        let left = std::fs::read_dir(&directory).expect("the directory").count();
-        assert_eq!(left, 1);
+        let entry_count = std::fs::read_dir(&directory).expect("the directory").count();
+        assert_eq!(entry_count, 1);
         let mut broken = noise(3, 3);
         broken.width = 4;
         let result = broken.write_png(directory.join("broken.png"));

@@ -1,4 +1,4 @@
-//! Edges and surfaces, tidying, and the generated shapes.
+//! Edges and surfaces, cleaning, and generated shapes.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::HashMap;
@@ -14,11 +14,11 @@ fn unit_points() -> Vec<Vec3> {
     vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z]
 }
 
-fn place(mesh: &Mesh, node: u32) -> DVec3 {
+fn position_of(mesh: &Mesh, node: u32) -> DVec3 {
     mesh.positions[node as usize].as_dvec3()
 }
 
-/// Vertices - edges + faces of a surface; 2 for a ball, 1 for a disc.
+/// Returns the Euler characteristic of a surface: vertices - edges + faces. It is 2 for a ball and 1 for a disc.
 fn euler(triangles: &[[u32; 3]]) -> i64 {
     let mut nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
     nodes.sort_unstable();
@@ -26,7 +26,7 @@ fn euler(triangles: &[[u32; 3]]) -> i64 {
     nodes.len() as i64 - edges(triangles, &[]).unwrap().len() as i64 + triangles.len() as i64
 }
 
-/// Every edge has exactly two triangles, and the triangles at a node follow each other in one round.
+/// Checks that every edge has exactly two triangles, and that the triangles around a node form a single cycle.
 fn check_manifold(triangles: &[[u32; 3]]) {
     let mut next = HashMap::new();
     for &[a, b, c] in triangles {
@@ -53,12 +53,12 @@ fn check_manifold(triangles: &[[u32; 3]]) {
 
 fn check_volumes(mesh: &Mesh) {
     for &[a, b, c, d] in &mesh.tetrahedra {
-        let [a, b, c, d] = [a, b, c, d].map(|node| place(mesh, node));
+        let [a, b, c, d] = [a, b, c, d].map(|node| position_of(mesh, node));
         assert!((b - a).cross(c - a).dot(d - a) > 0.0);
     }
 }
 
-/// The smallest and the largest angle between two faces of a tetrahedron, in degrees.
+/// Returns the smallest and the largest dihedral angle (degrees).
 fn dihedral_angles(mesh: &Mesh) -> (f64, f64) {
     let mut range = (180.0f64, 0.0f64);
     for t in &mesh.tetrahedra {
@@ -70,7 +70,7 @@ fn dihedral_angles(mesh: &Mesh) -> (f64, f64) {
             [1, 3, 0, 2],
             [2, 3, 0, 1],
         ] {
-            let [i, j, k, l] = [i, j, k, l].map(|corner: usize| place(mesh, t[corner]));
+            let [i, j, k, l] = [i, j, k, l].map(|corner: usize| position_of(mesh, t[corner]));
             let angle = (j - i).cross(k - i).angle_between((j - i).cross(l - i)).to_degrees();
             range = (range.0.min(angle), range.1.max(angle));
         }
@@ -79,7 +79,7 @@ fn dihedral_angles(mesh: &Mesh) -> (f64, f64) {
 }
 
 #[test]
-fn edges_are_there_once() {
+fn edges_are_listed_once() {
     assert_eq!(edges(&[], &[]).unwrap(), Vec::<[u32; 2]>::new());
     let expected = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
     assert_eq!(edges(&TETRAHEDRON, &[]).unwrap(), expected);
@@ -89,14 +89,14 @@ fn edges_are_there_once() {
 }
 
 #[test]
-fn the_boundary_leaves_out_inner_faces() {
+fn the_boundary_excludes_inner_faces() {
     assert!(boundary(&[]).unwrap().is_empty());
     // Two tetrahedra on both sides of 1 2 3.
     let surface = boundary(&[[0, 1, 2, 3], [4, 1, 3, 2]]).unwrap();
     assert_eq!(surface.len(), 6);
     assert!(is_closed(&surface).unwrap());
     assert_eq!(euler(&surface), 2);
-    // The same tetrahedron twice has no face of its own.
+    // The same tetrahedron twice has no boundary face.
     assert!(boundary(&[[0, 1, 2, 3], [3, 2, 1, 0]]).unwrap().is_empty());
     let mesh = Mesh {
         positions: unit_points(),
@@ -117,14 +117,14 @@ fn closed_and_open_surfaces() {
         let mut open = TETRAHEDRON.to_vec();
         open.remove(missing);
         assert!(!is_closed(&open).unwrap());
-        let mut turned = TETRAHEDRON;
-        turned[missing].swap(0, 1);
-        assert!(!is_closed(&turned).unwrap());
+        let mut flipped = TETRAHEDRON;
+        flipped[missing].swap(0, 1);
+        assert!(!is_closed(&flipped).unwrap());
     }
 }
 
 #[test]
-fn volumes_are_signed_and_keep_their_digits_far_away() {
+fn volumes_are_signed_and_accurate_far_from_the_origin() {
     let mut mesh = Mesh {
         positions: unit_points(),
         triangles: TETRAHEDRON.to_vec(),
@@ -145,25 +145,25 @@ fn volumes_are_signed_and_keep_their_digits_far_away() {
 #[test]
 fn tidy_counts_what_it_does() {
     let mut positions = unit_points();
-    positions.push(Vec3::new(7.0, 7.0, 7.0)); // 4: used by nothing
+    positions.push(Vec3::new(7.0, 7.0, 7.0)); // 4: unused
     positions.push(Vec3::new(1.0, 1e-7, 0.0)); // 5: the same as 1
     positions.push(Vec3::new(1.0, 1e-3, 0.0)); // 6: not the same as 1
-    positions.push(Vec3::new(0.5, 0.5, -0.5)); // 7: used by what collapses alone
+    positions.push(Vec3::new(0.5, 0.5, -0.5)); // 7: used only by a triangle that collapses
     let mesh = Mesh {
         positions,
         triangles: vec![
             [0, 1, 2], // on the surface, facing inward
-            [2, 0, 5], // again
-            [0, 3, 2], // on the surface, outward
-            [0, 2, 3], // and its back
+            [2, 0, 5], // the same again
+            [0, 3, 2], // on the surface, facing outward
+            [0, 2, 3], // and its reverse
             [7, 1, 5], // collapses
-            [0, 6, 2], // a sheet of its own ...
-            [2, 6, 0], // ... and its back
+            [0, 6, 2], // a separate sheet ...
+            [2, 6, 0], // ... and its reverse
             [6, 2, 0], // the sheet again
         ],
         tetrahedra: vec![
-            [0, 1, 3, 2], // inside out
-            [3, 2, 5, 0], // again
+            [0, 1, 3, 2], // inverted
+            [3, 2, 5, 0], // the same again
             [0, 1, 2, 5], // collapses
             [0, 6, 2, 1], // flat
         ],
@@ -183,39 +183,43 @@ fn tidy_counts_what_it_does() {
     assert!((mesh.volume().unwrap() - 1.0 / 6.0).abs() < 1e-12);
     assert_eq!(report.collapsed_triangles, 1);
     assert_eq!(mesh.triangles.len() + report.dropped_triangles(), 8);
-    // A second time there is nothing left to do.
-    let again = tidy(&mesh).unwrap();
-    assert_eq!(again.mesh, mesh);
-    assert_eq!(again.report.dropped_triangles() + again.report.flipped_tetrahedra, 0);
+    // A second run changes nothing.
+    let repeated = tidy(&mesh).unwrap();
+    assert_eq!(repeated.mesh, mesh);
+    assert_eq!(
+        repeated.report.dropped_triangles() + repeated.report.flipped_tetrahedra,
+        0
+    );
 }
 
 #[test]
 fn triangles_on_tetrahedra_face_outward() {
     let mut triangles = TETRAHEDRON.to_vec();
     triangles[1].swap(0, 1); // inward
-    triangles.push([2, 1, 3]); // the back of an outward one
-    triangles.push([1, 2, 0]); // and of another
+    triangles.push([2, 1, 3]); // the reverse of an outward one
+    triangles.push([1, 2, 0]); // and of another one
     let mesh = Mesh {
         positions: unit_points(),
         triangles,
         tetrahedra: vec![[0, 1, 2, 3]],
         ..Mesh::default()
     };
-    let tidied = tidy(&mesh).unwrap();
+    let cleaned = tidy(&mesh).unwrap();
     assert_eq!(
-        (tidied.report.turned_triangles, tidied.report.doubled_triangles),
+        (cleaned.report.turned_triangles, cleaned.report.doubled_triangles),
         (1, 2)
     );
-    assert_eq!(tidied.mesh.triangles.len(), 4);
-    assert!(is_closed(&tidied.mesh.triangles).unwrap());
+    assert_eq!(cleaned.mesh.triangles.len(), 4);
+    assert!(is_closed(&cleaned.mesh.triangles).unwrap());
     let surface = Mesh {
         tetrahedra: vec![],
-        ..tidied.mesh
+        ..cleaned.mesh
     };
     assert!(surface.volume().unwrap() > 0.0);
 }
 
-/// Points about as near as the limit, across every border of the grid, against a comparison of all pairs.
+/// Compares welding with a comparison of all pairs, for points at about the limit distance across every border of the
+/// grid.
 #[test]
 fn welding_agrees_with_comparing_all_pairs() {
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
@@ -225,14 +229,15 @@ fn welding_agrees_with_comparing_all_pairs() {
         state ^= state << 17;
         (state >> 40) as f32 / (1 << 24) as f32
     };
-    // A box with a diagonal of 1000 m: the limit is 1 mm. The rest lies in 20 mm about the origin, where f32 is exact.
+    // A box with a diagonal of 1000 m has a limit of 1 mm. The other points lie within 20 mm of the origin, where f32
+    // is accurate.
     let half = 500.0 / 3f32.sqrt();
     let mut positions = vec![Vec3::splat(-half), Vec3::splat(half), Vec3::new(half, -half, half)];
     positions.extend((0..3000).map(|_| Vec3::new(random(), random(), random()) * 0.02 - 0.01));
     let limit = 1e-6 * (positions[1] - positions[0]).as_dvec3().length();
     let count = positions.len() as u32;
     let triangles = (0..count / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    let tidied = tidy(&Mesh {
+    let cleaned = tidy(&Mesh {
         positions: positions.clone(),
         triangles,
         tetrahedra: vec![],
@@ -247,16 +252,16 @@ fn welding_agrees_with_comparing_all_pairs() {
     }
     assert!(first.iter().enumerate().filter(|&(i, &f)| f < i).count() > 300);
     for (i, &f) in first.iter().enumerate() {
-        assert_eq!(tidied.node_of_vertex[i], tidied.node_of_vertex[f]);
-        let node = tidied.node_of_vertex[i];
+        assert_eq!(cleaned.node_of_vertex[i], cleaned.node_of_vertex[f]);
+        let node = cleaned.node_of_vertex[i];
         if node != NO_NODE {
-            assert_eq!(tidied.mesh.positions[node as usize], positions[f]);
+            assert_eq!(cleaned.mesh.positions[node as usize], positions[f]);
         }
     }
 }
 
 #[test]
-fn tidy_refuses_what_cannot_be() {
+fn tidy_refuses_invalid_meshes() {
     let mut mesh = Mesh {
         positions: unit_points(),
         triangles: vec![[0, 1, 4]],
@@ -284,11 +289,11 @@ fn a_cloth_is_a_flat_rectangle() {
         assert_eq!(cloth.triangles.len(), 2 * x * z);
         assert_eq!(euler(&cloth.triangles), 1);
         assert!(!is_closed(&cloth.triangles).unwrap());
-        // Along x, along z and one diagonal a cell.
+        // Edges along x, along z, and one diagonal per cell.
         assert_eq!(cloth.edges().unwrap().len(), x * (z + 1) + z * (x + 1) + x * z);
         let mut area = 0.0;
         for &t in &cloth.triangles {
-            let [a, b, c] = t.map(|node| place(&cloth, node));
+            let [a, b, c] = t.map(|node| position_of(&cloth, node));
             let normal = (b - a).cross(c - a);
             assert!(normal.y > 0.0 && normal.x == 0.0 && normal.z == 0.0);
             area += normal.y / 2.0;
@@ -298,15 +303,15 @@ fn a_cloth_is_a_flat_rectangle() {
         assert_eq!(cloth.positions[x], Vec3::new(0.15, 0.0, -0.25));
         assert_eq!(cloth.positions[cloth.positions.len() - 1], Vec3::new(0.15, 0.0, 0.25));
     }
-    // As many diagonals one way as the other.
+    // As many diagonals in one direction as in the other.
     let cloth = Mesh::cloth([1.0, 1.0], [4, 4]).unwrap();
     let diagonals: Vec<f64> = cloth
         .edges()
         .unwrap()
         .iter()
-        .map(|&[a, b]| place(&cloth, b) - place(&cloth, a))
+        .map(|&[a, b]| position_of(&cloth, b) - position_of(&cloth, a))
         .map(|d| d.x * d.z)
-        .filter(|&way| way != 0.0)
+        .filter(|&product| product != 0.0)
         .collect();
     assert_eq!(diagonals.len(), 16);
     assert_eq!(diagonals.iter().sum::<f64>(), 0.0);
@@ -320,7 +325,7 @@ fn a_block_is_filled_without_gaps() {
         let [x, y, z] = cells.map(|count| count as usize);
         assert_eq!(block.positions.len(), (x + 1) * (y + 1) * (z + 1));
         assert_eq!(block.tetrahedra.len(), 5 * x * y * z);
-        // Two triangles on each square of the outside: where cells did not fit together, there would be more.
+        // Two triangles on each outer square. Cells that do not fit together would leave more.
         assert_eq!(block.triangles.len(), 4 * (x * y + y * z + z * x));
         check_volumes(&block);
         check_manifold(&block.triangles);
@@ -334,16 +339,16 @@ fn a_block_is_filled_without_gaps() {
         assert!((surface.volume().unwrap() / 0.03 - 1.0).abs() < 1e-6);
         assert_eq!(block.positions[0], -Vec3::from(size) / 2.0);
         assert_eq!(block.positions[block.positions.len() - 1], Vec3::from(size) / 2.0);
-        // Already tidy.
+        // The mesh is already clean.
         assert_eq!(tidy(&block).unwrap().mesh, block);
     }
 }
 
-/// The volume of the body that the organ's surface describes, in cubes of half its length: its sections are bent and
-/// shifted, which changes no volume, so each is half_height half_depth times an area that only depends on how much of the
-/// equation is left at that x.
+/// Returns the volume of the organ shape, in cubes of half its length. Its sections are bent and shifted, which changes
+/// no volume. So each section has the area half_height half_depth times an area that depends only on the remainder of
+/// the equation at that x.
 fn organ_volume() -> f64 {
-    let blunt = |share: f64| (share.powi(2) + share.powi(4)) / 2.0;
+    let blunt = |fraction: f64| (fraction.powi(2) + fraction.powi(4)) / 2.0;
     let steps = 2000;
     let middle = |i: usize| (i as f64 + 0.5) / steps as f64 * 2.0 - 1.0;
     let step = 2.0 / steps as f64;
@@ -361,19 +366,19 @@ fn organ_volume() -> f64 {
 
 #[test]
 fn an_organ_is_sound_at_every_spacing() {
-    an_organ_is_sound_at_every_spacing_of([8.0, 28.0]);
+    check_an_organ_is_sound_at_every_spacing([8.0, 28.0]);
 }
 
 #[test]
 #[ignore = "long"]
 fn an_organ_is_sound_at_every_fine_spacing() {
-    an_organ_is_sound_at_every_spacing_of([28.0, 42.0]);
+    check_an_organ_is_sound_at_every_spacing([28.0, 42.0]);
 }
 
-fn an_organ_is_sound_at_every_spacing_of([from, to]: [f64; 2]) {
+fn check_an_organ_is_sound_at_every_spacing([from, to]: [f64; 2]) {
     let exact = organ_volume() * 0.1f64.powi(3);
     assert!(exact > PI * 1e-4 && exact < 1e-3, "{exact}");
-    // Fractions of the length from 1/8 on, 40 of them uneven, to catch every way the lattice can lie.
+    // 40 uneven fractions of the length from 1/8 on, to cover every position of the lattice.
     let ratios = std::iter::successors(Some(8.0), |ratio| Some(ratio * 1.043));
     for ratio in ratios.skip_while(|ratio| *ratio < from).take_while(|ratio| *ratio < to) {
         let spacing = (0.2 / ratio) as f32;
@@ -391,18 +396,18 @@ fn an_organ_is_sound_at_every_spacing_of([from, to]: [f64; 2]) {
         let size = high - low;
         assert!((size.x - 0.2).abs() < 1e-6);
         assert!(size.x > 1.5 * size.z && size.z > 1.8 * size.y, "{size}");
-        // Scaling to the full length makes up for the tip the lattice misses: at most a few percent.
+        // Scaling to the full length compensates for the tip that the lattice misses, at most a few percent.
         let volume = organ.volume().unwrap();
         let error = (volume / exact - 1.0).abs();
         assert!(error < 25.0 / (ratio * ratio), "{ratio}: {error}");
         let edges = organ.edges().unwrap();
         let total: f64 = edges
             .iter()
-            .map(|&[a, b]| place(&organ, a).distance(place(&organ, b)))
+            .map(|&[a, b]| position_of(&organ, a).distance(position_of(&organ, b)))
             .sum();
         let mean = total / edges.len() as f64 / f64::from(spacing);
         assert!((0.88..1.05).contains(&mean), "{ratio}: {mean}");
-        // The fat lobe is on the left.
+        // The thick lobe is on the left.
         let (left, right): (Vec<_>, Vec<_>) = organ.positions.iter().map(|p| p.x).partition(|&x| x < 0.0);
         assert!(left.len() > right.len());
     }

@@ -1,5 +1,6 @@
-//! The binary interface is what it was: the header's functions, structs and constants, as a C compiler lays them out, against the description
-//! in `tests/sinew.abi`. What the library exports is the header's by `symbols.rs` and `header.rs`.
+//! The binary interface is unchanged: the functions, structs and constants of the header, as a C compiler lays them
+//! out, against the description in `tests/sinew.abi`. `symbols.rs` and `header.rs` check that the library exports what
+//! the header declares.
 //!
 //! `SINEW_WRITE_ABI=1 cargo test --test project abi` writes the description again.
 #![cfg(target_os = "linux")]
@@ -14,7 +15,8 @@ fn header() -> String {
     std::fs::read_to_string(root().join("include/sinew/sinew_all.h")).expect("sinew_all.h")
 }
 
-/// A shared library of functions that do nothing, with the types of a header; each constant is an enumeration that a function takes.
+/// Builds a shared library of empty functions with the types of a header; each constant becomes an enumeration that a
+/// function takes.
 fn library(name: &str, header: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("abi");
     std::fs::create_dir_all(&folder).expect("the target directory can be written");
@@ -34,7 +36,7 @@ fn library(name: &str, header: &str) -> PathBuf {
             _ => continue,
         };
         if !constant.starts_with("SINEW_VERSION") {
-            // Of two enumerations abidiff asks whether each value of one is somewhere in the other.
+            // For two enumerations, abidiff checks only whether each value of one exists in the other.
             let (of, is) = (format!("enum {constant}_"), format!("{constant}_is"));
             writeln!(
                 source,
@@ -49,7 +51,7 @@ fn library(name: &str, header: &str) -> PathBuf {
     succeed(
         Command::new("cc")
             .args(["-w", "-g", "-O0", "-fPIC", "-shared"])
-            // The description is the same wherever the project lies.
+            // The description does not depend on the project's folder.
             .arg(format!("-ffile-prefix-map={}=.", folder.display()))
             .arg(&file)
             .arg("-o")
@@ -73,7 +75,7 @@ fn describe(library: &Path) -> Vec<u8> {
     .stdout
 }
 
-/// What is not as it is described.
+/// Returns the differences from the description.
 fn differences(library: &Path) -> Option<String> {
     let output = Command::new("abidiff")
         .arg("--no-architecture")
@@ -82,7 +84,7 @@ fn differences(library: &Path) -> Option<String> {
         .output()
         .expect("abidiff runs");
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    // Its answer is made of bits: 4, a difference; 8, one that is a break for certain; 1 and 2, it could not tell.
+    // The exit code consists of bits: 4, a difference; 8, a certain break; 1 and 2, undecided.
     match output.status.code() {
         Some(0) => None,
         Some(code) if code & 3 == 0 => Some(said),
@@ -101,7 +103,7 @@ fn are_tools_there() -> bool {
 }
 
 #[test]
-fn the_binary_interface_is_what_it_was() {
+fn the_binary_interface_is_unchanged() {
     if !are_tools_there() {
         return;
     }

@@ -1,5 +1,6 @@
-//! The header and the library as C and C++ programs meet them: every program of `tests/c` compiled as both, linked to
-//! the shared and to the static library, and run; the examples compiled; then under sanitizers and valgrind.
+//! The header and the library in C and C++ programs. Every program of `tests/c` is compiled as both, linked to the
+//! shared and to the static library, and run; the examples are compiled. Then the programs run under sanitizers and
+//! valgrind.
 #![cfg(target_os = "linux")]
 
 use std::collections::BTreeSet;
@@ -12,10 +13,10 @@ use crate::support::{Library, failure, installed, root, skip, succeed};
 
 const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
 
-/// A compiler that is installed, for one language.
+/// An installed compiler for one language.
 struct Compiler {
     name: &'static str,
-    /// As `-x` names it.
+    /// The language as `-x` names it.
     language: &'static str,
 }
 
@@ -41,21 +42,21 @@ const ALL_COMPILERS: [Compiler; 4] = [
 impl Compiler {
     fn installed() -> impl Iterator<Item = &'static Compiler> {
         ALL_COMPILERS.iter().filter(|compiler| {
-            let there = installed(compiler.name);
-            if !there {
+            let is_installed = installed(compiler.name);
+            if !is_installed {
                 skip(&format!("{}, which is not installed", compiler.name));
             }
-            there
+            is_installed
         })
     }
 
-    /// The first that is installed for each language, or the others.
+    /// Returns the first installed compiler of each language, or the others.
     fn first_of_each_language(is_first: bool) -> impl Iterator<Item = &'static Compiler> {
         let mut languages = BTreeSet::new();
         Self::installed().filter(move |compiler| languages.insert(compiler.language) == is_first)
     }
 
-    /// All the standards that the header promises.
+    /// Returns all standards that the header supports.
     fn standards(&self) -> &'static [&'static str] {
         match self.language {
             "c" => &["c99", "c11", "c17", "c2x"],
@@ -63,7 +64,7 @@ impl Compiler {
         }
     }
 
-    /// The standard that the programs are written in.
+    /// Returns the standard of the test programs.
     fn standard(&self) -> &'static str {
         match self.language {
             "c" => "c99",
@@ -71,7 +72,7 @@ impl Compiler {
         }
     }
 
-    /// Compiles a program and links it; where it ends up.
+    /// Compiles and links a program; returns its path.
     fn build(&self, source: &Path, build: &Build) -> PathBuf {
         let program = Path::new(env!("CARGO_TARGET_TMPDIR"))
             .join(build.name)
@@ -109,7 +110,7 @@ enum Link {
     Static,
 }
 
-/// One way of building the programs, in a folder of its own: the tests run side by side.
+/// A configuration of the programs, in a folder of its own: the tests run in parallel.
 struct Build {
     name: &'static str,
     library: fn() -> &'static Library,
@@ -152,7 +153,7 @@ const CHECKED: Build = Build {
     options: &[],
 };
 
-/// The version of the crate as `sinew_version` gives it.
+/// Returns the version of the crate as `sinew_version` does.
 fn version() -> u32 {
     let part = |text: &str| text.parse::<u32>().expect("a number");
     part(env!("CARGO_PKG_VERSION_MAJOR")) << 16
@@ -160,7 +161,7 @@ fn version() -> u32 {
         | part(env!("CARGO_PKG_VERSION_PATCH"))
 }
 
-/// The C programs of a folder, in the order of their names.
+/// Returns the C programs of a folder, ordered by name.
 fn sources(folder: &str) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(root().join(folder)) else {
         return Vec::new();
@@ -173,8 +174,8 @@ fn sources(folder: &str) -> Vec<PathBuf> {
     sources
 }
 
-/// Runs all of these programs, some side by side, and tells of every one that fails. Each finds its library by its own path alone:
-/// cargo puts older builds on the loader's.
+/// Runs all programs, several in parallel, and reports every failure. Each finds its library by its own path: the
+/// loader path of cargo contains older builds.
 fn run_all(programs: impl Iterator<Item = Command> + Send) {
     let programs = Mutex::new(programs);
     let next = || programs.lock().expect("no program panicked").next();
@@ -223,21 +224,21 @@ fn programs_of_the_other_compilers_run_with_the_shared_library() {
 #[test]
 #[ignore = "long"]
 fn programs_run_with_the_static_library() {
-    // What compilers make of the programs does not depend on the library: one for each language links it.
+    // Compilation does not depend on the library: one compiler per language links it.
     every_program_runs(Compiler::first_of_each_language(true), &STATIC);
 }
 
-/// It takes the place of glibc's allocator.
+/// The program replaces glibc's allocator.
 #[test]
 #[cfg(target_env = "gnu")]
-fn a_first_refusal_for_want_of_memory_is_an_answer() {
+fn the_first_failed_allocation_returns_an_error() {
     if let Some(compiler) = Compiler::installed().find(|compiler| compiler.language == "c") {
         let program = compiler.build(&root().join("tests/out_of_memory.c"), &SHARED);
         run_all([Command::new(program)].into_iter());
     }
 }
 
-/// It counts what is asked of its own allocator.
+/// The program counts the requests to its own allocator.
 #[test]
 #[ignore = "long"]
 fn a_program_brings_its_own_allocator() {
@@ -272,7 +273,7 @@ fn the_examples_compile(compilers: impl Iterator<Item = &'static Compiler>) {
     }
 }
 
-/// Lessons are short, listed in the guide, and print what the comment at their top says.
+/// Lessons are short, are listed in the guide, and print what the comment at their top states.
 #[test]
 fn lessons_print_the_output_that_they_state() {
     let Some(compiler) = Compiler::installed().find(|compiler| compiler.language == "c") else {
@@ -303,7 +304,7 @@ fn lessons_print_the_output_that_they_state() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// The headers of C below `include/`.
+/// Returns the C headers below `include/`.
 fn headers() -> Vec<String> {
     let entries = std::fs::read_dir(root().join("include/sinew")).expect("include/sinew");
     let names = entries.map(|entry| entry.expect("a file").file_name());
@@ -313,7 +314,7 @@ fn headers() -> Vec<String> {
 }
 
 #[test]
-fn each_header_stands_alone_in_every_standard() {
+fn each_header_compiles_alone_in_every_standard() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("alone");
     std::fs::create_dir_all(&folder).expect("a folder can be made");
     let headers = headers();
@@ -343,8 +344,8 @@ fn each_header_stands_alone_in_every_standard() {
     }
 }
 
-/// A program of its own: what is compiled of this text, where it can be.
-fn compiled(compiler: &Compiler, build: &Build, name: &str, text: &str) -> Option<PathBuf> {
+/// Compiles this text as a separate program; `None` if that fails.
+fn compile(compiler: &Compiler, build: &Build, name: &str, text: &str) -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(build.name);
     std::fs::create_dir_all(&folder).expect("a folder can be made");
     let source = folder.join(name).with_extension("c");
@@ -360,12 +361,12 @@ fn compiled(compiler: &Compiler, build: &Build, name: &str, text: &str) -> Optio
     done.is_ok_and(|output| output.status.success()).then_some(program)
 }
 
-/// Whether a program ends well.
-fn ends_well(command: &mut Command) -> bool {
+/// True if a program exits successfully.
+fn succeeds(command: &mut Command) -> bool {
     command.output().is_ok_and(|output| output.status.success())
 }
 
-/// Writes beyond what it was given, and ends well where nobody looks.
+/// Writes out of bounds, and exits successfully without a sanitizer.
 const BEYOND: &str = "#include <stdlib.h>
 int main(int count, char **words) {
     char *two = (char *)malloc(2);
@@ -377,7 +378,7 @@ int main(int count, char **words) {
 }
 ";
 
-/// Adds what cannot be added.
+/// Overflows an addition.
 const OVERFLOW: &str = "int main(int count, char **words) {
     int most = 2147483647;
     (void)words;
@@ -385,7 +386,7 @@ const OVERFLOW: &str = "int main(int count, char **words) {
 }
 ";
 
-/// Loses what it was given.
+/// Leaks an allocation.
 const LEAK: &str = "#include <stdlib.h>
 int main(int count, char **words) {
     char *lost = (char *)malloc((size_t)count * 100);
@@ -397,10 +398,10 @@ int main(int count, char **words) {
 }
 ";
 
-/// Whether the compiler's address and undefined-behaviour sanitizers are there and work.
+/// True if the compiler's address and undefined-behavior sanitizers are installed and work.
 fn sanitizers_work(compiler: &Compiler) -> bool {
-    compiled(compiler, &SANITIZED, "nothing", "int main(void) { return 0; }\n")
-        .is_some_and(|program| ends_well(&mut Command::new(program)))
+    compile(compiler, &SANITIZED, "nothing", "int main(void) { return 0; }\n")
+        .is_some_and(|program| succeeds(&mut Command::new(program)))
 }
 
 #[test]
@@ -410,8 +411,8 @@ fn sanitizers_find_nothing() {
         return skip("the sanitizers, which no compiler here has");
     };
     for (name, fault) in [("beyond", BEYOND), ("overflow", OVERFLOW)] {
-        let planted = compiled(compiler, &SANITIZED, name, fault).expect("a program");
-        assert!(!ends_well(&mut Command::new(planted)), "{name} is not found");
+        let planted = compile(compiler, &SANITIZED, name, fault).expect("a program");
+        assert!(!succeeds(&mut Command::new(planted)), "{name} is not found");
     }
     let programs = sources("tests/c").into_iter();
     run_all(programs.map(|source| Command::new(compiler.build(&source, &SANITIZED))));
@@ -434,9 +435,9 @@ fn valgrind_finds_nothing() {
         valgrind
     };
     for (name, fault) in [("beyond", BEYOND), ("leak", LEAK)] {
-        let planted = compiled(compiler, &CHECKED, name, fault).expect("a program");
-        assert!(ends_well(&mut Command::new(&planted)), "{name} is no good program");
-        assert!(!ends_well(&mut checked(planted)), "{name} is not found");
+        let planted = compile(compiler, &CHECKED, name, fault).expect("a program");
+        assert!(succeeds(&mut Command::new(&planted)), "{name} is no good program");
+        assert!(!succeeds(&mut checked(planted)), "{name} is not found");
     }
     let programs = sources("tests/c").into_iter();
     run_all(programs.map(|source| checked(compiler.build(&source, &CHECKED))));

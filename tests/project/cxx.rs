@@ -1,5 +1,5 @@
-//! `include/sinew.hpp`: programs of `tests/cxx` and the example, built by each C++ compiler, run, also under sanitizers; and that it is
-//! not behind the C header.
+//! `include/sinew.hpp`: each C++ compiler builds the programs of `tests/cxx` and the example, which run, also under
+//! sanitizers. The header covers the whole C header.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -16,14 +16,14 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(root().join(path)).unwrap()
 }
 
-/// Every name that begins with `sinew_` and ends before one of these.
+/// Returns every name that begins with `sinew_` and ends before one of these characters.
 fn names(text: &str) -> BTreeSet<&str> {
     text.split(|letter: char| !(letter.is_ascii_alphanumeric() || letter == '_'))
         .filter(|word| word.starts_with("sinew_"))
         .collect()
 }
 
-fn built(compiler: &str, source: &Path, name: &str, options: &[&str]) -> PathBuf {
+fn build(compiler: &str, source: &Path, name: &str, options: &[&str]) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cxx").join(compiler);
     std::fs::create_dir_all(&folder).unwrap();
     let program = folder.join(name);
@@ -65,23 +65,23 @@ fn programs_build_and_run() {
             skip(&format!("{compiler}, which is not installed"));
             continue;
         }
-        run(&built(compiler, &root().join("tests/cxx/owners.cpp"), "owners", &[]));
+        run(&build(compiler, &root().join("tests/cxx/owners.cpp"), "owners", &[]));
         let without = root().join("tests/cxx/without_exceptions.cpp");
-        run(&built(compiler, &without, "without_exceptions", &["-fno-exceptions"]));
-        // In both languages it is the same world.
-        let c = built(
+        run(&build(compiler, &without, "without_exceptions", &["-fno-exceptions"]));
+        // Both languages produce the same world.
+        let c = build(
             compiler,
             &root().join("c_examples/quickstart.c"),
             "quickstart_c",
             &["-xc++"],
         );
-        let cpp = built(compiler, &root().join("c_examples/quickstart.cpp"), "quickstart", &[]);
+        let cpp = build(compiler, &root().join("c_examples/quickstart.cpp"), "quickstart", &[]);
         assert_eq!(run(&cpp), run(&c));
     }
 }
 
 #[test]
-fn nothing_is_lost_or_ended_twice() {
+fn nothing_is_leaked_or_destroyed_twice() {
     let options = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
     let probe = Path::new(env!("CARGO_TARGET_TMPDIR")).join("probe.cpp");
     std::fs::write(&probe, "int main() {}\n").unwrap();
@@ -95,7 +95,7 @@ fn nothing_is_lost_or_ended_twice() {
     if !sanitizes {
         return skip("sinew.hpp under sanitizers: no g++ that has them");
     }
-    run(&built(
+    run(&build(
         "g++",
         &root().join("tests/cxx/owners.cpp"),
         "owners_sanitized",
@@ -104,14 +104,14 @@ fn nothing_is_lost_or_ended_twice() {
 }
 
 #[test]
-fn it_is_not_behind_the_c_header() {
+fn it_covers_the_c_header() {
     let (c, cpp) = (read("include/sinew/sinew_all.h"), read("include/sinew.hpp"));
     let (functions, used): (BTreeSet<&str>, _) = (function_names(&c).collect(), names(&cpp));
     assert!(functions.len() > 100, "the functions are found");
     let missing: Vec<&str> = functions.difference(&used).copied().collect();
     assert!(missing.is_empty(), "sinew.hpp leaves to C: {missing:?}");
 
-    // What is declared and not defined is opaque: its owner destroys it.
+    // Types that are declared and not defined are opaque: their owner destroys them.
     let opaque: Vec<&str> = c
         .lines()
         .filter_map(|line| line.strip_prefix("typedef struct ")?.strip_suffix(';')?.split_once(' '))

@@ -1,5 +1,5 @@
-//! The library in other engines, by their FFI: each program of `c_examples/engines` runs where its engine is installed, judges for itself
-//! whether forces and places are right, and leaves a picture that shows something.
+//! The library in other engines, by their FFI. Each program of `c_examples/engines` runs if its engine is installed,
+//! checks forces and positions itself, and writes an image that is not blank.
 #![cfg(all(target_os = "linux", feature = "pictures"))]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -10,12 +10,12 @@ use std::sync::Mutex;
 
 use crate::support::{Library, root, skip, succeed};
 
-/// One engine at a time, each with the threads it likes.
+/// One engine at a time, since each uses several threads.
 static TURN: Mutex<()> = Mutex::new(());
 
-/// What an engine cannot do without, as the shell is asked for it.
+/// Returns the missing requirements of an engine, found by a shell.
 fn missing<'a>(needs: &[&'a str]) -> Vec<&'a str> {
-    let there = |need: &str| {
+    let is_available = |need: &str| {
         let probe = match need.split_once(".pc") {
             Some((package, _)) => format!("pkg-config --exists {package}"),
             None => format!("command -v {need}"),
@@ -26,10 +26,10 @@ fn missing<'a>(needs: &[&'a str]) -> Vec<&'a str> {
             .output()
             .is_ok_and(|output| output.status.success())
     };
-    needs.iter().copied().filter(|need| !there(need)).collect()
+    needs.iter().copied().filter(|need| !is_available(need)).collect()
 }
 
-/// Runs `make ENGINE`; what it said, or nothing where the engine is not here.
+/// Runs `make ENGINE`; returns its output, or `None` if the engine is not installed.
 fn run(engine: &str, needs: &[&str], settings: &[String]) -> Option<String> {
     let missing = missing(needs);
     if !missing.is_empty() {
@@ -59,8 +59,8 @@ fn pictures(engine: &str) -> PathBuf {
     folder
 }
 
-/// The picture is there, and no colour has nearly all of it: a black or an empty one would.
-fn shows_something(engine: &str, name: &str) {
+/// Checks that the image exists, and that no color covers nearly all of it, as in a black or empty one.
+fn check_not_blank(engine: &str, name: &str) {
     let path = pictures(engine).join(name);
     let file = std::fs::File::open(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
@@ -71,7 +71,7 @@ fn shows_something(engine: &str, name: &str) {
     assert!(frame.width >= 600 && frame.height >= 400, "{}", path.display());
     let mut counts = BTreeMap::new();
     for pixel in pixels.chunks_exact(frame.color_type.samples()) {
-        // Sixteen shades of each.
+        // Sixteen shades of each channel.
         *counts
             .entry([pixel[0] >> 4, pixel[1] >> 4, pixel[2] >> 4])
             .or_insert(0_usize) += 1;
@@ -80,7 +80,7 @@ fn shows_something(engine: &str, name: &str) {
     let most = counts.values().max().copied().unwrap_or(0);
     assert!(
         counts.len() > 20 && most < all * 9 / 10,
-        "{}: {} colours, {most} of {all} pixels of one",
+        "{}: {} colors, {most} of {all} pixels of one",
         path.display(),
         counts.len()
     );
@@ -92,11 +92,11 @@ fn begin(engine: &str) {
 
 #[test]
 #[ignore = "long"]
-fn love_draws_soft_blocks_by_luajit() {
+fn love_draws_soft_blocks_with_luajit() {
     begin("love");
     if let Some(said) = run("love", &["love", "xvfb-run", "xauth"], &["DISPLAY=".into()]) {
         assert!(said.contains("N carried"), "{said}");
-        shows_something("love", "love.png");
+        check_not_blank("love", "love.png");
     }
 }
 
@@ -106,7 +106,7 @@ fn mono_calls_it_as_unity_does() {
     begin("mono");
     if let Some(said) = run("mono", &["mcs", "mono"], &[]) {
         assert!(said.contains("floor"), "{said}");
-        shows_something("mono", "mono.png");
+        check_not_blank("mono", "mono.png");
     }
 }
 
@@ -116,7 +116,7 @@ fn a_ball_of_bullet_lies_in_a_sheet() {
     begin("bullet");
     if let Some(said) = run("bullet", &["bullet.pc", "c++"], &[]) {
         assert!(said.contains("momentum") && !said.contains("differ"), "{said}");
-        shows_something("bullet", "bullet.png");
+        check_not_blank("bullet", "bullet.png");
     }
 }
 
@@ -130,7 +130,7 @@ fn godot_lays_a_cloth_over_a_ball() {
         begin("godot");
         if let Some(said) = run("godot", needs, &[engine.trim().into()]) {
             assert!(said.contains("the ball bears"), "{said}");
-            shows_something("godot", "godot.png");
+            check_not_blank("godot", "godot.png");
         }
     }
 }

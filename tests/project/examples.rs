@@ -1,4 +1,4 @@
-//! The examples in Rust: each prints what its first lines say.
+//! The Rust examples: each prints the output stated in its first lines.
 
 use std::path::Path;
 
@@ -22,12 +22,15 @@ fn prints_what_it_says(name: &str) {
     let printed: Vec<&str> = output.lines().map(str::trim).collect();
     assert_eq!(printed.len(), expected.len(), "{name}: {output}");
     for (printed, expected) in printed.iter().zip(&expected) {
-        assert!(are_alike(printed, expected), "{name}: {printed}, not {expected}");
+        assert!(
+            are_equal_up_to_rounding(printed, expected),
+            "{name}: {printed}, not {expected}"
+        );
     }
 }
 
-/// Whether words are equal, and numbers differ by at most one of the last digit shown: processors round differently.
-fn are_alike(a: &str, b: &str) -> bool {
+/// True if words are equal and numbers differ by at most one unit of the last digit: processors round differently.
+fn are_equal_up_to_rounding(a: &str, b: &str) -> bool {
     let (a, b): (Vec<&str>, Vec<&str>) = (a.split_whitespace().collect(), b.split_whitespace().collect());
     a.len() == b.len()
         && a.iter()
@@ -43,11 +46,11 @@ fn are_alike(a: &str, b: &str) -> bool {
 
 #[test]
 fn numbers_may_differ_by_one_of_their_last_digit() {
-    assert!(are_alike("0.33 -176 of", "0.33 -177 of"));
-    assert!(!are_alike("0.33 -175", "0.33 -177"));
-    assert!(!are_alike("0.33", "0.35"));
-    assert!(!are_alike("1 of", "1 or"));
-    assert!(!are_alike("1", "1 1"));
+    assert!(are_equal_up_to_rounding("0.33 -176 of", "0.33 -177 of"));
+    assert!(!are_equal_up_to_rounding("0.33 -175", "0.33 -177"));
+    assert!(!are_equal_up_to_rounding("0.33", "0.35"));
+    assert!(!are_equal_up_to_rounding("1 of", "1 or"));
+    assert!(!are_equal_up_to_rounding("1", "1 1"));
 }
 
 #[test]

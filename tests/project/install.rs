@@ -1,5 +1,5 @@
-//! What `make install` leaves: C and C++ programs, by the header of each, built against the installed tree alone, with pkg-config and
-//! with CMake, shared and static, also after the tree has been moved; and what `uninstall` takes away.
+//! The results of `make install`: C and C++ programs are built with their headers against the installed tree only, with
+//! pkg-config and with CMake, shared and static, also after the tree has been moved. `uninstall` removes all of it.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -11,12 +11,12 @@ use crate::support::{Library, installed, root, skip, succeed};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The versions that the ABI is named by.
+/// Returns the versions that name the ABI.
 fn abi() -> &'static str {
     VERSION.rsplit_once('.').unwrap().0
 }
 
-/// An empty folder for one test.
+/// Creates an empty folder for one test.
 fn scratch(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("install").join(name);
     let _ = std::fs::remove_dir_all(&folder);
@@ -25,7 +25,7 @@ fn scratch(name: &str) -> PathBuf {
 }
 
 fn make(target: &str, settings: &[String]) {
-    // Once, whichever test is first: then make finds it there.
+    // Built once, by the first test: then make finds it there.
     Library::release();
     let target_folder = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
     succeed(
@@ -39,7 +39,8 @@ fn make(target: &str, settings: &[String]) {
     );
 }
 
-/// Installed, then moved to where it is used: the package knows no place. What is left behind has another name.
+/// Installs, then moves the tree to its final folder: the package must not contain its path. Leftovers have another
+/// name.
 fn moved_tree(name: &str, libdir: &str) -> PathBuf {
     let folder = scratch(name);
     make(
@@ -55,8 +56,8 @@ fn moved_tree(name: &str, libdir: &str) -> PathBuf {
     tree
 }
 
-/// A program that runs, says what the quickstart says, and needs the shared library or does not.
-fn runs(program: &Path, shared: bool) {
+/// Checks that a program runs, prints the quickstart's output, and links the shared library if `shared`.
+fn check_program(program: &Path, shared: bool) {
     let output = succeed(Command::new(program).env_remove("LD_LIBRARY_PATH"));
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(said.contains("force on the ball"), "{said}");
@@ -72,7 +73,7 @@ fn pkg_config_builds_c_and_cxx_shared_and_static() {
     if !installed("pkg-config") {
         return skip("programs built with pkg-config, which is not installed");
     }
-    // Nested, as Debian does.
+    // Nested, as on Debian.
     let tree = moved_tree("pkg_config", "lib/of/this/machine");
     let lib = tree.join("lib/of/this/machine");
     let ask = |arguments: &[&str]| {
@@ -102,10 +103,10 @@ fn pkg_config_builds_c_and_cxx_shared_and_static() {
                     .args(ask(&["--cflags", "--libs", package]))
                     .arg(format!("-Wl,-rpath,{}", lib.display())),
             );
-            runs(&program, shared);
+            check_program(&program, shared);
         }
     }
-    // Nothing is missing of what the compiler says that the static library needs.
+    // All libraries that the compiler reports for the static library are listed.
     let private = ask(&["--static", "--libs", "sinew"]);
     for library in &Library::release().native_libraries {
         assert!(
@@ -169,17 +170,17 @@ fn cmake_builds_c_and_cxx_shared_and_static() {
     );
     succeed(Command::new("cmake").arg("--build").arg(&build));
     for language in ["c", "cpp"] {
-        runs(&build.join(format!("{language}-sinew")), true);
-        runs(&build.join(format!("{language}-static")), false);
+        check_program(&build.join(format!("{language}-sinew")), true);
+        check_program(&build.join(format!("{language}-static")), false);
     }
-    // A part of the package that is missing is told of when it is looked for, not by the linker.
+    // A missing part of the package is reported when it is searched for, not by the linker.
     std::fs::remove_file(tree.join("lib/libsinew.a")).unwrap();
     let output = Command::new("cmake").arg(&build).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(!output.status.success() && said.contains("libsinew.a"), "{said}");
 }
 
-/// All files and links below a folder.
+/// Returns all files and links below a folder.
 fn files(folder: &Path) -> BTreeSet<PathBuf> {
     let mut found = BTreeSet::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -195,8 +196,8 @@ fn files(folder: &Path) -> BTreeSet<PathBuf> {
 
 #[test]
 #[ignore = "long"]
-fn uninstall_takes_away_what_install_brought_and_no_more() {
-    // A name that shells would take apart.
+fn uninstall_removes_exactly_the_installed_files() {
+    // A name with a space, which unquoted shell code would split.
     let prefix = scratch("un install");
     let settings = [format!("PREFIX={}", prefix.display())];
     let others = [prefix.join("lib/libother.so"), prefix.join("include/other.h")];
@@ -224,9 +225,9 @@ fn uninstall_takes_away_what_install_brought_and_no_more() {
             .extension()
             .is_some_and(|extension| extension == "pc" || extension == "cmake");
         if plain {
-            let (text, place) = (text(&path), prefix.to_str().unwrap());
+            let (text, prefix_text) = (text(&path), prefix.to_str().unwrap());
             let unfilled = text.split('@').count() > 2;
-            assert!(!text.contains(place) && !unfilled, "{}:\n{text}", path.display());
+            assert!(!text.contains(prefix_text) && !unfilled, "{}:\n{text}", path.display());
         }
     }
     make("uninstall", &settings);
@@ -235,9 +236,9 @@ fn uninstall_takes_away_what_install_brought_and_no_more() {
 }
 
 #[test]
-fn the_makefile_and_the_manifest_name_the_library_alike() {
+fn the_makefile_and_the_manifest_agree_on_the_library_name() {
     let manifest = std::fs::read_to_string(root().join("Cargo.toml")).unwrap();
-    // cargo-c takes as many parts of the version as build.rs.
+    // cargo-c uses as many components of the version as build.rs.
     let components = abi().split('.').count();
     assert!(manifest.contains(&format!("version_suffix_components = {components}")));
     let headers = std::fs::read_dir(root().join("include")).unwrap();

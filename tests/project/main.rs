@@ -1,4 +1,5 @@
-//! The project around the library: header and bindings, C and C++ programs, packages, documents, and the layers of the source.
+//! The project around the library: header and bindings, C and C++ programs, packages, documents, and the layers of the
+//! source.
 
 #[path = "../support/mod.rs"]
 mod support;

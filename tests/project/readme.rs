@@ -1,4 +1,4 @@
-//! The documents: programs in them are built and run, links lead to what there is, and the short ones stay short.
+//! The documents: programs in them are built and run, links have valid targets, and the short documents stay short.
 
 use std::collections::HashMap;
 use std::fs;
@@ -11,7 +11,7 @@ fn read(path: impl AsRef<Path>) -> String {
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// All documents, by their paths within the crate: those beside the README and those in `docs`.
+/// Returns all documents by their paths within the crate: those beside the README and those in `docs`.
 fn documents() -> Vec<PathBuf> {
     let mut folders = vec![PathBuf::from("docs")];
     let mut found: Vec<PathBuf> = files(Path::new("")).filter(|path| is_document(path)).collect();
@@ -36,7 +36,7 @@ fn is_document(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "md")
 }
 
-/// A document without its blocks of code.
+/// Returns a document without its code blocks.
 fn prose(text: &str) -> String {
     let mut in_code = false;
     let is_prose = |line: &&str| {
@@ -47,7 +47,7 @@ fn prose(text: &str) -> String {
     text.lines().filter(is_prose).flat_map(|line| [line, "\n"]).collect()
 }
 
-/// The targets of `[text](target)`. Code within a line is left out.
+/// Returns the targets of `[text](target)`, without inline code.
 fn links(text: &str) -> Vec<String> {
     let text: String = prose(text).split('`').step_by(2).collect();
     let targets = text.split("](").skip(1);
@@ -56,7 +56,7 @@ fn links(text: &str) -> Vec<String> {
         .collect()
 }
 
-/// The anchors of a document's headings, as hosts of repositories make them.
+/// Returns the anchors of a document's headings, as repository hosts generate them.
 fn anchors(text: &str) -> Vec<String> {
     let mut seen: HashMap<String, usize> = HashMap::new();
     let headings = prose(text);
@@ -77,7 +77,7 @@ fn anchors(text: &str) -> Vec<String> {
         .collect()
 }
 
-/// A path within the crate; none where it leads out of it.
+/// Returns a path within the crate, or `None` if it leads outside.
 fn within(path: &Path) -> Option<PathBuf> {
     let mut plain = PathBuf::new();
     for part in path.components() {
@@ -90,7 +90,7 @@ fn within(path: &Path) -> Option<PathBuf> {
     Some(plain)
 }
 
-/// The links of a document that lead nowhere.
+/// Returns the broken links of a document.
 fn broken_links(document: &Path, text: &str) -> Vec<String> {
     let is_broken = |link: &String| {
         if link.starts_with("https://") || link.starts_with("http://") {
@@ -110,7 +110,7 @@ fn broken_links(document: &Path, text: &str) -> Vec<String> {
     links(text).into_iter().filter(is_broken).collect()
 }
 
-/// The blocks of a language.
+/// Returns the code blocks of a language.
 fn code<'a>(text: &'a str, language: &str) -> Vec<&'a str> {
     let fence = format!("```{language}\n");
     let blocks = text.split(&fence).skip(1);
@@ -130,7 +130,7 @@ fn the_smallest_program_is_the_one_that_runs() {
 }
 
 #[test]
-fn what_else_the_documents_show_is_part_of_programs_that_run() {
+fn other_snippets_are_parts_of_programs_that_run() {
     let programs: String = ["c_examples", "c_examples/lessons", "tests/c"]
         .iter()
         .flat_map(|folder| files(Path::new(folder)))
@@ -221,7 +221,7 @@ fn the_book_has_every_page() {
     }
 }
 
-/// Links of the packaged README lead to files that are packaged too.
+/// Links of the packaged README lead to packaged files.
 #[test]
 fn the_package_has_the_documents() {
     let manifest = read("Cargo.toml");
@@ -241,7 +241,7 @@ fn the_package_has_the_documents() {
 }
 
 #[test]
-fn what_is_read_first_stays_short() {
+fn the_first_documents_stay_short() {
     let readme = read("README.md");
     assert!(
         readme.lines().count() <= 180,

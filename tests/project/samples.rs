@@ -1,4 +1,4 @@
-//! The samples program, unseen: every scene runs and is drawn, and the pointer pulls, presses and cuts.
+//! The samples program without a window: every scene runs and is drawn, and the pointer pulls, presses and cuts.
 #![cfg(all(target_os = "linux", feature = "pictures"))]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -9,7 +9,7 @@ use std::sync::{Mutex, OnceLock};
 
 use crate::support::{Library, root, skip, succeed};
 
-/// The program, built once; nothing where SDL2, OpenGL or a virtual display is missing.
+/// Returns the program, built once; `None` if SDL2, OpenGL or a virtual display is missing.
 fn program() -> Option<&'static Path> {
     static PROGRAM: OnceLock<Option<PathBuf>> = OnceLock::new();
     PROGRAM.get_or_init(build).as_deref()
@@ -41,7 +41,7 @@ fn build() -> Option<PathBuf> {
 /// One virtual display at a time: `xvfb-run -a` is not safe against another one that starts at the same moment.
 static TURN: Mutex<()> = Mutex::new(());
 
-/// Plays a scene for some frames; what the program printed, and its last picture.
+/// Plays a scene for several frames; returns its output and its last image.
 fn play(program: &Path, scene: &str, frames: u32, pointer: &str) -> (String, PathBuf) {
     let _turn = TURN.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("samples");
@@ -62,7 +62,7 @@ fn play(program: &Path, scene: &str, frames: u32, pointer: &str) -> (String, Pat
     (String::from_utf8_lossy(&output.stdout).into_owned(), folder.join(name))
 }
 
-/// All numbers of a line that begins so.
+/// Returns all numbers of a line that begins with this text.
 fn numbers(printed: &str, begins: &str) -> Vec<f64> {
     let line = printed.lines().find(|line| line.starts_with(begins));
     let line = line.unwrap_or_else(|| panic!("no line {begins}: {printed}"));
@@ -70,8 +70,8 @@ fn numbers(printed: &str, begins: &str) -> Vec<f64> {
     words.filter_map(|word| word.parse().ok()).collect()
 }
 
-/// Tissue, which is the only thing with strong colors, covers part of the picture, and not its corner.
-fn shows_something(path: &Path) {
+/// Checks that tissue, which alone has saturated colors, covers part of the image, and not its corner.
+fn check_not_blank(path: &Path) {
     let mut decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()));
     decoder.set_transformations(png::Transformations::normalize_to_color8());
     let mut reader = decoder.read_info().unwrap();
@@ -107,7 +107,7 @@ fn every_scene_runs_and_is_drawn() {
     for scene in scenes {
         let (printed, picture) = play(program, scene, 60, "");
         assert!(!printed.contains("refused"), "{printed}");
-        shows_something(&picture);
+        check_not_blank(&picture);
     }
 }
 
@@ -120,7 +120,8 @@ fn the_pointer_pulls_tissue_along() {
         let [moved, nearest, force] = numbers(&printed, "pointer")[..] else {
             panic!("{printed}")
         };
-        // Half an edge of a triangle at most: 11 mm of the organ, 10 mm of the cloth, 24 mm of the blocks' diagonals.
+        // Half a triangle edge at most: 11 mm for the organ, 10 mm for the cloth, 24 mm for the diagonals of the
+        // blocks.
         assert!(moved > 20.0 && nearest < 12.0 && force > 0.01, "{printed}");
     }
 }
@@ -134,7 +135,7 @@ fn the_pointer_presses_with_a_ball_that_stays_outside() {
         let [moved, nearest, force] = numbers(&printed, "pointer")[..] else {
             panic!("{printed}")
         };
-        // It goes in by 18 mm at most, and no node enters the ball, whose radius is 12 mm.
+        // It penetrates by at most 18 mm, and no node enters the ball, whose radius is 12 mm.
         assert!(moved > 10.0 && (11.9..20.0).contains(&nearest), "{printed}");
         assert!(force > 0.1, "{printed}");
     }
@@ -155,7 +156,7 @@ fn the_pointer_cuts() {
         );
         assert!(!printed.contains("refused"), "{printed}");
         if scene != "balloon" {
-            shows_something(&picture); // the balloon is below its weight
+            check_not_blank(&picture); // the balloon is below its weight
         }
     }
 }

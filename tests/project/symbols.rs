@@ -1,4 +1,4 @@
-//! What the shared library shows to a linker: exactly the functions of the header, under its versioned name.
+//! The exported symbols of the shared library: exactly the functions of the header, under its versioned name.
 #![cfg(target_os = "linux")]
 
 use std::collections::BTreeSet;
@@ -21,7 +21,7 @@ fn exported() -> BTreeSet<String> {
 }
 
 #[test]
-fn the_exported_symbols_are_the_headers_functions() {
+fn the_exported_symbols_are_the_functions_of_the_header() {
     if !installed("nm") {
         return skip("the exported symbols: nm is not installed");
     }
@@ -42,7 +42,7 @@ fn the_exported_symbols_are_the_headers_functions() {
 }
 
 #[test]
-fn the_shared_library_is_called_by_its_version() {
+fn the_shared_library_is_named_by_its_version() {
     if !installed("readelf") {
         return skip("the soname: readelf is not installed");
     }
@@ -62,13 +62,14 @@ fn the_shared_library_is_called_by_its_version() {
 }
 
 #[test]
-fn no_arithmetic_of_a_kernel_is_a_function_of_its_own() {
+fn kernel_arithmetic_is_inlined() {
     if !installed("nm") {
         return skip("the functions of kernels: nm is not installed");
     }
     let output = succeed(Command::new("nm").arg(Library::get().shared()));
     let symbols = String::from_utf8_lossy(&output.stdout);
-    // Called one by one springs take ten times as long. The library is built here with as little between its parts as in a program of someone else's.
+    // Calling them once per spring takes ten times as long. The library is built here with as little inlining between
+    // crates as in a user's program.
     let has = |name: &str| symbols.lines().any(|line| line.contains(name));
     assert!(
         has("run_avx512") || cfg!(not(target_arch = "x86_64")),

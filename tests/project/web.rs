@@ -1,4 +1,5 @@
-//! The samples as a page (`make web`): the same bits as natively, without a browser; and in one, that is driven by pointer events.
+//! The samples as a web page (`make web`): bitwise identical to the native build without a browser, and driven by
+//! pointer events in one.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -10,15 +11,15 @@ use crate::support::{Library, installed, report_folder, root, skip, succeed};
 
 const TARGET: &str = "wasm32-unknown-unknown";
 
-/// A node that has WebAssembly's SIMD.
+/// The first version of node with WebAssembly SIMD.
 const NODE: u32 = 16;
 
 fn folder() -> &'static Path {
     Path::new(env!("CARGO_TARGET_TMPDIR"))
 }
 
-/// What a command prints first.
-fn said(program: &str, arguments: &[&str]) -> Option<String> {
+/// Returns a command's output, or `None` if it fails.
+fn output_of(program: &str, arguments: &[&str]) -> Option<String> {
     let output = Command::new(program).args(arguments).output().ok()?;
     output
         .status
@@ -26,21 +27,21 @@ fn said(program: &str, arguments: &[&str]) -> Option<String> {
         .then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
-/// The page, built once; nothing where a tool is missing.
+/// Returns the page, built once; `None` if a tool is missing.
 fn page() -> Option<&'static Path> {
     static PAGE: OnceLock<Option<PathBuf>> = OnceLock::new();
     PAGE.get_or_init(build).as_deref()
 }
 
 fn build() -> Option<PathBuf> {
-    let libraries = said("rustc", &["--print", "target-libdir", "--target", TARGET]);
-    let node = said("node", &["--version"])
+    let libraries = output_of("rustc", &["--print", "target-libdir", "--target", TARGET]);
+    let node = output_of("node", &["--version"])
         .and_then(|version| version.trim_start_matches('v').split('.').next()?.parse().ok());
     let missing = [
         ("make", installed("make")),
         (
             "clang",
-            said("clang", &["--print-targets"]).is_some_and(|targets| targets.contains("wasm32")),
+            output_of("clang", &["--print-targets"]).is_some_and(|targets| targets.contains("wasm32")),
         ),
         (TARGET, libraries.is_some_and(|folder| Path::new(&folder).is_dir())),
         ("node 16", node.is_some_and(|version: u32| version >= NODE)),
@@ -65,7 +66,7 @@ fn build() -> Option<PathBuf> {
     Some(target.join("web"))
 }
 
-/// The sources of the scenes.
+/// Returns the sources of the scenes.
 fn scenes() -> Vec<PathBuf> {
     let samples = std::fs::read_dir(root().join("c_examples/samples")).unwrap();
     let is_scene = |name: &str| name.starts_with("scene") || name == "pointer.c";
@@ -79,7 +80,7 @@ fn scenes() -> Vec<PathBuf> {
     scenes
 }
 
-/// The hash after each of so many frames of every scene, with the portable kernel and no browser.
+/// Returns the hash after each of these frames of every scene, with the portable kernel and no browser.
 fn native_hashes(frames: &str) -> String {
     let library = Library::release();
     let program = folder().join("web_native");
@@ -114,7 +115,7 @@ fn native_hashes(frames: &str) -> String {
 
 #[test]
 #[ignore = "long"]
-fn every_scene_gives_the_bits_of_the_portable_kernel() {
+fn every_scene_is_bitwise_that_of_the_portable_kernel() {
     let Some(page) = page() else { return };
     const FRAMES: &str = "60";
     let output = succeed(
@@ -136,7 +137,7 @@ fn every_scene_gives_the_bits_of_the_portable_kernel() {
 
 #[test]
 #[ignore = "long"]
-fn the_page_is_small_enough_to_be_sent() {
+fn the_page_is_small_enough_to_download() {
     let Some(page) = page() else { return };
     let files = std::fs::read_dir(page)
         .unwrap()
@@ -174,14 +175,14 @@ fn a_browser_drags_and_cuts() {
             .unwrap_or_else(|| panic!("{name}: {report}"));
         rest.split([',', '}']).next().unwrap().parse().unwrap()
     };
-    // m: the pointer went 8 % of the canvas each way; what it holds is on its ray but for the rounding of single precision, and tissue
-    // is no further from it than nodes are from each other.
+    // m: the pointer moved by 8 % of the canvas in x and y. The held point lies on the pointer's ray up to
+    // single-precision rounding, and the tissue is within a node distance of it.
     assert!(
         value("moved") > 0.02 && value("off") < 1e-6 && value("nearest") < 0.011,
         "{report}"
     );
     assert!(value("after") > value("before"), "{report}");
-    // Shades of a lit surface; a blank picture has one.
+    // Shades of a lit surface; a blank image has one.
     assert!(value("colors") > 500.0, "{report}");
     assert!(std::fs::metadata(&picture).unwrap().len() > 10_000);
 }

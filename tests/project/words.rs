@@ -1,10 +1,10 @@
-//! The standard term for each concept: phrases that once stood for one do not come back into documents, headers and
-//! examples. The glossary in docs/guide/glossary.md has the terms.
+//! The standard term for each concept: replaced phrases must not return to documents, headers and examples. The
+//! glossary in docs/guide/glossary.md has the terms.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What not to write, and what to write instead.
+/// The phrases to avoid, and their replacements.
 const REPLACED: [(&str, &str); 30] = [
     ("in a row", "in series"),
     ("hang together", "are connected"),
@@ -41,7 +41,7 @@ const REPLACED: [(&str, &str); 30] = [
 const FOLDERS: [&str; 4] = ["docs", "include", "c_examples", "packaging"];
 const ENDINGS: [&str; 5] = ["md", "h", "hpp", "c", "cpp"];
 
-/// The texts below a folder.
+/// Collects the texts below a folder.
 fn texts(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("a file").path();
@@ -54,7 +54,7 @@ fn texts(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The lines of a text with a phrase that has a standard term.
+/// Returns the lines of a text that contain a replaced phrase.
 fn faults(name: &str, text: &str) -> Vec<String> {
     let mut found = Vec::new();
     for (number, line) in text.lines().enumerate() {

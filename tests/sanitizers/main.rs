@@ -1,4 +1,4 @@
-//! What `.ci/abuse` runs under the compiler's sanitizers alone; without their flags there is nothing in it.
+//! Tests that `.ci/abuse` runs under the compiler's sanitizers only; without their flags this program is empty.
 
 #[cfg(races)]
 mod races;

@@ -1,4 +1,5 @@
-//! What the thread sanitizer is for, which `.ci/abuse` has look at tests with threads: this has to end the program.
+//! Checks that the thread sanitizer, under which `.ci/abuse` runs the tests with threads, detects a data race: this
+//! test must end the program.
 #![allow(unsafe_code)]
 
 use std::cell::UnsafeCell;

@@ -1,6 +1,7 @@
-//! A tick, and a step of one thread, call nothing that may block: under RTSan, which ends the program where one does.
+//! A tick, and a step of one thread, call nothing that may block: RTSan ends the program at a blocking call.
 //!
-//! `RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=realtime --cfg realtime" cargo test --target x86_64-unknown-linux-gnu --test sanitizers`
+//! `RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=realtime --cfg realtime" cargo test --target x86_64-unknown-linux-gnu
+//! --test sanitizers`
 #![allow(unsafe_code)]
 
 use glam::Vec3;
@@ -12,7 +13,7 @@ unsafe extern "C" {
     fn __rtsan_realtime_exit();
 }
 
-/// Calls what must not block.
+/// Calls a function that must not block.
 fn nonblocking<T>(call: impl FnOnce() -> T) -> T {
     // SAFETY: they count, for this thread, in the sanitizer that the program is built with.
     unsafe { __rtsan_realtime_enter() };
@@ -65,7 +66,7 @@ fn a_hand_and_its_world_never_block() {
     }
 }
 
-/// What the sanitizer is for: this one has to fail.
+/// Checks the sanitizer itself: this test must fail.
 #[test]
 #[ignore = "ends the program"]
 fn an_allocation_is_found() {

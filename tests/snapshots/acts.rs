@@ -1,4 +1,4 @@
-//! A caller that does everything, the same in several worlds, which must answer the same.
+//! A caller that uses the whole API, identically in several worlds, which must return the same results.
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -49,13 +49,13 @@ impl Random {
     }
 }
 
-/// What it has made, and how often it did what with success.
+/// The objects it has created, and the number of successes of each action.
 pub struct Caller {
     pub random: Random,
     pub done: BTreeMap<&'static str, usize>,
-    /// Has so many requests for memory be met and no more; `None`: all.
+    /// Lets this many allocations succeed and the others fail; `None`: all succeed.
     pub scarce: Option<fn(Option<usize>)>,
-    /// How many calls have failed for it.
+    /// The number of failed calls.
     pub failed: usize,
     bodies: Vec<BodyId>,
     tools: Vec<ToolId>,
@@ -64,18 +64,18 @@ pub struct Caller {
     blades: Vec<BladeId>,
 }
 
-/// What all worlds answer.
-fn asked<T: Debug>(worlds: &mut [World], ask: impl Fn(&mut World) -> T) -> T {
+/// Returns the common result of all worlds.
+fn agreed_result<T: Debug>(worlds: &mut [World], ask: impl Fn(&mut World) -> T) -> T {
     let mut answers: Vec<T> = worlds.iter_mut().map(ask).collect();
     let first = answers.remove(0);
-    let said = format!("{first:?}");
+    let first_text = format!("{first:?}");
     for answer in answers {
-        assert_eq!(said, format!("{answer:?}"));
+        assert_eq!(first_text, format!("{answer:?}"));
     }
     first
 }
 
-/// Square metres of tissue in the plane, or a block of it.
+/// Returns a square meter of tissue in the plane, or a block of it.
 fn mesh(random: &mut Random) -> Mesh {
     let cells = [0; 3].map(|_| 2 + random.below(2) as u32);
     match random.below(3) {
@@ -100,11 +100,12 @@ impl Caller {
         }
     }
 
-    /// What all worlds answer that something is done to. Where memory may be made scarce the first is asked with too little of it at first, which changes
-    /// nothing, but for what is refused anyway: saying why takes memory.
+    /// Returns the common result of an action in all worlds. If allocations can fail, the first world is first called
+    /// with too few of them, which must change nothing. Calls that are refused anyway are not tested this way: their
+    /// error messages need memory.
     fn call<T: Debug>(&mut self, worlds: &mut [World], act: impl Fn(&mut World) -> Result<T>) -> Result<T> {
         let Some(scarce) = self.scarce else {
-            return asked(worlds, act);
+            return agreed_result(worlds, act);
         };
         let [world] = worlds else {
             unreachable!("memory is made scarce for one world alone");
@@ -116,39 +117,39 @@ impl Caller {
             return act(world);
         }
         let hash = world.state_hash();
-        // In a copy each time, and then in one world, which keeps what room it was given before and so asks for less.
+        // First in a fresh copy each time, then in the same world, which keeps earlier allocations and so needs fewer.
         for is_copied in [true, false] {
             for requests in 0.. {
                 let mut copy;
-                let asked = if is_copied {
+                let target = if is_copied {
                     copy = World::load(&bytes, 1, None).expect("a world");
                     &mut copy
                 } else {
                     &mut *world
                 };
                 scarce(Some(requests));
-                let answer = act(asked);
+                let answer = act(target);
                 scarce(None);
                 if !matches!(answer, Err(Error::OutOfMemory)) {
                     assert_eq!(format!("{answer:?}"), format!("{expected:?}"));
-                    assert_eq!(asked.state_hash(), twin.state_hash());
+                    assert_eq!(target.state_hash(), twin.state_hash());
                     if is_copied {
                         break;
                     }
                     return answer;
                 }
-                assert_eq!(asked.state_hash(), hash, "request {requests}");
+                assert_eq!(target.state_hash(), hash, "request {requests}");
                 self.failed += 1;
             }
         }
         unreachable!("memory is enough at some time")
     }
 
-    fn did<T>(&mut self, what: &'static str, answer: &Result<T>) {
+    fn record<T>(&mut self, what: &'static str, answer: &Result<T>) {
         *self.done.entry(what).or_default() += usize::from(answer.is_ok());
     }
 
-    /// Does one thing.
+    /// Performs one action.
     pub fn act(&mut self, worlds: &mut [World]) {
         if self.bodies.len() < 2 {
             return self.make_body(worlds);
@@ -158,57 +159,57 @@ impl Caller {
             0 if self.random.one_in(3) => {
                 let body = self.bodies.swap_remove(self.random.below(self.bodies.len()));
                 let answer = self.call(worlds, |world| world.destroy_body(body));
-                self.did("a body destroyed", &answer);
+                self.record("a body destroyed", &answer);
             }
             1 if self.tools.len() < 3 => self.make_tool(worlds),
             1 | 2 if !self.tools.is_empty() => {
                 let tool = self.random.of(&self.tools);
-                // Slowly: what is torn about meets everything, which takes long.
-                let (way, turn) = (self.random.vector(0.003), self.random.between(-0.1, 0.1));
+                // Slowly: fast bodies collide with everything, which takes long.
+                let (displacement, turn) = (self.random.vector(0.003), self.random.between(-0.1, 0.1));
                 let answer = self.call(worlds, |world| {
                     let pose = world.tool_target(tool)?;
                     let turned = pose.orientation * Quat::from_rotation_z(turn);
-                    world.set_pose(tool, pose.position + way, Some(turned))
+                    world.set_pose(tool, pose.position + displacement, Some(turned))
                 });
-                self.did("a pose", &answer);
+                self.record("a pose", &answer);
             }
             3 if !self.tools.is_empty() && self.random.one_in(4) => {
                 let tool = self.tools.swap_remove(self.random.below(self.tools.len()));
                 let answer = self.call(worlds, |world| world.destroy_tool(tool));
-                self.did("a tool destroyed", &answer);
+                self.record("a tool destroyed", &answer);
             }
             4 | 5 => self.cut(worlds),
             6 if self.blades.is_empty() => {
                 let mut definition = BladeDefinition::new([Vec3::ZERO, vec3(0.0, 0.06, 0.0)]);
                 definition.pose.position = self.random.vector(0.1);
                 let answer = self.call(worlds, |world| world.create_blade(&definition));
-                self.did("a blade", &answer);
+                self.record("a blade", &answer);
                 self.blades.extend(answer);
             }
             6 | 7 if !self.blades.is_empty() => {
                 let (place, blade) = (self.random.vector(0.05), self.blades[0]);
                 let answer = self.call(worlds, |world| world.set_blade_pose(blade, place, None));
-                self.did("a blade led", &answer);
+                self.record("a blade led", &answer);
             }
             8 | 9 => self.attach(worlds),
-            10 => self.sew(worlds),
+            10 => self.attach_suture(worlds),
             11 => {
                 if let Some(attachment) = self.attachments.pop() {
                     let answer = self.call(worlds, |world| world.release(attachment));
-                    self.did("a release", &answer);
+                    self.record("a release", &answer);
                 }
             }
             12 => {
                 if let Some(&suture) = self.sutures.last() {
                     let length = self.random.between(0.0, 0.05);
                     let answer = self.call(worlds, |world| world.set_suture_length(suture, length));
-                    self.did("a suture drawn", &answer);
+                    self.record("a suture drawn", &answer);
                 }
             }
             13 => {
                 let gravity = self.random.vector(9.81);
                 let answer = self.call(worlds, |world| world.set_gravity(gravity));
-                self.did("gravity", &answer);
+                self.record("gravity", &answer);
             }
             _ => self.change_body(worlds),
         }
@@ -300,7 +301,7 @@ impl Caller {
             },
             ..BodyDefinition::default()
         };
-        // Much cannot go together: then as much as does is left.
+        // Many settings conflict: then the remainder is used.
         let plain = BodyDefinition {
             viscosity: Viscosity::default(),
             yielding: Yielding::default(),
@@ -326,17 +327,17 @@ impl Caller {
             ("a plain body", plainest),
         ] {
             let answer = self.call(worlds, |world| world.create_body(&definition));
-            self.did(what, &answer);
+            self.record(what, &answer);
             if let Ok(body) = answer {
                 if definition
                     .material
                     .is_some_and(|material| material.model != Model::Springs)
                 {
-                    self.did("elements", &Ok(()));
+                    self.record("elements", &Ok(()));
                 }
                 self.bodies.push(body);
                 for node in [0, 1] {
-                    asked(worlds, |world| world.body_mut(body)?.pin(node)).expect("a pin");
+                    agreed_result(worlds, |world| world.body_mut(body)?.pin(node)).expect("a pin");
                 }
                 return;
             }
@@ -346,7 +347,7 @@ impl Caller {
     fn make_tool(&mut self, worlds: &mut [World]) {
         let random = &mut self.random;
         let mesh = Mesh::block([0.02, 0.05, 0.02], [1, 2, 1]).expect("a mesh");
-        // What tools share of meshes comes from the standard library's `Arc`, which has no way to fail.
+        // Tools share meshes by the standard library's `Arc`, whose allocation cannot fail gracefully.
         let is_scarce = self.scarce.is_some();
         let shape = match random.below(if is_scarce { 3 } else { 4 }) {
             0 => Shape::Sphere { radius: 0.015 },
@@ -383,7 +384,7 @@ impl Caller {
         };
         for definition in [definition, plain] {
             let answer = self.call(worlds, |world| world.create_tool(&definition));
-            self.did("a tool", &answer);
+            self.record("a tool", &answer);
             if let Ok(tool) = answer {
                 self.tools.push(tool);
                 return;
@@ -395,14 +396,14 @@ impl Caller {
         let (body, random) = (self.random.of(&self.bodies), &mut self.random);
         let places = worlds[0].body(body).expect("a body").positions();
         let middle = places.iter().copied().sum::<Vec3>() / places.len() as f32;
-        let (along, way) = (vec3(0.0, random.between(0.03, 0.1), 0.03), random.vector(0.06));
+        let (along, displacement) = (vec3(0.0, random.between(0.03, 0.1), 0.03), random.vector(0.06));
         let from = middle - 0.5 * along + random.vector(0.03);
         let sweep = Sweep {
             start: [from, from + along],
-            end: [from + way, from + along + way],
+            end: [from + displacement, from + along + displacement],
         };
         let answer = self.call(worlds, |world| world.cut(body, &sweep));
-        self.did("a cut", &answer);
+        self.record("a cut", &answer);
     }
 
     fn node(&mut self, world: &World, body: BodyId) -> u32 {
@@ -432,15 +433,15 @@ impl Caller {
             let other = self.random.of(&self.bodies);
             let anchors = [self.anchor(&worlds[0], body)];
             let others = [self.anchor(&worlds[0], other)];
-            asked(worlds, |world| {
+            agreed_result(worlds, |world| {
                 world.attach_to_body(body, &anchors, other, &others, limit)
             })
         };
-        self.did("an attachment", &answer);
+        self.record("an attachment", &answer);
         self.attachments.extend(answer.into_iter().flatten());
     }
 
-    fn sew(&mut self, worlds: &mut [World]) {
+    fn attach_suture(&mut self, worlds: &mut [World]) {
         let [body, other] = [0; 2].map(|_| self.random.of(&self.bodies));
         let anchors = [self.anchor(&worlds[0], body), self.anchor(&worlds[0], other)];
         let definition = SutureDefinition {
@@ -451,7 +452,7 @@ impl Caller {
         let answer = self.call(worlds, |world| {
             world.suture(body, &anchors[0], other, &anchors[1], &definition)
         });
-        self.did("a suture", &answer);
+        self.record("a suture", &answer);
         self.sutures.extend(answer);
     }
 
@@ -514,20 +515,20 @@ impl Caller {
             "a filter",
             "a force",
         ];
-        self.did(KINDS[kind], &answer);
+        self.record(KINDS[kind], &answer);
         if self.random.one_in(40) {
             let answer = self.call(worlds, |world| {
                 world.rest_state(id, &RestStateDefinition::default()).map(|_| ())
             });
-            self.did("a state of rest", &answer);
+            self.record("a state of rest", &answer);
         }
     }
 
-    /// Steps, and compares all that can be read.
+    /// Steps, and compares all readable state.
     pub fn step(&mut self, worlds: &mut [World]) {
         let dt = self.random.of(&[1e-3, 2e-3]);
         if let Some(scarce) = self.scarce {
-            // What would be cut or torn is left for another time: a step does not fail for it.
+            // Cuts and tears are left out here: they do not fail a step.
             let (world, requests) = (&mut worlds[0], self.random.below(10));
             let hash = world.state_hash();
             scarce(Some(requests));
@@ -535,11 +536,11 @@ impl Caller {
             scarce(None);
             assert!(answer.is_ok() || world.state_hash() == hash, "{answer:?}");
         }
-        let answer = asked(worlds, |world| world.step(dt));
-        self.did("a step", &answer);
-        asked(worlds, |world| world.state_hash());
+        let answer = agreed_result(worlds, |world| world.step(dt));
+        self.record("a step", &answer);
+        agreed_result(worlds, |world| world.state_hash());
         for &id in &self.bodies {
-            asked(worlds, |world| {
+            agreed_result(worlds, |world| {
                 let body = world.body(id).expect("a body");
                 let bits = |vectors: &[Vec3]| -> Vec<[u32; 3]> {
                     vectors
@@ -555,7 +556,7 @@ impl Caller {
                 );
                 xxhash(&format!("{read:?}"))
             });
-            asked(worlds, |world| {
+            agreed_result(worlds, |world| {
                 let gravity = world.gravity();
                 let body = world.body(id).expect("a body");
                 let changes = format!("{:?}", body.changes_since(0));
@@ -576,7 +577,7 @@ impl Caller {
             });
         }
         for &tool in &self.tools {
-            asked(worlds, |world| {
+            agreed_result(worlds, |world| {
                 let contacts: Vec<_> = world.contacts(tool).expect("a tool").collect();
                 format!(
                     "{:?} {:?} {:?} {contacts:?}",
@@ -587,20 +588,20 @@ impl Caller {
             });
         }
         for &blade in &self.blades {
-            asked(worlds, |world| format!("{:?}", world.blade_report(blade)));
+            agreed_result(worlds, |world| format!("{:?}", world.blade_report(blade)));
         }
-        asked(worlds, |world| {
+        agreed_result(worlds, |world| {
             (world.slipped().to_vec(), world.contact_changes().collect::<Vec<_>>())
         });
         for &held in self.attachments.iter().chain(&self.sutures) {
-            asked(worlds, |world| {
+            agreed_result(worlds, |world| {
                 format!("{:?} {:?}", world.attachment_force(held), world.suture_report(held))
             });
         }
     }
 }
 
-/// A short stand-in for what is long.
+/// A short stand-in for a long text.
 fn xxhash(text: &str) -> u64 {
     use std::hash::{DefaultHasher, Hash, Hasher};
     let mut hasher = DefaultHasher::new();

@@ -1,4 +1,5 @@
-//! Each thing that a body may have, in motion, pressed and cut: saved in the middle of it, it goes on to the bit.
+//! Each feature of a body, in motion, compressed and cut: saved in the middle of a run, it continues bitwise
+//! identically.
 
 use crate::support::scene::SOLVERS;
 use glam::{Vec3, vec3};
@@ -9,7 +10,7 @@ use sinew::{
     Storage, Tearing, ToolDefinition, ToolId, Values, Viscosity, World, WorldDefinition, Yielding,
 };
 
-/// A block of tissue or a sheet, held at some nodes, and a tool that comes down on it.
+/// A block of tissue or a sheet, held at some nodes, and a tool that moves down on it.
 struct Scene {
     world: World,
     body: BodyId,
@@ -34,8 +35,8 @@ const FIBRES: [Vec3; 300] = [Vec3::X; 300];
 
 type Change = fn(&mut BodyDefinition);
 
-/// What a block has beside springs.
-const OF_BLOCKS: [(&str, Change); 17] = [
+/// Features of a block beside springs.
+const BLOCK_FEATURES: [(&str, Change); 17] = [
     ("PACKED", |_| ()),
     ("EFFICIENT", |body| body.storage = Storage::Efficient),
     ("FAST_LINK", |body| {
@@ -90,8 +91,8 @@ const OF_BLOCKS: [(&str, Change); 17] = [
     ("tolerance of mass scaling", |body| body.mass_scaling = 0.05),
 ];
 
-/// What a sheet has.
-const OF_SHEETS: [(&str, Change); 9] = [
+/// Features of a sheet.
+const SHEET_FEATURES: [(&str, Change); 9] = [
     ("a sheet", |_| ()),
     ("bending", |body| body.bending_stiffness = 1e-6),
     ("a strain limit", |body| body.strain_limit = 0.05),
@@ -126,7 +127,7 @@ const OF_SHEETS: [(&str, Change); 9] = [
 ];
 
 impl Scene {
-    /// `None`: what does not go together.
+    /// `None` if the settings conflict.
     fn new(is_block: bool, solver: Solver, change: Change, room: u32) -> Option<Self> {
         let mesh = if is_block {
             Mesh::block([0.06; 3], [3, 3, 3])
@@ -148,8 +149,8 @@ impl Scene {
         }
         change(&mut definition);
         let body = world.create_body(&definition).ok()?;
-        for (node, place) in mesh.positions.iter().enumerate() {
-            if place.x < -0.029 {
+        for (node, position) in mesh.positions.iter().enumerate() {
+            if position.x < -0.029 {
                 world.body_mut(body).expect("a body").pin(node as u32).expect("a pin");
             }
         }
@@ -160,7 +161,7 @@ impl Scene {
     }
 }
 
-/// What is done in a step: the tool comes down and goes up, a blade goes through, a corner is pulled.
+/// Performs the actions of a step: the tool moves down and up, a blade passes through, a corner is pulled.
 fn step(world: &mut World, body: BodyId, tool: ToolId, step: usize, is_cuttable: bool) {
     let height = 0.05 - 0.0015 * step.min(60 - step.min(60)) as f32;
     world.set_pose(tool, vec3(0.01, height, 0.01), None).expect("a pose");
@@ -190,31 +191,31 @@ fn bits(world: &World, body: BodyId) -> Vec<u32> {
 }
 
 #[test]
-fn whatever_a_body_has_goes_on_to_the_bit() {
-    let [made, cut] = go_on_to_the_bit(is_short);
+fn every_feature_continues_bitwise() {
+    let [made, cut] = check_bitwise_continuation(is_short);
     assert!(made > 40 && cut > 16, "{made} bodies, {cut} cut");
 }
 
 #[test]
 #[ignore = "long"]
-fn whatever_a_body_has_goes_on_to_the_bit_with_the_other_solvers() {
-    let [made, cut] = go_on_to_the_bit(|feature, solver| !is_short(feature, solver));
+fn every_feature_continues_bitwise_with_the_other_solvers() {
+    let [made, cut] = check_bitwise_continuation(|feature, solver| !is_short(feature, solver));
     assert!(made > 80 && cut > 34, "{made} bodies, {cut} cut");
 }
 
-/// One solver for each; NEWTON, which takes long for blocks, for sheets alone.
+/// One solver for each feature; NEWTON, which is slow for blocks, for sheets only.
 fn is_short(feature: usize, solver: usize) -> bool {
-    let solvers = if feature < OF_BLOCKS.len() { 2 } else { 3 };
+    let solvers = if feature < BLOCK_FEATURES.len() { 2 } else { 3 };
     feature % solvers == solver
 }
 
-/// With these features and solvers; how many bodies were made, and how many of them cut.
-fn go_on_to_the_bit(is_tried: fn(usize, usize) -> bool) -> [usize; 2] {
+/// Runs these features and solvers; returns the number of bodies created, and of those cut.
+fn check_bitwise_continuation(is_selected: fn(usize, usize) -> bool) -> [usize; 2] {
     let [mut made, mut cut] = [0; 2];
-    let blocks = OF_BLOCKS.iter().map(|feature| (true, feature));
-    let all = blocks.chain(OF_SHEETS.iter().map(|feature| (false, feature)));
+    let blocks = BLOCK_FEATURES.iter().map(|feature| (true, feature));
+    let all = blocks.chain(SHEET_FEATURES.iter().map(|feature| (false, feature)));
     for (feature, (is_block, (name, change))) in all.enumerate() {
-        for (_, solver) in (0..).zip(SOLVERS).filter(|&(number, _)| is_tried(feature, number)) {
+        for (_, solver) in (0..).zip(SOLVERS).filter(|&(number, _)| is_selected(feature, number)) {
             for room in [0, 600] {
                 let Some(Scene { mut world, body, tool }) = Scene::new(is_block, solver, *change, room) else {
                     continue;
@@ -260,9 +261,9 @@ fn go_on_to_the_bit(is_tried: fn(usize, usize) -> bool) -> [usize; 2] {
     [made, cut]
 }
 
-/// What a tool finds what it touches by is kept with it.
+/// The contact data of a tool is saved with it.
 #[test]
-fn tools_of_every_kind_go_on_to_the_bit() {
+fn tools_of_every_kind_continue_bitwise() {
     let rod = Mesh::block([0.02, 0.03, 0.02], [2, 3, 2]).expect("a mesh");
     let shapes = [
         Shape::Sphere { radius: 0.015 },

@@ -1,4 +1,4 @@
-//! A world to bytes and back: it goes on as if nothing had been, and what is no world is refused.
+//! Snapshots of a world: a restored world continues bitwise identically, and invalid bytes are refused.
 #![allow(clippy::expect_used)]
 
 mod acts;
@@ -12,7 +12,7 @@ use std::ops::Range;
 use acts::Caller;
 use sinew::{World, WorldDefinition};
 
-/// Of which a step soon ends.
+/// A world whose steps end soon.
 fn world(threads: u32) -> World {
     World::new(WorldDefinition {
         thread_count: threads,
@@ -23,23 +23,23 @@ fn world(threads: u32) -> World {
 }
 
 #[test]
-fn a_world_that_was_saved_goes_on_to_the_bit_whatever_is_done() {
-    go_on_to_the_bit(12..14);
+fn a_saved_world_continues_bitwise_under_any_action() {
+    check_bitwise_continuation(12..14);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_world_that_was_saved_goes_on_to_the_bit_when_everything_was_done() {
-    // Some others tangle bodies up, which takes long.
-    let done = go_on_to_the_bit(10..25);
-    // What is not done is not known to go on.
+fn a_saved_world_continues_bitwise_after_every_action() {
+    // Some other seeds entangle bodies, which takes long.
+    let done = check_bitwise_continuation(10..25);
+    // Every action must have occurred, else its continuation is untested.
     for (what, count) in &done {
         assert!(*count > 0 || *what == "a plain body", "{what}: never");
     }
 }
 
-/// With callers of these seeds; how often each did what.
-fn go_on_to_the_bit(seeds: Range<u64>) -> BTreeMap<&'static str, usize> {
+/// Runs callers with these seeds; returns how often each action succeeded.
+fn check_bitwise_continuation(seeds: Range<u64>) -> BTreeMap<&'static str, usize> {
     let mut done: BTreeMap<&str, usize> = BTreeMap::new();
     for seed in seeds {
         let mut caller = Caller::new(seed);
@@ -48,7 +48,7 @@ fn go_on_to_the_bit(seeds: Range<u64>) -> BTreeMap<&'static str, usize> {
             for _ in 0..3 {
                 caller.act(&mut worlds);
             }
-            // Also in the middle of what is done between two steps.
+            // Also between the actions of two steps.
             if [6, 14, 23].contains(&step) {
                 let bytes = worlds[0].save().expect("bytes");
                 for twin in &worlds {

@@ -1,4 +1,4 @@
-//! A recording is replayed as it was taken, and what is other is found where it is.
+//! Recordings are replayed exactly, and a difference is found at its step.
 
 use std::fs;
 use std::ops::Range;
@@ -18,7 +18,7 @@ fn path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.recording"))
 }
 
-/// A cloth that hangs on two of its corners.
+/// A cloth that hangs by two of its corners.
 fn hanging() -> World {
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let mesh = Mesh::cloth([0.1; 2], [6, 6]).expect("a cloth");
@@ -36,7 +36,7 @@ fn hanging() -> World {
     world
 }
 
-/// The frames of a recording: where each step's `dt` and hash are in the file.
+/// Returns the positions of each step's `dt` and hash in the file of a recording.
 fn frames(bytes: &[u8]) -> Vec<[usize; 2]> {
     let mut frames = Vec::new();
     let mut at = 12;
@@ -50,13 +50,13 @@ fn frames(bytes: &[u8]) -> Vec<[usize; 2]> {
 }
 
 #[test]
-fn random_calls_are_replayed_with_the_hashes_that_were_recorded() {
+fn random_calls_are_replayed_with_the_recorded_hashes() {
     random_calls_are_replayed_times(10..11, 2);
 }
 
 #[test]
 #[ignore = "long"]
-fn random_calls_are_replayed_eight_times_more_with_the_hashes_that_were_recorded() {
+fn random_calls_are_replayed_eight_more_times_with_the_recorded_hashes() {
     random_calls_are_replayed_times(10..12, 8);
 }
 
@@ -81,7 +81,8 @@ fn random_calls_are_replayed_times(seeds: Range<u64>, replays: u32) {
             difference: None,
             is_cut_short: false,
         };
-        // A replay takes the same states with another number of threads, however often. `fuzz/run replays` tries many more.
+        // A replay has the same states for another number of threads, any number of times. `fuzz/run replays` runs many
+        // more.
         for replay in 0..replays {
             let report = World::replay(&path, 1 + replay % 2).expect("a replay");
             assert_eq!(report, expected, "seed {seed}, replay {replay}");
@@ -107,7 +108,7 @@ fn a_recording_changes_no_state() {
 }
 
 #[test]
-fn steps_of_bounded_work_are_replayed() {
+fn steps_with_a_work_budget_are_replayed() {
     let path = path("bounded");
     let mut world = hanging();
     world.start_recording(&path).expect("a file");
@@ -116,7 +117,7 @@ fn steps_of_bounded_work_are_replayed() {
         let report = world.step_with_budget(8e-3, work).expect("a step");
         lags += u32::from(report.lag > 0.0);
     }
-    assert!(lags > 1, "some steps are cut short by their work");
+    assert!(lags > 1, "some steps end early by their work budget");
     let steps = world.stop_recording().expect("a recording");
     let report = World::replay(&path, 1).expect("a replay");
     assert_eq!((report.steps, report.difference), (steps, None));
@@ -124,7 +125,7 @@ fn steps_of_bounded_work_are_replayed() {
 }
 
 #[test]
-fn what_is_called_between_steps_of_a_solved_body_is_replayed() {
+fn calls_between_steps_of_an_implicit_body_are_replayed() {
     let path = path("solved");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let mesh = Mesh::cloth([0.1; 2], [6, 6]).expect("a cloth");
@@ -162,7 +163,7 @@ fn a_planted_difference_is_found_at_its_step() {
     assert_eq!(frames.len(), 20);
     for step in [1, 7, 20] {
         let [dt, hash] = frames[step - 1];
-        // What was recorded of the state, and a step that is longer by the last bit.
+        // The recorded state hash, and a step whose last bit differs.
         for at in [hash, dt] {
             let mut bytes = good.clone();
             bytes[at] ^= 1;
@@ -177,7 +178,7 @@ fn a_planted_difference_is_found_at_its_step() {
 }
 
 #[test]
-fn a_file_that_ends_anywhere_is_replayed_as_far_as_it_goes() {
+fn a_truncated_file_is_replayed_up_to_its_end() {
     let path = path("short");
     let mut world = hanging();
     world.start_recording(&path).expect("a file");
@@ -231,7 +232,7 @@ fn a_full_disk_ends_the_recording_and_not_the_step() {
 }
 
 #[test]
-fn a_recording_without_steps_is_one() {
+fn a_recording_without_steps_is_valid() {
     let path = path("empty");
     let mut world = hanging();
     world.start_recording(&path).expect("a file");
@@ -245,7 +246,7 @@ fn a_recording_without_steps_is_one() {
 }
 
 #[test]
-fn what_a_haptic_handle_leads_is_replayed() {
+fn motion_of_a_haptic_handle_is_replayed() {
     let path = path("led");
     let mut world = hanging();
     let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });

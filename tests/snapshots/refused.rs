@@ -1,4 +1,4 @@
-//! Bytes that are no world, and worlds that cannot be bytes.
+//! Invalid bytes are not loaded, and unsupported worlds are not saved.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -8,12 +8,12 @@ use xxhash_rust::xxh3::Xxh3Default;
 use super::acts::{Caller, Random};
 use super::world;
 
-/// Where the header keeps the version, the size and the checksum, and where it ends.
+/// The positions of the version, the size and the checksum in the header, and the end of the header.
 const VERSION: usize = 8;
 const CHECKSUM: usize = 28;
 const HEADER: usize = 36;
 
-/// A world with something of everything, as bytes.
+/// Returns a world with every kind of object, as bytes.
 fn bytes(seed: u64) -> Vec<u8> {
     let mut caller = Caller::new(seed);
     let mut worlds = [world(1)];
@@ -30,8 +30,8 @@ fn load(bytes: &[u8]) -> Result<World, Error> {
     World::load(bytes, 1, None)
 }
 
-/// As somebody would who wants them to be believed.
-fn seal(bytes: &mut [u8]) {
+/// Updates the checksum, as a forger would.
+fn update_checksum(bytes: &mut [u8]) {
     let mut hasher = Xxh3Default::new();
     hasher.update(&bytes[..CHECKSUM]);
     hasher.update(&bytes[HEADER..]);
@@ -39,29 +39,27 @@ fn seal(bytes: &mut [u8]) {
 }
 
 #[test]
-fn bytes_that_were_cut_short_or_changed_are_refused() {
-    bytes_that_were_cut_short_or_changed_are_refused_of(|at| at < 64 || at.is_multiple_of(9973));
+fn truncated_or_changed_bytes_are_refused() {
+    truncated_or_changed_bytes_are_refused_of(|at| at < 64 || at.is_multiple_of(9973));
 }
 
 #[test]
 #[ignore = "long"]
-fn bytes_that_were_cut_short_or_changed_are_refused_in_more_places() {
-    bytes_that_were_cut_short_or_changed_are_refused_of(|at| {
-        (64..300).contains(&at) || at > 300 && at.is_multiple_of(997)
-    });
+fn truncated_or_changed_bytes_are_refused_in_more_places() {
+    truncated_or_changed_bytes_are_refused_of(|at| (64..300).contains(&at) || at > 300 && at.is_multiple_of(997));
 }
 
-fn bytes_that_were_cut_short_or_changed_are_refused_of(is_tried: fn(usize) -> bool) {
+fn truncated_or_changed_bytes_are_refused_of(is_selected: fn(usize) -> bool) {
     let bytes = bytes(3);
     assert!(load(&bytes).is_ok());
-    for size in (0..bytes.len()).filter(|size| is_tried(*size)) {
+    for size in (0..bytes.len()).filter(|size| is_selected(*size)) {
         let refused = load(&bytes[..size]).expect_err("cut short");
         assert!(matches!(refused, Error::InvalidArgument(_)), "{size}: {refused}");
     }
     let longer = [&bytes[..], &[0]].concat();
     assert!(matches!(load(&longer), Err(Error::InvalidArgument(_))));
     let mut changed = bytes.clone();
-    for at in (0..bytes.len()).filter(|at| is_tried(*at)) {
+    for at in (0..bytes.len()).filter(|at| is_selected(*at)) {
         for bit in [0, 3, 7] {
             changed[at] ^= 1 << bit;
             assert!(load(&changed).is_err(), "bit {bit} of byte {at}");
@@ -72,7 +70,7 @@ fn bytes_that_were_cut_short_or_changed_are_refused_of(is_tried: fn(usize) -> bo
 }
 
 #[test]
-fn bytes_of_something_else_are_refused_by_what_they_are() {
+fn other_files_are_refused_by_kind() {
     let said = |bytes: &[u8]| load(bytes).expect_err("no world").to_string();
     assert!(said(b"").contains("header"));
     assert!(said(b"solid organ\n").contains("begin with something else"));
@@ -82,20 +80,20 @@ fn bytes_of_something_else_are_refused_by_what_they_are() {
     let mut changed = whole.clone();
     changed[whole.len() / 2] ^= 1;
     assert!(said(&changed).contains("checksum"));
-    let mut of_later = whole.clone();
-    of_later[VERSION] += 1;
-    seal(&mut of_later);
-    assert!(matches!(load(&of_later), Err(Error::Unsupported(_))));
-    // Of a version whose fields are others.
-    let mut of_others = whole;
-    of_others[VERSION + 4] ^= 1;
-    seal(&mut of_others);
-    assert!(matches!(load(&of_others), Err(Error::Unsupported(_))));
+    let mut later_version = whole.clone();
+    later_version[VERSION] += 1;
+    update_checksum(&mut later_version);
+    assert!(matches!(load(&later_version), Err(Error::Unsupported(_))));
+    // A version whose fields differ.
+    let mut other_fields = whole;
+    other_fields[VERSION + 4] ^= 1;
+    update_checksum(&mut other_fields);
+    assert!(matches!(load(&other_fields), Err(Error::Unsupported(_))));
 }
 
-/// Nothing worse than that a step panics comes of bytes that somebody made up, and bytes that were written as they are go back as they are.
+/// Forged bytes cause at worst a panic in a step, and bytes with unchanged values are saved again identically.
 #[test]
-fn bytes_with_a_checksum_of_their_own_are_looked_at_again() {
+fn bytes_with_a_valid_checksum_are_still_validated() {
     let whole = bytes(5);
     let mut random = Random(1);
     let mut refused = 0;
@@ -105,7 +103,7 @@ fn bytes_with_a_checksum_of_their_own_are_looked_at_again() {
             let at = HEADER + random.below(forged.len() - HEADER);
             forged[at] = random.below(256) as u8;
         }
-        seal(&mut forged);
+        update_checksum(&mut forged);
         let loaded = catch_unwind(|| load(&forged)).expect("bytes are loaded or refused");
         match loaded {
             Ok(mut world) => {
@@ -118,14 +116,14 @@ fn bytes_with_a_checksum_of_their_own_are_looked_at_again() {
 }
 
 #[test]
-fn what_cannot_be_bytes_says_so() {
+fn unsupported_worlds_report_an_error() {
     let mut world = world(1);
     let size = world.snapshot_size().expect("a size");
     for wrong in [0, size - 1, size + 1] {
-        let mut place = vec![7; wrong];
-        let refused = world.save_into(&mut place).expect_err("another size");
+        let mut buffer = vec![7; wrong];
+        let refused = world.save_into(&mut buffer).expect_err("another size");
         assert!(refused.to_string().contains(&format!("size is {wrong}")), "{refused}");
-        assert!(place.iter().all(|&byte| byte == 7));
+        assert!(buffer.iter().all(|&byte| byte == 7));
     }
     let tool = world
         .create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))

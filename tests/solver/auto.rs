@@ -1,4 +1,4 @@
-//! The solver that is chosen, and what a step that is refused says of its body.
+//! The automatic choice of a solver, and the error message of a refused step.
 
 use glam::{Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -9,7 +9,7 @@ use sinew::{
 use crate::support::bodies::{FREE, Parts, Scene};
 use crate::support::organ::of_elements;
 
-/// Two masses of `mass` kg whose spring has the longest stable substep `limit`, s: 2 / omega, with omega^2 = 2 k / m.
+/// Two masses of `mass` kg whose spring has the longest stable substep `limit` (s): 2 / omega, with omega^2 = 2 k / m.
 fn pair(limit: f32) -> Parts {
     let mass = 0.01;
     Parts::chain(2, Vec3::X, mass, 0.5 * mass * (2.0 / limit).powi(2))
@@ -24,7 +24,7 @@ fn automatic(parts: &Parts) -> Scene {
 }
 
 #[test]
-fn few_substeps_are_explicit_and_many_are_not() {
+fn few_substeps_choose_verlet_and_many_choose_implicit() {
     for (limit, solver, reason) in [
         (1e-3, Solver::Verlet, ChoiceReason::FewSubsteps),
         (2e-4, Solver::Verlet, ChoiceReason::FewSubsteps),
@@ -35,7 +35,7 @@ fn few_substeps_are_explicit_and_many_are_not() {
         let choice = scene.body().solver_choice();
         assert_eq!((choice.solver, choice.reason), (solver, reason), "{limit} s");
         assert_eq!(choice.step, 1.0 / 60.0);
-        // 0.8 of the limit is used, 0.9 where nodes may be anywhere.
+        // VERLET uses 0.8 of the limit, or 0.9 where the bound holds for all positions.
         let needed = |part: f32| choice.step / (part * limit);
         assert!(
             (needed(0.9) * 0.99..needed(0.8) * 1.01 + 1.0).contains(&(choice.substeps as f32)),
@@ -52,7 +52,7 @@ fn few_substeps_are_explicit_and_many_are_not() {
 }
 
 #[test]
-fn the_choice_is_for_the_steps_that_the_world_takes() {
+fn the_choice_follows_the_step_length_of_the_world() {
     let parts = pair(5e-5);
     let mut scene = automatic(&pair(1e-3));
     scene.run(1e-3, 10);
@@ -64,14 +64,14 @@ fn the_choice_is_for_the_steps_that_the_world_takes() {
     let choice = scene.world.body(id).expect("the body").solver_choice();
     assert_eq!(choice.solver, Solver::Verlet, "{choice:?}");
     assert!((choice.step / 1e-3 - 1.0).abs() < 1e-6);
-    // Who fixes substeps has chosen them for VERLET.
+    // With fixed substeps the caller has chosen them for VERLET.
     let world = WorldDefinition { substeps: 10, ..FREE };
     let fixed = with_solver(&parts, world, Solver::Auto);
     assert_eq!(fixed.body().solver_choice().solver, Solver::Verlet);
 }
 
 #[test]
-fn a_body_moves_as_with_the_solver_that_was_chosen() {
+fn an_automatic_body_moves_as_with_the_chosen_solver() {
     let gravity = WorldDefinition {
         gravity: Vec3::Y * -9.81,
         ..FREE
@@ -111,7 +111,7 @@ fn refused(world: &mut World) -> (StepLimit, String) {
 }
 
 #[test]
-fn an_unstable_step_names_the_spring_and_what_helps() {
+fn an_unstable_step_names_the_spring_and_the_remedy() {
     let mut parts = Parts::chain(10, Vec3::X * 0.1, 0.01, 10.0);
     parts.stiffnesses[6] = 1e5;
     let few = WorldDefinition {
@@ -138,14 +138,14 @@ fn an_unstable_step_names_the_spring_and_what_helps() {
     ] {
         assert!(message.contains(word), "{message}");
     }
-    // As many substeps as it names are enough.
+    // The number of substeps that the message names is enough.
     scene.world.set_substeps(0, limit.needed + 1).expect("substeps");
     assert!(scene.world.step(1.0 / 60.0).expect("a step").limit.is_none());
 }
 
-/// Bodies that are attached to each other take as many substeps as the stiffest asks for: that one is named, and how many.
+/// Attached bodies take as many substeps as the stiffest of them needs; the message names that body and the number.
 #[test]
-fn an_unstable_step_names_the_stiffest_of_the_bodies_that_are_attached() {
+fn an_unstable_step_names_the_stiffest_attached_body() {
     let few = WorldDefinition {
         max_substeps: 5,
         ..FREE
@@ -172,7 +172,7 @@ fn an_unstable_step_names_the_stiffest_of_the_bodies_that_are_attached() {
 }
 
 #[test]
-fn a_body_that_chose_its_solver_is_not_told_to_choose() {
+fn the_message_suggests_no_solver_that_is_already_set() {
     let mut parts = Parts::chain(10, Vec3::X * 0.1, 0.01, 10.0);
     parts.stiffnesses[6] = 1e6;
     let mut world = World::new(WorldDefinition {
@@ -199,8 +199,8 @@ fn a_body_that_chose_its_solver_is_not_told_to_choose() {
 #[test]
 fn an_unstable_step_names_the_element_or_the_term() {
     let mut mesh = Mesh::block([0.08, 0.04, 0.04], [4, 2, 2]).expect("a mesh");
-    // A corner that is drawn in makes flat tetrahedra.
-    let far = mesh.positions.iter().map(|place| place.dot(Vec3::ONE));
+    // Moving a corner inward makes flat tetrahedra.
+    let far = mesh.positions.iter().map(|position| position.dot(Vec3::ONE));
     let corner = far.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).expect("a node").0;
     mesh.positions[corner] -= Vec3::splat(0.012);
     let elements = BodyDefinition {
@@ -224,7 +224,7 @@ fn an_unstable_step_names_the_element_or_the_term() {
         corners == named
     };
     assert!(mesh.tetrahedra.iter().any(is_named), "{message}");
-    // One of those about the corner.
+    // One of the tetrahedra at the corner.
     assert!(named.contains(&(corner as u32)), "{message}");
 
     let parts = Parts::chain(4, Vec3::X, 0.01, 1.0);

@@ -1,4 +1,5 @@
-//! Steps of bounded work: what they do is bounded, nothing is lost, energy does not grow, and the same work gives the same bits.
+//! Steps with a work budget: work is bounded, no time is lost, energy does not grow, and equal work gives bitwise
+//! identical results.
 
 use glam::Vec3;
 use sinew::{BodyDefinition, Error, Pose, Shape, Solver, ToolDefinition, World, WorldDefinition};
@@ -12,7 +13,7 @@ const EARTH: WorldDefinition = WorldDefinition {
     ..FREE
 };
 
-/// A block held at a corner, whose explicit steps take some tens of substeps.
+/// A block held at a corner, whose explicit steps take tens of substeps.
 fn block() -> Parts {
     let mut parts = Parts::block([6, 3, 3], 0.02, 1e-3, 2000.0);
     parts.masses[0] = 0.0;
@@ -29,7 +30,7 @@ fn scene(solver: Solver, threads: u32) -> Scene {
 }
 
 #[test]
-fn a_step_with_work_enough_is_a_step() {
+fn a_sufficient_budget_changes_nothing() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let (mut plain, mut budgeted) = (scene(solver, 1), scene(solver, 1));
         for _ in 0..20 {
@@ -42,7 +43,7 @@ fn a_step_with_work_enough_is_a_step() {
 }
 
 #[test]
-fn explicit_work_is_bounded_and_time_is_carried_on() {
+fn explicit_work_is_bounded_and_the_lag_is_caught_up() {
     let mut scene = scene(Solver::Verlet, 1);
     let needed = scene.step(DT).substeps;
     assert!(needed > 20, "{needed}");
@@ -55,7 +56,7 @@ fn explicit_work_is_bounded_and_time_is_carried_on() {
         assert_eq!((done.error, done.step.bodies_restored), (0.0, 0));
         assert!(done.lag > 0.0 && done.lag < f64::from(DT) * f64::from(step), "{done:?}");
         most = most.max(kinetic(&scene));
-        // Leapfrog's energy swings by a part of what moves; it does not drift.
+        // Leapfrog's energy oscillates by a fraction of the moving energy; it does not drift.
         assert!(
             scene.energy() <= energy + 0.02 * most,
             "{} J of {energy} J",
@@ -63,20 +64,20 @@ fn explicit_work_is_bounded_and_time_is_carried_on() {
         );
     }
     assert!(scene.world.lag() > 10.0 * f64::from(DT), "{} s", scene.world.lag());
-    // Nothing of the time is lost, and all of it is made up for.
+    // No time is lost: the world catches up with all of it.
     let mut steps = 31;
     while scene.world.lag() > 0.0 && steps < 60 {
         scene.world.step_with_budget(DT, 1_000_000).expect("a step");
         steps += 1;
-        let known = scene.world.time() + scene.world.lag();
-        assert!((known / (f64::from(steps) * f64::from(DT)) - 1.0).abs() < 1e-6);
+        let accounted_time = scene.world.time() + scene.world.lag();
+        assert!((accounted_time / (f64::from(steps) * f64::from(DT)) - 1.0).abs() < 1e-6);
     }
     assert_eq!(scene.world.lag(), 0.0);
 }
 
-/// A lag that is given up is never made up for, and nothing else is changed by that.
+/// A lag that is dropped is never caught up with, and nothing else changes.
 #[test]
-fn a_lag_is_given_up() {
+fn a_dropped_lag_is_not_caught_up() {
     let mut scene = scene(Solver::Verlet, 1);
     while scene.world.lag() < 5.0 * f64::from(DT) {
         scene.world.step_with_budget(DT, 7).expect("a step");
@@ -88,19 +89,19 @@ fn a_lag_is_given_up() {
     plain.step(DT).expect("a step");
     assert_eq!(scene.world.lag(), 0.0);
     assert!((scene.world.time() - time - f64::from(DT)).abs() < 1e-12);
-    assert!(plain.lag() >= 5.0 * f64::from(DT), "a plain step leaves it");
+    assert!(plain.lag() >= 5.0 * f64::from(DT), "a step without a budget keeps it");
     plain.drop_lag();
     assert_eq!(scene.world.state_hash(), plain.state_hash());
 }
 
 #[test]
-fn an_equation_that_is_solved_in_part_gains_no_energy_and_says_what_is_off() {
+fn a_partly_solved_equation_gains_no_energy_and_reports_its_error() {
     let mut scene = scene(Solver::Implicit, 1);
     let energy = scene.energy();
     let mut largest = 0.0_f32;
     for _ in 0..60 {
         let done = scene.world.step_with_budget(DT, 3).expect("a step");
-        // An equation takes one product at least, whatever is left.
+        // An equation takes at least one product, whatever budget is left.
         assert!(done.work_done <= 12 && done.lag == 0.0, "{done:?}");
         assert!(scene.is_finite() && done.step.bodies_restored == 0);
         assert!(
@@ -120,7 +121,7 @@ fn an_equation_that_is_solved_in_part_gains_no_energy_and_says_what_is_off() {
 }
 
 #[test]
-fn recorded_work_is_replayed_to_the_bit() {
+fn recorded_work_is_replayed_bitwise() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let mut timed = scene(solver, 1);
         let works: Vec<u32> = (0..12)
@@ -143,15 +144,18 @@ fn recorded_work_is_replayed_to_the_bit() {
 }
 
 #[test]
-fn contact_holds_however_little_work_is_allowed() {
+fn contact_holds_with_any_budget() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         let mut parts = block();
         parts.masses[0] = parts.masses[1];
         let lowest = parts
             .positions
             .iter()
-            .fold(f32::INFINITY, |low, place| low.min(place.y));
-        parts.positions.iter_mut().for_each(|place| place.y += 0.01 - lowest);
+            .fold(f32::INFINITY, |low, position| low.min(position.y));
+        parts
+            .positions
+            .iter_mut()
+            .for_each(|position| position.y += 0.01 - lowest);
         let mut scene = Scene::with(&parts, EARTH, |definition| BodyDefinition { solver, ..definition });
         scene
             .world
@@ -163,7 +167,7 @@ fn contact_holds_however_little_work_is_allowed() {
             let lowest = scene
                 .positions()
                 .iter()
-                .fold(f64::INFINITY, |low, place| low.min(place.y));
+                .fold(f64::INFINITY, |low, position| low.min(position.y));
             assert!(lowest > -1e-6, "{solver:?}: {lowest} m");
             nearest = nearest.min(lowest);
         }
@@ -171,11 +175,12 @@ fn contact_holds_however_little_work_is_allowed() {
     }
 }
 
-/// Each step beside the same one with more work: two that are off by no more than they say differ by no more than both.
+/// Compares each step with the same step with more work: their forces differ by no more than the sum of the reported
+/// errors.
 #[test]
 fn work_beside_a_tool_is_bounded_and_its_force_is_within_its_error() {
     const RADIUS: f32 = 0.02;
-    /// The most that is spent on one equation.
+    /// The maximum number of products spent on one equation.
     const MOST: u32 = 39;
     let (mut compared, mut covered) = (0, 0);
     for work in [3, 6, 12] {
@@ -205,7 +210,7 @@ fn work_beside_a_tool_is_bounded_and_its_force_is_within_its_error() {
             let saved = scene.world.save().expect("a snapshot");
             scene.world.set_pose(ball, place, None).expect("a pose");
             let done = scene.world.step_with_budget(DT, work).expect("a step");
-            // What first comes near a tool is solved again, and friction may take a product more.
+            // A first approach of a tool solves the equation again, and friction may take one product more.
             assert!(done.work_done <= 2 * work + 2 && done.step.substeps == 1, "{done:?}");
             assert!(scene.is_finite() && done.step.bodies_restored == 0 && done.lag == 0.0);
             let nearest = scene.positions().iter().fold(f64::INFINITY, |near, node| {
@@ -229,7 +234,7 @@ fn work_beside_a_tool_is_bounded_and_its_force_is_within_its_error() {
 }
 
 #[test]
-fn what_is_no_budget_is_refused() {
+fn invalid_budgets_are_refused() {
     let mut scene = scene(Solver::Verlet, 1);
     let before = scene.world.state_hash();
     let world = &mut scene.world;

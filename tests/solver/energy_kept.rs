@@ -1,5 +1,5 @@
-//! An undamped organ of springs that hangs folds under its weight, and leapfrog gains energy where it does: the energy monitor keeps that off, whatever
-//! holds the organ and whatever is set on the way.
+//! An undamped hanging organ of springs folds under its weight, and leapfrog gains energy where it folds. The energy
+//! monitor prevents the gain, whatever holds the organ and whatever the program sets during the run.
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
@@ -12,21 +12,21 @@ use crate::support::bodies::{FREE, Parts, Random, Scene};
 
 const DT: f32 = 1.0 / 60.0;
 
-/// An organ of springs of 5.4 kPa, its nodes at one end, and the one that is furthest from there.
+/// Returns an organ of springs (5.4 kPa), its nodes at one end, and the node farthest from that end.
 fn organ() -> (World, BodyId, Vec<u32>, u32) {
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let (body, end, tip) = organ_at(&mut world, Vec3::ZERO);
     (world, body, end, tip)
 }
 
-/// A body of a mesh that is moved by this, of tissue of this Young's modulus, Pa.
+/// Adds a body made from a mesh that is moved by this offset, of tissue with this Young's modulus (Pa).
 fn body_of(
     world: &mut World,
     mesh: &Mesh,
     offset: Vec3,
     (solver, model, young_modulus): (Solver, Model, f32),
 ) -> BodyId {
-    let positions: Vec<Vec3> = mesh.positions.iter().map(|place| *place + offset).collect();
+    let positions: Vec<Vec3> = mesh.positions.iter().map(|position| *position + offset).collect();
     let body = world.create_body(&BodyDefinition {
         positions: &positions,
         tetrahedra: &mesh.tetrahedra,
@@ -42,13 +42,14 @@ fn body_of(
     body.expect("a body")
 }
 
-/// The same organ, moved by this.
+/// Adds the same organ, moved by this offset.
 fn organ_at(world: &mut World, offset: Vec3) -> (BodyId, Vec<u32>, u32) {
     let mesh = Mesh::organ(0.15, 0.012).expect("an organ");
     let body = body_of(world, &mesh, offset, (Solver::Verlet, Model::Springs, 5400.0));
     let along = |node: &u32| mesh.positions[*node as usize].x;
     let nodes = 0..mesh.positions.len() as u32;
-    let [low, high] = [f32::min, f32::max].map(|of| nodes.clone().map(|node| along(&node)).reduce(of).expect("nodes"));
+    let [low, high] =
+        [f32::min, f32::max].map(|extreme| nodes.clone().map(|node| along(&node)).reduce(extreme).expect("nodes"));
     let end: Vec<u32> = nodes
         .clone()
         .filter(|node| along(node) < low + 0.1 * (high - low))
@@ -57,7 +58,7 @@ fn organ_at(world: &mut World, offset: Vec3) -> (BodyId, Vec<u32>, u32) {
     (body, end, tip)
 }
 
-/// The same, pinned at that end, with its furthest node.
+/// Returns the organ pinned at that end, with its farthest node.
 fn pinned() -> (World, BodyId, u32) {
     let (mut world, body, end, tip) = organ();
     for node in end {
@@ -66,13 +67,13 @@ fn pinned() -> (World, BodyId, u32) {
     (world, body, tip)
 }
 
-/// Steps it for so many frames as `step` does, and compares all energy with that at the start, as a part of the most that there is of kinetic and
-/// elastic energy in the first two seconds: it swings about its rest then.
+/// Steps for this many frames and returns the gain of total energy since the start, relative to the maximum of kinetic
+/// plus elastic energy in the first two seconds, in which the organ swings about its rest shape.
 fn gain((world, body): (&mut World, BodyId), frames: usize, step: impl FnMut(&mut World)) -> f64 {
     gain_of_all((world, &[body]), frames, step)
 }
 
-/// Kinetic and elastic energy of bodies, and all of theirs, J.
+/// Returns kinetic plus elastic energy, and total energy, of bodies (J).
 fn energy_of(world: &World, bodies: &[BodyId]) -> (f64, f64) {
     bodies.iter().fold((0.0, 0.0), |(inner, all), &body| {
         let energy = world.body(body).expect("a body").energy(world.gravity());
@@ -100,7 +101,7 @@ fn plain(world: &mut World) {
 }
 
 #[test]
-fn what_tools_hold_gains_no_energy() {
+fn tissue_held_by_tools_gains_no_energy() {
     for holds_end in [true, false] {
         let (mut world, body, end, tip) = organ();
         let tool = world.create_tool(&ToolDefinition {
@@ -127,17 +128,17 @@ fn what_tools_hold_gains_no_energy() {
 }
 
 #[test]
-fn what_is_set_in_each_frame_gains_no_energy() {
-    what_is_set_in_each_frame_gains_no_energy_of(|setting| setting == 1);
+fn settings_changed_in_each_frame_gain_no_energy() {
+    settings_changed_in_each_frame_gain_no_energy_of(|setting| setting == 1);
 }
 
 #[test]
 #[ignore = "long"]
-fn what_is_set_in_each_frame_gains_no_energy_in_the_other_cases() {
-    what_is_set_in_each_frame_gains_no_energy_of(|setting| setting != 1);
+fn settings_changed_in_each_frame_gain_no_energy_in_the_other_cases() {
+    settings_changed_in_each_frame_gain_no_energy_of(|setting| setting != 1);
 }
 
-fn what_is_set_in_each_frame_gains_no_energy_of(is_tried: fn(usize) -> bool) {
+fn settings_changed_in_each_frame_gain_no_energy_of(is_selected: fn(usize) -> bool) {
     type Setting = (&'static str, fn(&mut World, BodyId));
     let settings: [Setting; 3] = [
         ("node damping", |world, body| {
@@ -154,7 +155,7 @@ fn what_is_set_in_each_frame_gains_no_energy_of(is_tried: fn(usize) -> bool) {
             body.scale_region(&[0, 1, 2], 1.0, 1.0).expect("a region");
         }),
     ];
-    for (_, (name, set)) in (0..).zip(settings).filter(|setting| is_tried(setting.0)) {
+    for (_, (name, set)) in (0..).zip(settings).filter(|setting| is_selected(setting.0)) {
         let (mut world, body, _) = pinned();
         let gained = gain((&mut world, body), 1200, |world| {
             set(world, body);
@@ -165,7 +166,7 @@ fn what_is_set_in_each_frame_gains_no_energy_of(is_tried: fn(usize) -> bool) {
 }
 
 #[test]
-fn impulses_put_in_what_they_give_and_no_more() {
+fn impulses_add_exactly_their_own_energy() {
     let (mut world, body, tip) = pinned();
     let energy = |world: &World| world.body(body).expect("a body").energy(world.gravity());
     let all = |world: &World| energy(world).kinetic + energy(world).elastic + energy(world).gravitational;
@@ -192,7 +193,7 @@ fn impulses_put_in_what_they_give_and_no_more() {
 }
 
 #[test]
-fn steps_of_little_work_let_the_world_lag_and_gain_no_energy() {
+fn steps_with_small_budgets_lag_and_gain_no_energy() {
     for work in [5, 11] {
         let (mut world, body, _) = pinned();
         let gained = gain((&mut world, body), 1200, |world| {
@@ -202,9 +203,10 @@ fn steps_of_little_work_let_the_world_lag_and_gain_no_energy() {
     }
 }
 
-/// In modes as fast as the substep, leapfrog begins with an amplitude that is too large: the mean energy would be up to 1 % above what was put in.
+/// In modes as fast as the substep, leapfrog begins with too large an amplitude: the mean energy would be up to 1 %
+/// above the energy put in.
 #[test]
-fn fast_modes_have_no_more_energy_than_was_put_in() {
+fn fast_modes_keep_the_energy_put_in() {
     let mut random = Random::new(7);
     for cells in [[7, 7, 1], [10, 10, 1], [4, 4, 4]] {
         let parts = Parts::block(cells, 0.03, 0.005, 300.0);
@@ -220,7 +222,7 @@ fn fast_modes_have_no_more_energy_than_was_put_in() {
                 sum += scene.energy();
             }
             let gained = sum / f64::from(frames) / start - 1.0;
-            // It is taken off with the first comparison, within some eighty substeps.
+            // The first comparison removes it, within about eighty substeps.
             assert!(
                 window == 0 || gained < 1e-3,
                 "{cells:?}, {window}: {:.2} %",
@@ -231,7 +233,7 @@ fn fast_modes_have_no_more_energy_than_was_put_in() {
 }
 
 #[test]
-fn organs_that_hang_from_each_other_gain_no_energy() {
+fn attached_organs_gain_no_energy() {
     for is_sutured in [false, true] {
         let (mut world, first, tip) = pinned();
         let positions = world.body(first).expect("a body").positions();
@@ -259,9 +261,9 @@ fn organs_that_hang_from_each_other_gain_no_energy() {
     }
 }
 
-/// The energy of a fall is none that the body has within: what is lost or gained of its spin is not hidden by it.
+/// The energy of a fall is not internal energy: it must not hide a loss or gain of spin.
 #[test]
-fn what_spins_while_it_falls_keeps_its_spin() {
+fn a_spinning_falling_body_keeps_its_spin() {
     for (solver, model) in [
         (Solver::Implicit, Model::Tetrahedra),
         (Solver::Implicit, Model::Springs),
@@ -286,24 +288,28 @@ fn what_spins_while_it_falls_keeps_its_spin() {
             sum / masses.iter().sum::<f64>()
         };
         let centre = mean(&mesh.positions).as_vec3();
-        // 0.28 rad in a step.
+        // 0.28 rad per step.
         let spin = Vec3::Z * 16.8;
-        let velocities: Vec<Vec3> = mesh.positions.iter().map(|place| spin.cross(*place - centre)).collect();
+        let velocities: Vec<Vec3> = mesh
+            .positions
+            .iter()
+            .map(|position| spin.cross(*position - centre))
+            .collect();
         world
             .body_mut(body)
             .expect("a body")
             .set_velocities(&velocities)
             .expect("velocities");
-        // The energy about the middle, and the angular momentum about it.
+        // The energy about the center, and the angular momentum about it.
         let own = |world: &World| {
             let body = world.body(body).expect("a body");
-            let (places, velocities) = (body.positions(), body.velocities());
-            let (centre, mean) = (mean(places), mean(velocities));
+            let (positions, velocities) = (body.positions(), body.velocities());
+            let (centre, mean) = (mean(positions), mean(velocities));
             let (mut energy, mut turn) = (body.energy(Vec3::ZERO).elastic, DVec3::ZERO);
-            for ((place, velocity), mass) in places.iter().zip(velocities).zip(&masses) {
+            for ((position, velocity), mass) in positions.iter().zip(velocities).zip(&masses) {
                 let velocity = velocity.as_dvec3() - mean;
                 energy += 0.5 * mass * velocity.length_squared();
-                turn += (place.as_dvec3() - centre).cross(velocity) * *mass;
+                turn += (position.as_dvec3() - centre).cross(velocity) * *mass;
             }
             (energy, turn)
         };
@@ -311,20 +317,21 @@ fn what_spins_while_it_falls_keeps_its_spin() {
         for frame in 0..300 {
             plain(&mut world);
             let (now, turns) = own(&world);
-            let (gained, off) = (now / energy - 1.0, (turns - turn).length() / turn.length());
+            let (gained, error) = (now / energy - 1.0, (turns - turn).length() / turn.length());
             assert!(gained < 3e-4, "{solver:?} {model:?} {frame}: {:.4} %", 100.0 * gained);
             assert!(
-                off < 5e-4,
+                error < 5e-4,
                 "{solver:?} {model:?} {frame}: {:.4} % of its spin",
-                100.0 * off
+                100.0 * error
             );
         }
     }
 }
 
-/// Gaps between attached points that rounding opens and closes are no work: stiff blocks swing as one does.
+/// Gaps between attached points that rounding opens and closes do no work: stiff attached blocks swing as one block
+/// does.
 #[test]
-fn stiff_blocks_that_are_attached_swing_on() {
+fn stiff_attached_blocks_keep_swinging() {
     let mesh = Mesh::block([0.1, 0.05, 0.05], [4, 2, 2]).expect("a block");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let [first, second] = [0.0, 0.1].map(|offset| {
@@ -341,7 +348,8 @@ fn stiff_blocks_that_are_attached_swing_on() {
             .filter(|&node| (mesh.positions[node as usize].x - x).abs() < 1e-4)
             .collect()
     };
-    let [low, high] = [f32::min, f32::max].map(|of| mesh.positions.iter().map(|place| place.x).reduce(of));
+    let [low, high] =
+        [f32::min, f32::max].map(|extreme| mesh.positions.iter().map(|position| position.x).reduce(extreme));
     let [low, high] = [low, high].map(|x| side(x.expect("nodes")));
     let anchors = [&high, &low].map(|nodes| nodes.iter().copied().map(Anchor::Node).collect::<Vec<_>>());
     for node in low {

@@ -1,4 +1,4 @@
-//! IMPLICIT against the exact solutions of its own formulas, order of convergence, falls, rest shapes, and what it reports.
+//! IMPLICIT against the exact solutions of its own formulas, order of convergence, falls, rest shapes, and its reports.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use crate::support::euler::{euler_step, uneven_block};
@@ -18,7 +18,7 @@ fn implicit(parts: &Parts, world: WorldDefinition, order: u32, accuracy: f32) ->
 
 const OMEGA_SQUARED: f64 = 100.0 / 0.75;
 
-/// How far the spring is stretched after each step, by the formula of this order in `f64`, begun with order 1.
+/// The stretch of the spring after each step, by the formula of this order in `f64`. The first step has order 1.
 fn discrete(order: u32, h: f64, steps: usize) -> Vec<f64> {
     let (mut q, mut v) = (0.05, 0.0);
     let (mut last_q, mut last_v) = (q, v);
@@ -59,7 +59,7 @@ fn two_masses_follow_the_discrete_solution() {
     }
 }
 
-/// The error of the stretch after a second, over the amplitude.
+/// The error of the stretch after one second, relative to the amplitude.
 fn error_after_a_second(order: u32, steps: usize) -> f64 {
     let mut scene = implicit(&two_masses().0, FREE, order, 1e-6);
     scene.run((1.0 / steps as f64) as f32, steps);
@@ -68,7 +68,7 @@ fn error_after_a_second(order: u32, steps: usize) -> f64 {
 }
 
 #[test]
-fn each_order_is_reached() {
+fn each_order_of_convergence_is_reached() {
     for (order, steps) in [(1, 4000), (2, 1000)] {
         let ratio = error_after_a_second(order, steps) / error_after_a_second(order, 2 * steps);
         let expected = f64::from(1 << order);
@@ -128,26 +128,27 @@ fn nodes_reach_their_terminal_velocity_at_every_step() {
             let mut scene = implicit(&parts, world, order, 0.0);
             scene.run(h, (6.0 / h) as usize + 20);
             let error = (scene.velocities()[0].y / (-9.81 * 0.5 / 2.0) - 1.0).abs();
-            // Of what a step of little damping adds, rounding loses a part: about 1e-7 of the velocity.
+            // Rounding loses a part of the small velocity that a step with little damping adds: about 1e-7 of the
+            // velocity.
             let allowed = f64::max(1e-5, 3.6e-7 / (f64::from(h) * 2.0 / 0.5));
             assert!(error < allowed, "order {order}, {h} s: {error:.2e}");
         }
     }
 }
 
-/// A chain of forty that hangs from a pin: each spring is stretched by the weight of all that is below it.
+/// A chain of forty nodes hangs from a pin: the weight of all nodes below a spring stretches it.
 #[test]
-fn a_chain_hangs_as_far_at_every_step_in_every_storage() {
-    a_chain_hangs_as_far_at_every_step_in_every_storage_of(|storage, h| storage == Storage::Packed || h > 0.5);
+fn a_chain_has_the_same_sag_for_every_step_and_storage() {
+    a_chain_has_the_same_sag_for_every_step_and_storage_of(|storage, h| storage == Storage::Packed || h > 0.5);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_chain_hangs_as_far_at_every_step_in_every_storage_in_the_other_cases() {
-    a_chain_hangs_as_far_at_every_step_in_every_storage_of(|storage, h| storage != Storage::Packed && h < 0.5);
+fn a_chain_has_the_same_sag_for_every_step_and_storage_in_the_other_cases() {
+    a_chain_has_the_same_sag_for_every_step_and_storage_of(|storage, h| storage != Storage::Packed && h < 0.5);
 }
 
-fn a_chain_hangs_as_far_at_every_step_in_every_storage_of(is_tried: fn(Storage, f32) -> bool) {
+fn a_chain_has_the_same_sag_for_every_step_and_storage_of(is_selected: fn(Storage, f32) -> bool) {
     let (count, mass, stiffness) = (40, 0.01, 50.0);
     let mut parts = Parts::chain(count + 1, Vec3::Y * -0.1, mass, stiffness);
     parts.masses[0] = 0.0;
@@ -160,7 +161,7 @@ fn a_chain_hangs_as_far_at_every_step_in_every_storage_of(is_tried: fn(Storage, 
     let extension = pull * (count * (count + 1)) as f64 / 2.0;
     for storage in STORAGES {
         for (order, h, steps) in [(1, 1.0_f32, 400), (2, 0.1, 4000), (2, 1.0 / 60.0, 20_000)] {
-            if !is_tried(storage, h) {
+            if !is_selected(storage, h) {
                 continue;
             }
             let mut scene = Scene::with(&parts, world, |definition| BodyDefinition {
@@ -210,7 +211,7 @@ fn a_step_is_the_true_implicit_step_at_every_contrast() {
 }
 
 #[test]
-fn the_budget_is_kept_and_what_is_missing_reported() {
+fn the_budget_is_kept_and_the_residual_reported() {
     let world = WorldDefinition {
         gravity: Vec3::Y * -9.81,
         ..FREE
@@ -228,7 +229,7 @@ fn the_budget_is_kept_and_what_is_missing_reported() {
         let solved = scene.body().solver_report();
         assert!(solved.iterations <= iterations * report.substeps, "{solved:?}");
         assert!(scene.is_finite() && solved.error.is_finite());
-        // Where there is enough for it, it is solved, and where there is not that is said.
+        // A sufficient budget solves the equation; otherwise the report says that it is not solved.
         assert!(solved.has_converged || iterations < 5000, "{solved:?}");
         assert!(!solved.has_converged || iterations > 5, "{solved:?}");
         errors.push(solved.error);
@@ -237,7 +238,7 @@ fn the_budget_is_kept_and_what_is_missing_reported() {
 }
 
 #[test]
-fn a_change_of_topology_is_taken_in() {
+fn a_topology_change_takes_effect() {
     let world = WorldDefinition {
         gravity: Vec3::Y * -9.81,
         ..FREE
@@ -251,14 +252,14 @@ fn a_change_of_topology_is_taken_in() {
             ..definition
         });
         changed.run(1.0 / 60.0, 30);
-        let gone: Vec<[u32; 2]> = parts.springs.iter().copied().step_by(9).collect();
-        for &[a, b] in &gone {
+        let removed: Vec<[u32; 2]> = parts.springs.iter().copied().step_by(9).collect();
+        for &[a, b] in &removed {
             changed.body_mut().remove_spring(a, b).expect("a spring");
         }
         changed.body_mut().add_spring(0, 40, 30.0, Some(0.1)).expect("room");
         changed.run(1.0 / 60.0, 900);
-        // A body that was made that way.
-        let kept = |index: usize| !gone.contains(&parts.springs[index]);
+        // A body created with this topology.
+        let kept = |index: usize| !removed.contains(&parts.springs[index]);
         let mut other = parts.clone();
         let all = 0..parts.springs.len();
         other.springs = all.clone().filter(|&i| kept(i)).map(|i| parts.springs[i]).collect();
@@ -279,7 +280,7 @@ fn a_change_of_topology_is_taken_in() {
 }
 
 #[test]
-fn what_is_out_of_range_is_refused() {
+fn settings_out_of_range_are_refused() {
     let (parts, _) = two_masses();
     let mut world = World::new(FREE).expect("a world");
     let plain = BodyDefinition {
@@ -318,10 +319,10 @@ fn what_is_out_of_range_is_refused() {
     }
 }
 
-/// A node on a stiff spring, pushed aside: where IMPLICIT says that the equation is solved, a whole correction by the matrix without
-/// what pressed springs do sideways, in `f64`, is a small part of the way.
+/// A node on a stiff spring is pushed aside. Where IMPLICIT reports a solved equation, a full correction in `f64`, by
+/// the matrix without the transverse stiffness of compressed springs, is a small part of the displacement.
 #[test]
-fn what_is_said_to_be_solved_is_solved() {
+fn a_reported_solution_is_a_solution() {
     let mut solved = 0;
     for h in [1e-2_f32, 1.0 / 60.0, 0.1, 0.7] {
         for (stiffness, mass) in [
@@ -338,26 +339,26 @@ fn what_is_said_to_be_solved_is_solved() {
                 let force = Vec3::new(0.0, push, 0.1 * push);
                 scene.body_mut().apply_force(1, force).expect("a force");
                 let report = scene.step(h);
-                let told = scene.body().solver_report();
-                // A step that was taken again in parts is another one.
-                if !told.has_converged || report.substeps > 1 {
+                let solver_report = scene.body().solver_report();
+                // A step that was repeated in substeps solves another equation.
+                if !solver_report.has_converged || report.substeps > 1 {
                     continue;
                 }
                 solved += 1;
                 let position = scene.positions()[1];
-                let way = position - DVec3::X * f64::from(parts.positions[1].x);
+                let displacement = position - DVec3::X * f64::from(parts.positions[1].x);
                 let (length, along) = (position.length(), position.normalize());
                 let (k, rest) = (f64::from(stiffness), f64::from(parts.rest_lengths[0]));
                 let inertia = f64::from(mass) / f64::from(h).powi(2);
-                let residual = force.as_dvec3() - along * (k * (length - rest)) - way * inertia;
+                let residual = force.as_dvec3() - along * (k * (length - rest)) - displacement * inertia;
                 let stretched = residual.dot(along);
                 let sideways = inertia + (k * (1.0 - rest / length)).max(0.0);
                 let correction = along * (stretched / (inertia + k)) + (residual - along * stretched) / sideways;
                 // Positions are rounded to 4e-9 m, which is a force on the spring.
-                let part = (correction.length() - 1e-7).max(0.0) / way.length();
+                let part = (correction.length() - 1e-7).max(0.0) / displacement.length();
                 assert!(
                     part < 0.03,
-                    "{stiffness} N/m, {mass} kg, {push} N, {h} s: {part:.2e}, {told:?}"
+                    "{stiffness} N/m, {mass} kg, {push} N, {h} s: {part:.2e}, {solver_report:?}"
                 );
             }
         }
@@ -365,9 +366,9 @@ fn what_is_said_to_be_solved_is_solved() {
     assert!(solved >= 50, "{solved} of 60");
 }
 
-/// Whatever the forces, velocities, places or masses: a step ends in finite numbers, or puts the body back to the bit.
+/// For any forces, velocities, positions or masses, a step ends in finite numbers or rolls the body back bitwise.
 #[test]
-fn what_would_not_be_finite_is_put_back() {
+fn a_step_to_infinity_is_rolled_back() {
     let world = WorldDefinition {
         gravity: Vec3::Y * -9.81,
         ..FREE
@@ -408,18 +409,18 @@ fn what_would_not_be_finite_is_put_back() {
                     *restored += 1;
                     assert_eq!(state(&scene), before, "{named}");
                 } else {
-                    // Nothing was left out: what is pulled like that, or goes so fast, goes on.
+                    // Nothing else is refused: the body goes on under such forces and at such speeds.
                     let led = scene.positions()[if what == "pin" { 1 } else { 2 }].length();
                     assert!(what == "place" || led > 1e20, "{named}: {led}");
                 }
             }
         }
     }
-    // A pin that goes so far has more energy than a number holds.
+    // A pin this fast has more energy than `f32` can represent.
     assert!(restored.iter().all(|&count| count >= 6), "{restored:?}");
 }
 
-/// A step that is refused, here for a body of VERLET beside it, changes neither what follows nor what is told.
+/// A refused step, here caused by a VERLET body in the same world, changes neither later steps nor reports.
 #[test]
 fn a_refused_step_leaves_no_trace() {
     for seed in 0..10 {
@@ -439,9 +440,9 @@ fn a_refused_step_leaves_no_trace() {
             scene
         };
         let (mut plain, mut refused) = (make(), make());
-        let told = refused.body().solver_report();
+        let report = refused.body().solver_report();
         assert!(matches!(refused.world.step(1e4), Err(Error::Unstable { .. })));
-        assert_eq!(refused.body().solver_report(), told);
+        assert_eq!(refused.body().solver_report(), report);
         for step in 0..30 {
             plain.step(0.01);
             refused.step(0.01);

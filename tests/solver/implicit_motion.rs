@@ -1,5 +1,5 @@
-//! IMPLICIT and NEWTON against motions that are known: each against the exact solution of its own formula, oscillators, damping,
-//! falls, waves, the pendulum, momentum, and the same motion turned and moved.
+//! IMPLICIT and NEWTON against known motions, each by the exact solution of its own formula: oscillators, damping,
+//! falls, waves, the pendulum, momentum, and the same motion rotated and translated.
 
 use std::f64::consts::PI;
 
@@ -15,7 +15,7 @@ use sinew::{BodyDefinition, Material, Model, Solver, World, WorldDefinition};
 
 const SOLVERS: [Solver; 2] = [Solver::Implicit, Solver::Newton];
 
-/// Solved as exactly as can be asked for, so that the formula is what is seen.
+/// Creates a scene whose equations are solved as exactly as possible, so that only the error of the formula remains.
 fn scene(parts: &Parts, world: WorldDefinition, solver: Solver, order: u32) -> Scene {
     Scene::with(parts, world, |definition| BodyDefinition {
         solver,
@@ -31,7 +31,7 @@ fn under(gravity: Vec3) -> WorldDefinition {
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
-/// The two masses, damped at their nodes: 0.75 kg reduced mass.
+/// Two masses with nodal damping: 0.75 kg reduced mass.
 fn damped_masses(zeta: f64) -> (Parts, Mode) {
     let (mut parts, _) = two_masses();
     let rate = 2.0 * zeta * omega();
@@ -39,7 +39,7 @@ fn damped_masses(zeta: f64) -> (Parts, Mode) {
     (parts, Mode::new(omega(), rate, STRETCH, 0.0))
 }
 
-/// The motion after so many steps.
+/// Returns the scene after this many steps.
 fn damped(solver: Solver, order: u32, parts: &Parts, mode: &Mode, h: f32, steps: usize) -> Scene {
     let mut scene = scene(parts, FREE, solver, order);
     let v0 = mode.now[1];
@@ -64,7 +64,7 @@ fn oscillators_follow_the_discrete_solution() {
                         let (q, v) = stretch(&scene);
                         let error = (q - expected.now[0]).hypot((v - expected.now[1]) / omega()) / STRETCH;
                         let named = format!("{solver:?}, order {order}, zeta {zeta}, h omega {x}, {steps} steps");
-                        // Positions are rounded to 7.5e-9 m, 1.5e-7 of the stretch, again and again with IMPLICIT.
+                        // Positions are rounded to 7.5e-9 m, 1.5e-7 of the stretch, in each step of IMPLICIT.
                         assert!(error < 2e-6, "{named}: {error:.2e}");
                     }
                 }
@@ -88,7 +88,7 @@ fn damped_oscillators_converge_and_decay_alike() {
                 let (re, im) = (q, -(v + zeta * omega() * q) / turns);
                 let amplitude = STRETCH * (-zeta * omega() * t).exp();
                 let decay = -(re.hypot(im) / STRETCH).ln() / (zeta * omega() * t);
-                // The formula's own is (h omega)² more, and what its first step takes.
+                // The formula itself adds (h omega)² and the error of its first step.
                 assert!((decay - 1.0).abs() < 1e-3, "{solver:?}, zeta {zeta}: decay {decay}");
                 (re - amplitude * (turns * t).cos()).hypot(im - amplitude * (turns * t).sin()) / amplitude
             });
@@ -104,7 +104,7 @@ fn damped_oscillators_converge_and_decay_alike() {
 }
 
 #[test]
-fn nodes_reach_their_terminal_velocity_at_every_step() {
+fn nodes_reach_their_terminal_velocity_with_every_step() {
     let mut parts = Parts::nodes(vec![Vec3::ZERO, Vec3::X, Vec3::Y], 0.0);
     parts.masses = vec![0.001, 0.5, 20.0];
     parts.node_dampings = vec![1.0, 20.0, 1000.0];
@@ -125,9 +125,9 @@ fn nodes_reach_their_terminal_velocity_at_every_step() {
                         modes[node].step(order, f64::from(h));
                         let terminal = f64::from(DOWN.y) / rate(node);
                         let error = (velocity.y - modes[node].now[1]) / terminal;
-                        // A step rounds the velocity by 6e-8, and forgets the part h rate of it.
+                        // A step rounds the velocity by 6e-8, and damping forgets the fraction h rate of it.
                         let rounded = f64::max(1e-5, 3.6e-7 / (rate(node) * f64::from(h)));
-                        // A millionth of what all nodes do together, in the norm of their masses, may be missing.
+                        // The solver may leave a residual of 1e-6 of the motion of all nodes, in the mass norm.
                         let unsolved = match solver {
                             Solver::Implicit => f64::from(all / parts.masses[node]).sqrt() * 1e-6,
                             _ => 0.0,
@@ -146,33 +146,34 @@ fn nodes_reach_their_terminal_velocity_at_every_step() {
     }
 }
 
-/// g n (n + 1) h² / 2 with order 1; g t² / 2 with order 2, but for its first step.
+/// The fall is g n (n + 1) h² / 2 with order 1, and g t² / 2 with order 2 except in its first step.
 #[test]
-fn bodies_fall_as_the_formula_says_far_from_the_origin() {
-    bodies_fall_as_the_formula_says_of(|case| [2, 9].contains(&case));
+fn bodies_fall_by_the_formula_far_from_the_origin() {
+    bodies_fall_by_the_formula_of(|case| [2, 9].contains(&case));
 }
 
 #[test]
 #[ignore = "long"]
-fn bodies_fall_as_the_formula_says_in_the_other_cases() {
-    bodies_fall_as_the_formula_says_of(|case| ![2, 9].contains(&case));
+fn bodies_fall_by_the_formula_in_the_other_cases() {
+    bodies_fall_by_the_formula_of(|case| ![2, 9].contains(&case));
 }
 
-/// Twelve cases: of each solver, of each order, three distances.
-fn bodies_fall_as_the_formula_says_of(is_tried: fn(usize) -> bool) {
+/// Twelve cases: each solver, each order, three distances.
+fn bodies_fall_by_the_formula_of(is_selected: fn(usize) -> bool) {
     let h = 1e-4_f32;
     let mut case = 0;
     for solver in SOLVERS {
         for order in [1, 2] {
             for offset in [0.0_f32, 10.0, 10_000.0] {
                 case += 1;
-                if !is_tried(case - 1) {
+                if !is_selected(case - 1) {
                     continue;
                 }
                 let parts = Parts::block([1, 1, 1], 0.05, 0.01, 50.0)
                     .moved(Quat::IDENTITY, Vec3::new(-offset, offset, 0.3 * offset));
                 let mut scene = scene(&parts, under(DOWN), solver, order);
-                // Of the centre: the roundings of its places make a body's nodes tremble against each other.
+                // This is the motion of the center: rounded positions make the nodes of a body vibrate against each
+                // other.
                 let centre = |vectors: &[DVec3]| vectors.iter().sum::<DVec3>() / vectors.len() as f64;
                 let start = centre(&scene.positions());
                 let mut expected = Mode {
@@ -190,14 +191,14 @@ fn bodies_fall_as_the_formula_says_of(is_tried: fn(usize) -> bool) {
                     let rounding = rounding(start.y) + rounding(fall);
                     let [y, v] = expected.now;
                     let error = (fall + y).abs();
-                    // 3e-5 is aimed at; what f32 rounds off the velocity in each step adds up to 7e-5 of the fall.
+                    // The target is 3e-5; rounding the velocity in each step adds up to 7e-5 of the fall in `f32`.
                     assert!(error < 1e-4 * fall + rounding, "{named}: {:.2e}", error / fall);
-                    // Of the true fall, order 1 is off by h / t.
+                    // Order 1 differs from the true fall by h / t.
                     let error = (fall / (0.5 * f64::from(-DOWN.y) * t * t) - 1.0).abs();
                     let discrete = if order == 1 { 1.01 * f64::from(h) / t } else { 0.0 };
                     assert!(t < 0.9 || error < 1e-4 + discrete + rounding, "{named}: {error:.2e}");
                     let off = centre(&scene.velocities()).distance(DVec3::Y * v) / v.abs();
-                    // 1e-4 is aimed at; 1.3e-4 comes of it.
+                    // The target is 1e-4; the result is 1.3e-4.
                     assert!(off < 2e-4, "{named}: velocity {off:.2e}");
                 }
             }
@@ -243,7 +244,7 @@ fn waves_travel_at_their_speed() {
         let waves = Waves::new(free);
         let mut scene = scene(&waves.parts, FREE, solver, 2);
         waves.start(&mut scene);
-        // A node in 10 ms: what the ends do does not come to the middle.
+        // A wave takes 10 ms per node: disturbances from the ends do not reach the middle.
         let h = 0.001;
         let steps = (free - 39) * 5 / 2;
         scene.run(h, steps);
@@ -255,7 +256,7 @@ fn waves_travel_at_their_speed() {
     }
 }
 
-/// The period of the pendulum from 150 degrees over what it should be, less 1, in steps of 1 ms.
+/// The relative error of the pendulum's period from 150 degrees, in steps of 1 ms.
 fn error_of_period(solver: Solver) -> f64 {
     let (pendulum, h) = (Pendulum::from_150_degrees(), 1e-3_f32);
     let mut scene = scene(&pendulum.parts, under(Vec3::NEG_Y * pendulum.gravity), solver, 2);
@@ -274,9 +275,9 @@ fn a_pendulum_from_150_degrees_keeps_its_period() {
     }
 }
 
-/// Springs give a body neither momentum nor angular momentum.
+/// Springs change neither momentum nor angular momentum of a body.
 #[test]
-fn springs_give_no_momentum_and_no_torque() {
+fn springs_exert_no_net_force_and_no_net_torque() {
     for solver in SOLVERS {
         for order in [1, 2] {
             let mut random = Random::new(2);
@@ -319,7 +320,7 @@ fn springs_give_no_momentum_and_no_torque() {
     }
 }
 
-/// About the centre of mass, and the sum of what its parts are at most.
+/// Returns the angular momentum about the center of mass, and the sum of the magnitudes of its parts.
 fn angular_momentum(scene: &Scene, masses: &[f32]) -> (DVec3, f64) {
     let (positions, velocities) = (scene.positions(), scene.velocities());
     let all: f64 = masses.iter().map(|&mass| f64::from(mass)).sum();
@@ -334,20 +335,20 @@ fn angular_momentum(scene: &Scene, masses: &[f32]) -> (DVec3, f64) {
     (sum, reach)
 }
 
-/// A block of springs and one of elements spin at 5 rad/s for 1 s, also while they fall: by the formula alone they would lose 0.5 %
-/// with order 2 and steps of 1/60 s, and far more with order 1.
+/// A block of springs and one of elements spin at 5 rad/s for 1 s, also while they fall. The formula alone would lose
+/// 0.5 % with order 2 and steps of 1/60 s, and far more with order 1.
 #[test]
-fn a_free_body_spins_on() {
-    a_free_body_spins_on_of(|solver, order, is_solid| (order == 2) == (is_solid == (solver == Solver::Implicit)));
+fn a_free_body_keeps_spinning() {
+    a_free_body_keeps_spinning_of(|solver, order, is_solid| (order == 2) == (is_solid == (solver == Solver::Implicit)));
 }
 
 #[test]
 #[ignore = "long"]
-fn a_free_body_spins_on_in_the_other_cases() {
-    a_free_body_spins_on_of(|solver, order, is_solid| (order == 2) != (is_solid == (solver == Solver::Implicit)));
+fn a_free_body_keeps_spinning_in_the_other_cases() {
+    a_free_body_keeps_spinning_of(|solver, order, is_solid| (order == 2) != (is_solid == (solver == Solver::Implicit)));
 }
 
-fn a_free_body_spins_on_of(is_tried: fn(Solver, u32, bool) -> bool) {
+fn a_free_body_keeps_spinning_of(is_selected: fn(Solver, u32, bool) -> bool) {
     let h = 1.0 / 60.0;
     let spin = Vec3::new(0.0, 5.0, 0.0);
     let mesh = Mesh::block([1.5; 3], [3; 3]).expect("a block");
@@ -362,13 +363,13 @@ fn a_free_body_spins_on_of(is_tried: fn(Solver, u32, bool) -> bool) {
     for solver in SOLVERS {
         for order in [1, 2] {
             for gravity in [Vec3::ZERO, DOWN] {
-                // NEWTON takes its time.
+                // NEWTON is slow.
                 if solver == Solver::Newton && gravity != Vec3::ZERO {
                     continue;
                 }
                 for is_solid in [false, true]
                     .into_iter()
-                    .filter(|&is_solid| is_tried(solver, order, is_solid))
+                    .filter(|&is_solid| is_selected(solver, order, is_solid))
                 {
                     let (parts, mut scene) = if is_solid {
                         let mut world = World::new(under(gravity)).expect("a world");
@@ -413,10 +414,11 @@ fn a_free_body_spins_on_of(is_tried: fn(Solver, u32, bool) -> bool) {
     }
 }
 
-/// An organ that turns by two thirds of a radian in a step, as stiff and incompressible as tissue is, asks more than the budget pays for. What
-/// steps that are not solved have gained comes off its deformation: off all velocities, it cost 3 % of the spin within six steps.
+/// An organ that turns by two thirds of a radian per step, as stiff and incompressible as tissue, needs more than the
+/// budget allows. Energy gained by unsolved steps is removed from the deformation: removing it from all velocities cost
+/// 3 % of the spin within six steps.
 #[test]
-fn a_step_that_is_not_solved_does_not_brake_a_spin() {
+fn an_unsolved_step_does_not_brake_a_spin() {
     let mesh = Mesh::organ(0.15, 0.012).expect("an organ");
     let mut world = World::new(FREE).expect("a world");
     let definition = BodyDefinition {
@@ -426,7 +428,7 @@ fn a_step_that_is_not_solved_does_not_brake_a_spin() {
     let id = world.create_body(&definition).expect("a body");
     let mut scene = Scene { world, id };
     let spin = 20.0 * Vec3::new(0.3, 1.0, 0.2).normalize();
-    let velocities: Vec<Vec3> = mesh.positions.iter().map(|place| spin.cross(*place)).collect();
+    let velocities: Vec<Vec3> = mesh.positions.iter().map(|position| spin.cross(*position)).collect();
     scene.body_mut().set_velocities(&velocities).expect("velocities");
     let mut masses = vec![0.0; velocities.len()];
     scene.body().node_masses(&mut masses).expect("masses");
@@ -436,12 +438,12 @@ fn a_step_that_is_not_solved_does_not_brake_a_spin() {
         scene.step(1.0 / 30.0);
         is_solved &= scene.body().solver_report().has_converged;
     }
-    assert!(!is_solved, "the scene shows nothing");
+    assert!(!is_solved, "the scene has no effect to test");
     let lost = angular_momentum(&scene, &masses).0.distance(first) / first.length();
     assert!(lost < 2e-3, "{lost:.2e}");
 }
 
-/// The slowest mode of a chain 1 m long, of which a step goes by less than coordinates are rounded to.
+/// The slowest mode of a chain 1 m long, which moves less per step than the rounding of coordinates.
 #[test]
 fn slow_small_motion_follows_the_discrete_solution() {
     let (free, spacing, mass, stiffness) = (49, 0.02_f32, 0.01_f32, 100.0_f32);
@@ -474,16 +476,16 @@ fn slow_small_motion_follows_the_discrete_solution() {
                 let v = project(&scene.velocities(), 0.0);
                 worst = worst.max((q - expected.now[0]).hypot((v - expected.now[1]) / omega) / amplitude);
             }
-            // `accuracy` is 0.01. A millionth of the length is but some of the last places of coordinates.
+            // `accuracy` is 0.01. A millionth of the length is only a few units in the last place of coordinates.
             let allowed = if size < 1e-5 { 0.1 } else { 0.02 };
             assert!(worst < allowed, "{size:e} of its length, {h} s: {worst:.2e}");
         }
     }
 }
 
-/// A bar of elements that rings by a millionth to a hundredth of its length, as NEWTON has it with the same formula.
+/// A bar of elements vibrates by a millionth to a hundredth of its length, as with NEWTON and the same formula.
 #[test]
-fn a_bar_rings_by_however_little() {
+fn a_bar_vibrates_at_any_amplitude() {
     let mesh = Mesh::block([0.1, 0.02, 0.02], [10, 2, 2]).expect("a block");
     let shape = |p: &Vec3| Vec3::Y * (10.0 * (p.x + 0.05)).powi(2);
     let rate = 5.0_f32;
@@ -520,7 +522,7 @@ fn a_bar_rings_by_however_little() {
                 });
                 worst = worst.max((implicit[0] - newton[0]).hypot(implicit[1] - newton[1]) / amplitude);
             }
-            // The strains of a millionth are five times what they are rounded by.
+            // Strains of a millionth are five times their rounding error.
             let allowed = if size < 1e-5 { 0.1 } else { 0.02 };
             assert!(worst < allowed, "{size:e} of its length, {h} s: {worst:.2e}");
         }
@@ -528,7 +530,7 @@ fn a_bar_rings_by_however_little() {
 }
 
 #[test]
-fn the_motion_turns_and_moves_with_the_scene() {
+fn the_motion_rotates_and_translates_with_the_scene() {
     let gravity = Vec3::new(1.0, -9.0, 2.0);
     let mut parts = Parts::block([3, 2, 2], 0.05, 0.01, 40.0);
     let mut random = Random::new(3);
@@ -558,10 +560,10 @@ fn the_motion_turns_and_moves_with_the_scene() {
     }
 }
 
-/// In a step of one equation a pin without mass is held against the spring at it, as that is at the end: however often the step was
-/// tried, which chains that are flung about in steps of any length have happen.
+/// In a step of one equation, a pin without mass balances the spring force at the end of the step, counted once however
+/// often the step was tried. Chains that are thrown about with varying steps need such retries.
 #[test]
-fn what_holds_a_pin_is_counted_once() {
+fn a_pin_force_is_counted_once() {
     let mut looked_at = 0;
     for seed in 0..100 {
         let mut random = Random::new(seed);
@@ -584,9 +586,9 @@ fn what_holds_a_pin_is_counted_once() {
             }
             looked_at += 1;
             let positions = scene.positions();
-            let way = positions[1] - positions[0];
-            let stretch = way.length() - f64::from(parts.rest_lengths[0]);
-            let expected = way.normalize() * (-f64::from(stiffness) * stretch);
+            let link = positions[1] - positions[0];
+            let stretch = link.length() - f64::from(parts.rest_lengths[0]);
+            let expected = link.normalize() * (-f64::from(stiffness) * stretch);
             let found = scene.body().pin_force(0).expect("a pin").as_dvec3();
             let error = found.distance(expected) / expected.length().max(1e-3);
             assert!(

@@ -1,5 +1,5 @@
-//! IMPLICIT pressed at the speed of a hand, 0.1 m/s, in frames of 1/60 s: it finds the forces that VERLET does, and its equations are
-//! solved within their budget, however many contacts come and go.
+//! IMPLICIT pressed at the speed of a hand, 0.1 m/s, in frames of 1/60 s: its forces agree with VERLET, and its
+//! equations are solved within their budget however many contacts form and open.
 
 use crate::support::held_block::{CELL, TOP, held_block};
 use crate::support::solid::ball;
@@ -11,18 +11,18 @@ const FRAME: f32 = 1.0 / 60.0;
 const SPEED: f32 = 0.1;
 const DEPTH: f32 = 0.006;
 
-/// Of a frame.
-struct Felt {
+/// The measured values of one frame.
+struct Sample {
     /// N
     force: f64,
     products: u32,
     converged: bool,
 }
 
-/// What a ball feels that is pressed into a block and stays there.
-fn press(solver: Solver, elements: bool, shape: Shape) -> Vec<Felt> {
+/// Returns the forces on a ball that is pressed into a block and stays there.
+fn press(solver: Solver, elements: bool, shape: Shape) -> Vec<Sample> {
     let (mut world, body, _) = held_block(elements, solver);
-    // Aside of the mesh's symmetry, and a little above.
+    // Off the symmetry axis of the mesh, and slightly above the block.
     let at = |depth: f32| Vec3::new(0.3 * CELL, TOP + RADIUS - depth, 0.1 * CELL);
     let tool = world
         .create_tool(&ToolDefinition {
@@ -40,7 +40,7 @@ fn press(solver: Solver, elements: bool, shape: Shape) -> Vec<Felt> {
             world.set_pose(tool, at(depth), None).expect("a pose");
             world.step(FRAME).expect("a step");
             let report = world.body(body).expect("the body").solver_report();
-            Felt {
+            Sample {
                 force: f64::from(world.wrench(tool).expect("a tool").0.y),
                 products: report.iterations,
                 converged: report.has_converged,
@@ -50,17 +50,17 @@ fn press(solver: Solver, elements: bool, shape: Shape) -> Vec<Felt> {
 }
 
 #[test]
-fn a_tool_pressed_by_hand_feels_what_it_should() {
-    a_tool_pressed_by_hand_feels_what_it_should_of(&[(true, true)]);
+fn a_tool_pressed_by_hand_gets_the_right_force() {
+    a_tool_pressed_by_hand_gets_the_right_force_of(&[(true, true)]);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_tool_pressed_by_hand_feels_what_it_should_in_the_other_cases() {
-    a_tool_pressed_by_hand_feels_what_it_should_of(&[(false, false), (true, false)]);
+fn a_tool_pressed_by_hand_gets_the_right_force_in_the_other_cases() {
+    a_tool_pressed_by_hand_gets_the_right_force_of(&[(false, false), (true, false)]);
 }
 
-fn a_tool_pressed_by_hand_feels_what_it_should_of(cases: &[(bool, bool)]) {
+fn a_tool_pressed_by_hand_gets_the_right_force_of(cases: &[(bool, bool)]) {
     let round = ball(RADIUS, 3);
     let mesh = Shape::Mesh {
         positions: &round.positions,
@@ -74,11 +74,11 @@ fn a_tool_pressed_by_hand_feels_what_it_should_of(cases: &[(bool, bool)]) {
         let right = press(Solver::Verlet, elements, shape);
         let found = press(Solver::Implicit, elements, shape);
         let largest = right.iter().map(|felt| felt.force).fold(0.0, f64::max);
-        assert!(largest > 0.5, "{case}: nothing to be measured, {largest} N");
+        assert!(largest > 0.5, "{case}: force too small to measure, {largest} N");
         for (frame, (found, right)) in found.iter().zip(&right).enumerate() {
-            // Parts of 1 ms are of order 1.
-            let off = (found.force - right.force).abs() / largest;
-            if off > 0.02 || !found.converged || found.products > 700 {
+            // Substeps of 1 ms have order 1.
+            let error = (found.force - right.force).abs() / largest;
+            if error > 0.02 || !found.converged || found.products > 700 {
                 failures.push(format!(
                     "{case}, frame {frame}: {} N, {} N is right, {} products, solved: {}",
                     found.force, right.force, found.products, found.converged

@@ -1,5 +1,5 @@
-//! A sphere that touches many nodes, edges and faces of a block: IMPLICIT finds what VERLET does on the same mesh, comes to rest, and
-//! takes a few products for it.
+//! A sphere that touches many nodes, edges and faces of a block: IMPLICIT agrees with VERLET on the same mesh, comes to
+//! rest, and takes few products.
 
 use glam::{DVec3, Vec3};
 use sinew::{BodyId, Pose, Shape, Solver, ToolDefinition, ToolId, World};
@@ -42,12 +42,12 @@ impl Scene {
         }
     }
 
-    /// Where the sphere is at a depth, aside of the mesh's symmetry.
+    /// Returns the position of the sphere at a depth, off the symmetry axis of the mesh.
     fn at(radius: f32, depth: f32) -> Vec3 {
         Vec3::new(0.3 * CELL, TOP + radius - depth, 0.1 * CELL)
     }
 
-    /// One frame to this depth: the force upon the sphere.
+    /// Takes one frame to this depth and returns the force on the sphere.
     fn step(&mut self, depth: f32) -> Vec3 {
         let place = Self::at(self.radius, depth);
         self.world.set_pose(self.tool, place, None).expect("a pose");
@@ -56,7 +56,7 @@ impl Scene {
         self.world.wrench(self.tool).expect("a tool").0
     }
 
-    /// How deep the surface is within the sphere, m.
+    /// Returns the penetration of the surface into the sphere (m).
     fn depth(&self) -> f64 {
         let centre = self.world.pose(self.tool).expect("a tool").position.as_dvec3();
         let positions = self.world.body(self.body).expect("the body").positions();
@@ -71,9 +71,9 @@ impl Scene {
     }
 }
 
-/// From a point to a triangle (Ericson 2005, section 5.1.5).
+/// Returns the distance of a point from a triangle (Ericson 2005, section 5.1.5).
 fn distance(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
-    let of_edge = |from: DVec3, to: DVec3| {
+    let nearest_on_edge = |from: DVec3, to: DVec3| {
         let along = ((point - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
         from.lerp(to, along).distance(point)
     };
@@ -84,24 +84,26 @@ fn distance(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     if is_inside {
         return (point - a).dot(normal.normalize()).abs();
     }
-    of_edge(a, b).min(of_edge(b, c)).min(of_edge(c, a))
+    nearest_on_edge(a, b)
+        .min(nearest_on_edge(b, c))
+        .min(nearest_on_edge(c, a))
 }
 
-/// What a sphere feels that is pressed in for so many frames and stays for as many.
+/// The measured values of a sphere that is pressed in and then stays for as many frames.
 struct Course {
-    /// After each frame, N.
+    /// After each frame (N).
     forces: Vec<f64>,
     /// Products of each frame.
     products: Vec<u32>,
     /// J
     energies: Vec<f64>,
-    /// The deepest that the surface is within the sphere after any frame, m.
-    deepest: f64,
-    /// In the last frame.
+    /// The maximum penetration of the surface into the sphere after any frame (m).
+    max_penetration: f64,
+    /// True if the last frame converged.
     converged: bool,
 }
 
-/// The contact's radius at the end, in cells.
+/// The contact radius at the end, in cells.
 const CONTACT: f32 = 3.0;
 
 fn course(tissue: Tissue, solver: Solver, radius: f32, frames: usize) -> Course {
@@ -111,7 +113,7 @@ fn course(tissue: Tissue, solver: Solver, radius: f32, frames: usize) -> Course 
         forces: Vec::new(),
         products: Vec::new(),
         energies: Vec::new(),
-        deepest: 0.0,
+        max_penetration: 0.0,
         converged: true,
     };
     for frame in 1..=2 * frames {
@@ -120,34 +122,34 @@ fn course(tissue: Tissue, solver: Solver, radius: f32, frames: usize) -> Course 
         course.forces.push(f64::from(force.y));
         course.products.push(report.iterations);
         course.energies.push(scene.energy());
-        course.deepest = course.deepest.max(scene.depth());
+        course.max_penetration = course.max_penetration.max(scene.depth());
         course.converged = report.has_converged;
     }
     course
 }
 
-/// Frames to press in, and to stay.
+/// Frames to press in, and frames to stay.
 const FRAMES: usize = 20;
 
 #[test]
-fn many_contacts_push_as_they_do_in_short_steps() {
-    many_contacts_push_as_they_do_in_short_steps_of(Tissue::Tetrahedra, 16.0 * CELL);
+fn many_contacts_give_the_force_of_short_steps() {
+    many_contacts_give_the_force_of_short_steps_of(Tissue::Tetrahedra, 16.0 * CELL);
 }
 
 #[test]
 #[ignore = "long"]
-fn many_contacts_push_as_they_do_in_short_steps_with_springs() {
-    many_contacts_push_as_they_do_in_short_steps_of(Tissue::Springs, 8.0 * CELL);
+fn many_contacts_give_the_force_of_short_steps_with_springs() {
+    many_contacts_give_the_force_of_short_steps_of(Tissue::Springs, 8.0 * CELL);
 }
 
-fn many_contacts_push_as_they_do_in_short_steps_of(tissue: Tissue, radius: f32) {
+fn many_contacts_give_the_force_of_short_steps_of(tissue: Tissue, radius: f32) {
     let case = format!("{tissue:?}, {radius} m");
     let expected = course(tissue, Solver::Verlet, radius, FRAMES);
     let found = course(tissue, Solver::Implicit, radius, FRAMES);
     for (frame, (force, expected)) in found.forces.iter().zip(&expected.forces).enumerate().skip(4) {
-        let off = force / expected - 1.0;
+        let error = force / expected - 1.0;
         assert!(
-            off.abs() < 0.02,
+            error.abs() < 0.02,
             "{case}, frame {frame}: {force} N, {expected} N is right"
         );
     }
@@ -163,11 +165,11 @@ fn many_contacts_push_as_they_do_in_short_steps_of(tissue: Tissue, radius: f32) 
     let energies = &found.energies[2 * FRAMES - 6..];
     assert!(energies[5] <= energies[0] * (1.0 + 1e-5), "{case}: {energies:?} J");
     assert!(
-        found.deepest < 1e-4 * f64::from(radius),
+        found.max_penetration < 1e-4 * f64::from(radius),
         "{case}: {} m deep",
-        found.deepest
+        found.max_penetration
     );
-    // Of seventeen parts each: thousands where contacts are not solved with the geometry that they have at the end.
+    // For seventeen substeps each. Solving contacts with outdated geometry would take thousands.
     let (pressing, resting) = found.products.split_at(FRAMES);
     assert!(pressing.iter().all(|&products| products < 700), "{case}: {pressing:?}");
     assert!(

@@ -1,5 +1,6 @@
-//! Rest shapes that IMPLICIT and NEWTON come to under damping, and states of rest, against statics: a catenary, patches of lattice
-//! and triangles under even stress (Cauchy-Born). Chains that hang are in `implicit.rs`, `newton.rs` and `rest_state.rs`.
+//! Rest shapes of IMPLICIT and NEWTON under damping, and static equilibria, against statics: a catenary, patches of
+//! lattice and triangles under uniform stress (Cauchy-Born). Hanging chains are in `implicit.rs`, `newton.rs` and
+//! `rest_state.rs`.
 
 use std::ops::Range;
 
@@ -8,8 +9,8 @@ use crate::support::statics::{Catenary, G, Patch, damp};
 use glam::Vec3;
 use sinew::{BodyDefinition, RestStateDefinition, Solver, Storage, WorldDefinition};
 
-/// A solver and a storage for each: every solver with two of them, and by motion or by a search for rest.
-const WAYS: [(Solver, Storage, bool); 8] = [
+/// A solver and a storage for each case: every solver with two storages, by motion or by a search for equilibrium.
+const CASES: [(Solver, Storage, bool); 8] = [
     (Solver::Implicit, Storage::Packed, true),
     (Solver::Implicit, Storage::FastLink, true),
     (Solver::Implicit, Storage::Efficient, true),
@@ -20,7 +21,7 @@ const WAYS: [(Solver, Storage, bool); 8] = [
     (Solver::Implicit, Storage::Packed, false),
 ];
 
-/// The body after so many frames, or in its state of rest; `load` is what acts on it.
+/// Returns the body after this many frames, or in static equilibrium, under `load`.
 fn settled(
     parts: &Parts,
     gravity: Vec3,
@@ -49,28 +50,28 @@ fn settled(
 }
 
 #[test]
-fn a_chain_held_at_both_ends_hangs_as_the_discrete_catenary() {
+fn a_chain_held_at_both_ends_is_a_discrete_catenary() {
     let mut chain = Catenary::new();
     damp(&mut chain.parts, 2.0);
-    for way in WAYS {
-        let scene = settled(&chain.parts, Vec3::NEG_Y * G, 1200, way, |_| {});
+    for case in CASES {
+        let scene = settled(&chain.parts, Vec3::NEG_Y * G, 1200, case, |_| {});
         let error = chain.error_of(&scene);
-        assert!(error < 1e-6, "{way:?}: {error:.2e}");
+        assert!(error < 1e-6, "{case:?}: {error:.2e}");
     }
 }
 
 #[test]
-fn patches_stretch_as_their_lattices() {
-    patches_stretch_as_their_lattices_of(0..1);
+fn patches_stretch_like_their_lattices() {
+    patches_stretch_like_their_lattices_of(0..1);
 }
 
 #[test]
 #[ignore = "long"]
-fn patches_stretch_as_their_lattices_in_the_other_cases() {
-    patches_stretch_as_their_lattices_of(1..3);
+fn patches_stretch_like_their_lattices_in_the_other_cases() {
+    patches_stretch_like_their_lattices_of(1..3);
 }
 
-fn patches_stretch_as_their_lattices_of(cases: Range<usize>) {
+fn patches_stretch_like_their_lattices_of(cases: Range<usize>) {
     for (name, mut patch) in [
         ("lattice", Patch::lattice(1.08)),
         ("triangles along x", Patch::triangles(0, 1, 1.06)),
@@ -81,10 +82,10 @@ fn patches_stretch_as_their_lattices_of(cases: Range<usize>) {
     .skip(cases.start)
     {
         damp(&mut patch.parts, 10.0);
-        for way in WAYS {
-            let scene = settled(&patch.parts, Vec3::ZERO, 600, way, |scene| patch.load(scene));
+        for case in CASES {
+            let scene = settled(&patch.parts, Vec3::ZERO, 600, case, |scene| patch.load(scene));
             let error = patch.error_of(&scene);
-            assert!(error < 1e-5, "{name}, {way:?}: {error:.2e}");
+            assert!(error < 1e-5, "{name}, {case:?}: {error:.2e}");
         }
     }
 }

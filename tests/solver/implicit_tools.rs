@@ -1,5 +1,5 @@
-//! IMPLICIT and NEWTON with tools: what springs do against a tool belongs to the equation, so a tool feels what it should
-//! whatever the step; and a step near tools ends.
+//! IMPLICIT and NEWTON with tools: the spring reaction to a tool belongs to the equation, so the tool gets the right
+//! force for every step length, and a step near tools ends.
 
 use glam::{Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -12,8 +12,8 @@ use crate::support::bodies::FREE;
 use crate::support::organ::of_elements;
 
 const THICKNESS: f32 = 0.06;
-/// The most parts of a step to a tolerance.
-const CUT: u32 = 64;
+/// The maximum number of substeps of a step to a tolerance.
+const MAX_SUBSTEPS: u32 = 64;
 const START: f32 = THICKNESS + 1e-3;
 
 /// A block between two planes.
@@ -22,8 +22,8 @@ struct Press {
     body: BodyId,
     planes: [(f32, ToolId); 2],
     distance: f32,
-    /// What the planes have put in, J.
-    worked: f64,
+    /// The work done by the planes (J).
+    work: f64,
 }
 
 impl Press {
@@ -37,7 +37,7 @@ impl Press {
         let mut world = World::new(WorldDefinition {
             gravity: Vec3::ZERO,
             tolerance,
-            max_substeps: if tolerance > 0.0 { CUT } else { 1000 },
+            max_substeps: if tolerance > 0.0 { MAX_SUBSTEPS } else { 1000 },
             ..WorldDefinition::default()
         })
         .expect("a world");
@@ -71,12 +71,12 @@ impl Press {
             body,
             planes,
             distance: START,
-            worked: 0.0,
+            work: 0.0,
         }
     }
 
-    /// Has the next step bring the planes to this distance.
-    fn lead(&mut self, distance: f32) {
+    /// Sets the distance of the planes for the next step.
+    fn set_distance(&mut self, distance: f32) {
         for (side, tool) in self.planes {
             self.world
                 .set_pose(tool, Vec3::Y * side * 0.5 * distance, None)
@@ -86,11 +86,11 @@ impl Press {
 
     /// Brings the planes to this distance in one step.
     fn step(&mut self, dt: f32, distance: f32) -> StepReport {
-        self.lead(distance);
+        self.set_distance(distance);
         let report = self.world.step(dt).expect("a step");
         assert_eq!(report.bodies_restored, 0);
         for (side, force) in self.forces() {
-            self.worked -= f64::from(force * side * 0.5 * (distance - self.distance));
+            self.work -= f64::from(force * side * 0.5 * (distance - self.distance));
         }
         self.distance = distance;
         report
@@ -119,7 +119,8 @@ impl Press {
     }
 }
 
-/// By how much the energy of the springs grows where the block at rest is pressed by a little more: what a plane feels, N.
+/// Returns the force on a plane (N): the growth of the spring energy when the block at rest is compressed slightly
+/// more.
 fn force_of_rest() -> f64 {
     let energies = [0.0505, 0.0495].map(|gap| {
         let mut press = Press::new(Solver::Verlet, Storage::Packed, 0.0);
@@ -130,8 +131,8 @@ fn force_of_rest() -> f64 {
 }
 
 #[test]
-fn a_tool_feels_what_it_presses_whatever_the_step() {
-    a_tool_feels_what_it_presses_whatever_the_step_of(&[
+fn a_tool_gets_the_right_force_for_every_step() {
+    a_tool_gets_the_right_force_for_every_step_of(&[
         (Solver::Implicit, Storage::Packed, 1e-3),
         (Solver::Implicit, Storage::FastLink, 1.0 / 60.0),
         (Solver::Newton, Storage::Packed, 1.0 / 60.0),
@@ -140,38 +141,38 @@ fn a_tool_feels_what_it_presses_whatever_the_step() {
 
 #[test]
 #[ignore = "long"]
-fn a_tool_feels_what_it_presses_whatever_the_step_in_the_other_cases() {
-    a_tool_feels_what_it_presses_whatever_the_step_of(&[
+fn a_tool_gets_the_right_force_for_every_step_in_the_other_cases() {
+    a_tool_gets_the_right_force_for_every_step_of(&[
         (Solver::Implicit, Storage::Packed, 1.0 / 60.0),
         (Solver::Implicit, Storage::Packed, 1.0),
     ]);
 }
 
-fn a_tool_feels_what_it_presses_whatever_the_step_of(cases: &[(Solver, Storage, f32)]) {
+fn a_tool_gets_the_right_force_for_every_step_of(cases: &[(Solver, Storage, f32)]) {
     let expected = force_of_rest();
     for &(solver, storage, dt) in cases {
         let mut press = Press::new(solver, storage, 0.0);
         press.close(dt, 0.05, 0.3);
         for (side, force) in press.forces() {
-            let off = f64::from(side * force) / expected - 1.0;
+            let error = f64::from(side * force) / expected - 1.0;
             assert!(
-                off.abs() < 0.02,
+                error.abs() < 0.02,
                 "{solver:?}, {storage:?}, {dt} s: {force} N, {expected} N is right"
             );
         }
         let energy = press.energy();
-        // The mean force is told, which is off by 1 % where an equation is solved to 1 %.
+        // The reported force is a mean, which is off by 1 % where an equation is solved to 1 %.
         assert!(
-            energy < 1.02 * press.worked,
+            energy < 1.02 * press.work,
             "{solver:?}, {dt} s: {energy} J of {} J",
-            press.worked
+            press.work
         );
     }
 }
 
 #[test]
-fn crushed_flat_a_step_still_ends() {
-    crushed_flat_a_step_still_ends_of(&[
+fn a_step_ends_with_tissue_crushed_flat() {
+    a_step_ends_with_tissue_crushed_flat_of(&[
         (Solver::Implicit, 0.1),
         (Solver::Implicit, 0.01),
         (Solver::Newton, 0.01),
@@ -180,48 +181,51 @@ fn crushed_flat_a_step_still_ends() {
 
 #[test]
 #[ignore = "long"]
-fn crushed_flat_a_long_step_still_ends() {
-    crushed_flat_a_step_still_ends_of(&[(Solver::Implicit, 1.0)]);
+fn a_long_step_ends_with_tissue_crushed_flat() {
+    a_step_ends_with_tissue_crushed_flat_of(&[(Solver::Implicit, 1.0)]);
 }
 
-fn crushed_flat_a_step_still_ends_of(cases: &[(Solver, f32)]) {
+fn a_step_ends_with_tissue_crushed_flat_of(cases: &[(Solver, f32)]) {
     for &(solver, dt) in cases {
         let mut press = Press::new(solver, Storage::Packed, 0.5);
         let mut gaps = vec![1e-4; 3];
         gaps.push(10.0 * THICKNESS);
         for gap in gaps {
             let report = press.step(dt, gap);
-            // Parts of a millisecond, cut again at most until there are 4096.
+            // Substeps of a millisecond, subdivided until there are at most 4096.
             assert!(report.substeps <= 4096, "{solver:?}, {dt} s: {report:?}");
             let solved = press.world.body(press.body).expect("the body").solver_report();
             assert!(solved.error.is_finite());
             if solver == Solver::Implicit {
-                // A thirty-second of the budget for each, or one where nothing is left.
+                // A thirty-second of the budget for each, or one product where nothing is left.
                 let most = 1000 + 31 * (dt / 1e-3).ceil() as u32 + 2 * 4096;
                 assert!(solved.iterations <= most, "{dt} s: {solved:?}");
             }
             let energy = press.energy();
             assert!(
-                energy < 1e-6 + 1.1 * press.worked,
+                energy < 1e-6 + 1.1 * press.work,
                 "{solver:?}, {dt} s: {energy} J of {} J",
-                press.worked
+                press.work
             );
         }
     }
 }
 
 #[test]
-fn crushed_flat_a_step_to_a_tolerance_ends() {
+fn a_step_to_a_tolerance_ends_with_tissue_crushed_flat() {
     for solver in [Solver::Implicit, Solver::Newton] {
         let mut press = Press::to_tolerance(solver, Storage::Packed, 0.5, 1e-4);
         for gap in [0.02, 1e-4, 1e-4] {
-            press.lead(gap);
+            press.set_distance(gap);
             let before = press.energy();
             match press.world.step(0.01) {
                 Ok(report) => assert!(report.error_estimate <= 1e-4, "{solver:?}: {report:?}"),
-                // It is cut in two until it would be more parts than are allowed, and nothing has changed then.
+                // The step is halved until it would need more substeps than are allowed; nothing has changed then.
                 Err(Error::Unstable { report, allowed }) => {
-                    assert!(report.error_estimate > 1e-4 && allowed == CUT, "{solver:?}: {report:?}");
+                    assert!(
+                        report.error_estimate > 1e-4 && allowed == MAX_SUBSTEPS,
+                        "{solver:?}: {report:?}"
+                    );
                     assert_eq!(press.energy(), before, "{solver:?}");
                 }
                 Err(error) => panic!("{solver:?}: {error}"),
@@ -230,9 +234,10 @@ fn crushed_flat_a_step_to_a_tolerance_ends() {
     }
 }
 
-/// A plane that goes aside faster than a number holds, under what lies on it with friction: the body is put back.
+/// A plane moves sideways faster than `f32` can represent, below tissue that rests on it with friction: the body is
+/// rolled back.
 #[test]
-fn a_plane_that_jerks_away_puts_the_body_back() {
+fn a_plane_that_jerks_away_rolls_the_body_back() {
     for solver in [Solver::Implicit, Solver::Newton] {
         let mut press = Press::new(solver, Storage::Packed, 0.5);
         press.close(1e-3, 0.05, 0.0);
@@ -248,10 +253,10 @@ fn a_plane_that_jerks_away_puts_the_body_back() {
     }
 }
 
-/// A sheet that a capsule stands in lies within both of its ends, one on each side: it is carried, and they do not press it against each
-/// other by more and more.
+/// A sheet on the end of a capsule lies within both of its caps, one on each side. The capsule carries it, and the caps
+/// do not press against each other more and more.
 #[test]
-fn both_ends_of_a_capsule_in_one_face_do_what_is_needed() {
+fn both_caps_of_a_capsule_can_be_within_one_face() {
     for solver in [Solver::Implicit, Solver::Newton] {
         let mesh = Mesh::cloth([1.0, 1.0], [1, 1]).expect("a sheet");
         let mut world = World::new(WorldDefinition::default()).expect("a world");
@@ -310,9 +315,9 @@ fn both_ends_of_a_capsule_in_one_face_do_what_is_needed() {
     }
 }
 
-/// A tool that moved far in one step, away from tissue, is not near it in the steps after.
+/// A tool that jumped far away from tissue in one step is not near it in later steps.
 #[test]
-fn a_tool_that_has_jumped_away_costs_nothing_afterwards() {
+fn a_tool_that_jumped_away_costs_nothing_afterwards() {
     for solver in [Solver::Implicit, Solver::Newton] {
         let mut world = World::new(FREE).expect("a world");
         let mesh = Mesh::block([0.1, 0.03, 0.06], [5, 2, 3]).expect("a block");

@@ -1,4 +1,4 @@
-//! Numbers at the end of `f32`, and things that must not matter.
+//! Numbers at the limits of `f32`, and inputs that must have no effect.
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
@@ -33,7 +33,7 @@ fn springs_beyond_the_range_allow_no_step() {
 }
 
 #[test]
-fn a_tool_far_away_changes_no_bit_of_a_moving_cloth() {
+fn a_distant_tool_leaves_a_moving_cloth_bitwise_identical() {
     let mesh = Mesh::cloth([0.2, 0.2], [9, 9]).expect("a cloth");
     let moved = |with_tool: bool| {
         let mut world = world();
@@ -71,7 +71,7 @@ fn a_tool_far_away_changes_no_bit_of_a_moving_cloth() {
 }
 
 #[test]
-fn a_force_on_a_pinned_node_is_nothing_even_when_it_is_let_go() {
+fn a_force_on_a_pinned_node_has_no_effect_even_after_release() {
     let mut world = world();
     let definition = BodyDefinition {
         positions: &[Vec3::ZERO],
@@ -88,19 +88,20 @@ fn a_force_on_a_pinned_node_is_nothing_even_when_it_is_let_go() {
     assert_eq!(world.body(id).expect("a body").positions(), &[Vec3::ZERO]);
 }
 
-/// A step near something is cut into parts of a millisecond, or of a quarter of one. A program with a loop wants an end to that, whatever it asks.
+/// A step near a tool or body is cut into substeps of 1 ms or 0.25 ms. The number of substeps is bounded, whatever the
+/// caller requests.
 #[test]
-fn a_step_near_something_takes_no_more_than_so_many_parts() {
-    a_step_near_something_takes_no_more_than_so_many_parts_of(Solver::Implicit);
+fn a_step_near_a_tool_takes_a_bounded_number_of_substeps() {
+    a_step_near_a_tool_takes_a_bounded_number_of_substeps_of(Solver::Implicit);
 }
 
 #[test]
 #[ignore = "long"]
-fn a_step_near_something_takes_no_more_than_so_many_parts_with_newton() {
-    a_step_near_something_takes_no_more_than_so_many_parts_of(Solver::Newton);
+fn a_step_near_a_tool_takes_a_bounded_number_of_substeps_with_newton() {
+    a_step_near_a_tool_takes_a_bounded_number_of_substeps_of(Solver::Newton);
 }
 
-fn a_step_near_something_takes_no_more_than_so_many_parts_of(solver: Solver) {
+fn a_step_near_a_tool_takes_a_bounded_number_of_substeps_of(solver: Solver) {
     let mesh = Mesh::cloth([0.1, 0.1], [2, 2]).expect("a cloth");
     let cloth = |with_bodies| BodyDefinition {
         masses: Values::Uniform(1e-3),

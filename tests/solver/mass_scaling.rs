@@ -1,4 +1,4 @@
-//! Mass scaling: a few light nodes between stiff springs, as slivers of a mesh have them, do not hold up the body.
+//! Mass scaling: a few light nodes between stiff springs, as in mesh slivers, do not slow the body down.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use glam::{DVec3, Vec3};
@@ -10,11 +10,11 @@ use sinew::{
 
 const FRAME: f32 = 1.0 / 60.0;
 const G: f32 = 9.81;
-/// The part of the mass that may be added where nothing else is asked for.
+/// The default for the fraction of mass that may be added.
 const DEFAULT: f64 = 0.001;
-/// A part that is enough for the slivers of a small body.
+/// A fraction that is enough for the slivers of a small body.
 const PLENTY: f64 = 0.02;
-/// The part of the longest stable substep that is used.
+/// The fraction of the longest stable substep that is used.
 const RESERVE: f64 = 0.9;
 
 fn gravity() -> WorldDefinition {
@@ -24,8 +24,8 @@ fn gravity() -> WorldDefinition {
     }
 }
 
-/// A block of uneven cells with `count` nodes of a thousandth of the mass in it, each joined to the eight about it. What is at
-/// the top is held, where `held`.
+/// A block of uneven cells with `count` nodes of a thousandth of the mass, each joined to the eight nodes around it. If
+/// `held`, the top is pinned.
 fn slivers(cells: usize, count: usize, held: bool) -> Parts {
     const SPACING: f32 = 0.01;
     const MASS: f32 = 1e-3;
@@ -74,7 +74,7 @@ fn added(scene: &Scene) -> f64 {
     scene.body().solver_report().added_mass
 }
 
-/// What each node needs for this substep, kg, and is given where that is more than it has.
+/// Returns the mass that each node needs for this substep (kg), or its own mass if that is larger.
 fn masses_for(parts: &Parts, substep: f64) -> Vec<f64> {
     let mut stiffnesses = vec![0.0; parts.positions.len()];
     for (spring, &stiffness) in parts.springs.iter().zip(&parts.stiffnesses) {
@@ -92,7 +92,7 @@ fn masses_for(parts: &Parts, substep: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Leapfrog in `f64` with this inertia and the weight as it is, from rest.
+/// Leapfrog in `f64` from rest with this inertia and the unscaled weight.
 fn leapfrog(parts: &Parts, inertia: &[f64], substep: f64, substeps: u32) -> Vec<DVec3> {
     let mut reference = parts.reference(Vec3::ZERO);
     let weights: Vec<DVec3> = (parts.masses.iter().map(|&mass| DVec3::NEG_Y * f64::from(G * mass))).collect();
@@ -102,8 +102,8 @@ fn leapfrog(parts: &Parts, inertia: &[f64], substep: f64, substeps: u32) -> Vec<
         for node in 0..inertia.len() {
             if inertia[node] > 0.0 {
                 reference.velocities[node] += (forces[node] + weights[node]) / inertia[node] * time;
-                let way = reference.velocities[node] * substep;
-                reference.positions[node] += way;
+                let displacement = reference.velocities[node] * substep;
+                reference.positions[node] += displacement;
             }
         }
     }
@@ -111,7 +111,7 @@ fn leapfrog(parts: &Parts, inertia: &[f64], substep: f64, substeps: u32) -> Vec<
 }
 
 #[test]
-fn a_body_moves_with_the_inertia_that_is_reported_and_the_weight_it_had() {
+fn a_body_moves_with_the_reported_inertia_and_its_own_weight() {
     let parts = slivers(8, 6, true);
     let mut scene = scene(&parts, gravity(), DEFAULT as f32);
     let mut substeps = 0;
@@ -130,18 +130,17 @@ fn a_body_moves_with_the_inertia_that_is_reported_and_the_weight_it_had() {
     let reference = leapfrog(&parts, &inertia, substep, substeps);
     let error = largest_difference(&scene.positions(), &reference) / parts.size();
     assert!(error < 1e-5, "{error:e}");
-    // As few substeps as the mass allows: with one fewer a step there would be too much.
+    // The number of substeps is minimal: one fewer would need too much added mass.
     let fewer = f64::from(FRAME) / (f64::from(substeps / 6) - 1.0);
     let more = masses_for(&parts, fewer).iter().sum::<f64>() - total_mass(&parts);
     assert!(more > DEFAULT * total_mass(&parts), "{more}");
 }
 
-/// What is added acts as a load of its mass times its acceleration: of the weight of the body no larger part than it is of
-/// its mass, times what a sudden load makes of a steady one (2), and once more for accelerations beyond g. A light node also
-/// lags behind by what its springs need to bring what was added to it along, twice that after a sudden start, and twice more where
-/// the body turns round.
+/// The added mass acts as a load of its mass times its acceleration. Relative to the weight, this load is at most the
+/// added fraction, times 2 for a sudden load, and times 2 for accelerations beyond g. A light node also lags: its
+/// springs must accelerate the added mass, twice as much after a sudden start, and twice more at turning points.
 #[test]
-fn the_motion_is_that_without_added_mass() {
+fn the_motion_agrees_with_that_without_added_mass() {
     let parts = slivers(8, 6, true);
     let mut plain = scene(&parts, gravity(), 0.0);
     let mut scaled = scene(&parts, gravity(), DEFAULT as f32);
@@ -157,8 +156,9 @@ fn the_motion_is_that_without_added_mass() {
         let heaviest = masses.fold(0.0_f64, |most, (inertia, &mass)| most.max(inertia - f64::from(mass)));
         // Eight springs of 10 N/m, a third of them along each axis.
         let lag = 4.0 * heaviest * f64::from(G) / (8.0 * 10.0 / 3.0);
-        // The slowest mode swings by half of that about a sag of as much, and falls behind: by half of what its mass grows, and by
-        // the h² omega² / 24 of a longer substep. Faster ones swing less, by the square of what they are faster.
+        // The slowest mode swings by half of the maximum displacement about an equal sag. It lags by half of its growth
+        // in mass, and by the h² omega² / 24 of a longer substep. Faster modes swing less, by the square of the
+        // frequency ratio.
         let omega = (2.0 * f64::from(G) / farthest).sqrt();
         let substep = f64::from(FRAME) / f64::from(few);
         let behind =
@@ -175,12 +175,12 @@ fn the_motion_is_that_without_added_mass() {
 }
 
 #[test]
-fn pins_carry_the_weight_as_it_was() {
+fn pins_carry_the_unscaled_weight() {
     let mut parts = slivers(4, 4, true);
     for (damping, mass) in parts.node_dampings.iter_mut().zip(&parts.masses) {
         *damping = 15.0 * mass;
     }
-    // A larger part, so that it would be seen.
+    // A larger fraction, to make an error visible.
     let mut scene = scene(&parts, gravity(), 0.02);
     scene.run(FRAME, 300);
     let part = added(&scene) / total_mass(&parts);
@@ -196,9 +196,9 @@ fn pins_carry_the_weight_as_it_was() {
     );
 }
 
-/// With damping in proportion to mass all nodes fall alike, so that no spring is ever stretched.
+/// With damping proportional to mass all nodes fall alike, so that no spring is stretched.
 #[test]
-fn weight_and_damping_of_a_heavier_node_are_as_they_were() {
+fn weight_and_damping_of_a_scaled_node_are_unchanged() {
     const RATE: f32 = 5.0;
     let mut parts = slivers(6, 5, false);
     for (damping, mass) in parts.node_dampings.iter_mut().zip(&parts.masses) {
@@ -214,7 +214,7 @@ fn weight_and_damping_of_a_heavier_node_are_as_they_were() {
 }
 
 #[test]
-fn nothing_is_added_where_substeps_are_fixed_or_a_tolerance_is_asked_for() {
+fn no_mass_is_added_with_fixed_substeps_or_a_tolerance() {
     let parts = slivers(4, 4, true);
     let fixed = WorldDefinition {
         substeps: 400,
@@ -234,14 +234,14 @@ fn nothing_is_added_where_substeps_are_fixed_or_a_tolerance_is_asked_for() {
         assert_eq!(scenes[0].positions(), scenes[1].positions());
         assert_eq!(scenes[0].velocities(), scenes[1].velocities());
     }
-    // The same body is made heavier where it may be.
+    // The same body gets added mass where it is allowed.
     let mut free = scene(&parts, gravity(), 0.02);
     free.step(FRAME);
     assert!(added(&free) > 0.0);
 }
 
 #[test]
-fn a_body_without_slivers_is_what_it_would_be_without_mass_scaling() {
+fn a_body_without_slivers_is_unaffected() {
     let even = Parts::block([6; 3], 0.01, 1e-3, 100.0);
     let mut scenes = [0.0, DEFAULT as f32].map(|part| scene(&even, gravity(), part));
     for scene in &mut scenes {
@@ -249,7 +249,7 @@ fn a_body_without_slivers_is_what_it_would_be_without_mass_scaling() {
         assert_eq!(added(scene), 0.0);
     }
     assert_eq!(scenes[0].world.state_hash(), scenes[1].world.state_hash());
-    // Nor does a step that is short anyway ask for mass.
+    // A step that is short anyway needs no added mass either.
     let parts = slivers(6, 4, true);
     let mut short = scene(&parts, gravity(), DEFAULT as f32);
     for _ in 0..10 {
@@ -293,9 +293,9 @@ fn energy_does_not_grow_of(cases: &[(f32, f32)]) {
     }
 }
 
-/// The added mass lies to one side, and gravity pulls at all of it, so the body falls without turning.
+/// The added mass lies on one side, and gravity acts on all of it, so the body falls without rotating.
 #[test]
-fn a_body_that_falls_does_not_turn() {
+fn a_falling_body_does_not_rotate() {
     const STEPS: usize = 30;
     let parts = slivers(5, 1, false);
     let extent = 0.05;
@@ -311,9 +311,9 @@ fn a_body_that_falls_does_not_turn() {
         .zip(&velocities)
         .map(|(position, velocity)| (position - centre).cross(velocity - mean) * 1e-3);
     let turns = turns.sum::<DVec3>().length();
-    // What it would turn with if the added mass had no weight, a tenth of its size from the middle.
-    let would = lacks_weight * 0.1 * extent * f64::from(G * FRAME * STEPS as f32);
-    assert!(turns < 0.02 * would, "{turns:e} kg m2/s, {would:e}");
+    // The rotation if the added mass had no weight, a tenth of the body's size from the center.
+    let expected_turn = lacks_weight * 0.1 * extent * f64::from(G * FRAME * STEPS as f32);
+    assert!(turns < 0.02 * expected_turn, "{turns:e} kg m2/s, {expected_turn:e}");
 }
 
 #[test]
@@ -336,7 +336,7 @@ fn momentum_is_kept() {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_bits() {
+fn any_number_of_threads_is_bitwise_identical() {
     let parts = slivers(20, 30, true);
     assert!(parts.positions.len() > 8192);
     let hashes = [1, 2, 5].map(|thread_count| {
@@ -381,7 +381,7 @@ fn all_storages_agree() {
 }
 
 #[test]
-fn a_step_that_fails_leaves_masses_as_they_were() {
+fn a_failed_step_restores_the_masses() {
     let parts = slivers(5, 5, true);
     let mut tried = scene(&parts, gravity(), PLENTY as f32);
     let mut plain = scene(&parts, gravity(), PLENTY as f32);
@@ -401,7 +401,7 @@ fn a_step_that_fails_leaves_masses_as_they_were() {
         }
         assert_eq!(tried.world.state_hash(), plain.world.state_hash());
     }
-    // A body that becomes infinite is put back with its masses.
+    // A body that becomes infinite is rolled back together with its masses.
     let far = vec![Vec3::splat(1e30); parts.positions.len()];
     tried.body_mut().set_velocities(&far).expect("velocities");
     let mass = added(&tried);
@@ -410,7 +410,7 @@ fn a_step_that_fails_leaves_masses_as_they_were() {
 }
 
 #[test]
-fn pins_and_springs_that_come_and_go_change_what_is_needed() {
+fn pin_and_spring_changes_update_the_added_mass() {
     let parts = slivers(5, 5, true);
     let sliver = (parts.positions.len() - 1) as u32;
     let mut scene = scene(&parts, gravity(), PLENTY as f32);
@@ -424,7 +424,7 @@ fn pins_and_springs_that_come_and_go_change_what_is_needed() {
     scene.body_mut().unpin(sliver).expect("a pin");
     scene.run(FRAME, 3);
     assert!((added(&scene) / all - 1.0).abs() < 1e-5);
-    // Let go of by all its neighbours a light node needs nothing.
+    // A light node without neighbors needs no added mass.
     let own: Vec<[u32; 2]> = parts
         .springs
         .iter()
@@ -444,7 +444,7 @@ fn pins_and_springs_that_come_and_go_change_what_is_needed() {
     }
     scene.run(FRAME, 1);
     assert!((added(&scene) / all - 1.0).abs() < 1e-5, "{} of {all}", added(&scene));
-    // What is refused changes nothing.
+    // A refused change has no effect.
     let before = scene.world.state_hash();
     assert!(scene.body_mut().add_spring(0, 1, 1e5, None).is_err());
     assert_eq!(scene.world.state_hash(), before);
@@ -461,7 +461,7 @@ fn pins_and_springs_that_come_and_go_change_what_is_needed() {
 }
 
 #[test]
-fn what_is_out_of_range_is_refused() {
+fn settings_out_of_range_are_refused() {
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let positions = [Vec3::ZERO, Vec3::X];
     for solver in [Solver::Verlet, Solver::Implicit] {
@@ -490,7 +490,8 @@ fn what_is_out_of_range_is_refused() {
     );
 }
 
-/// A block of finite elements, of which a few are cut in four by a light node in their middle, and held at the top.
+/// A block of finite elements, held at the top. A few of the elements are split in four by a light node at their
+/// center.
 struct Tissue {
     world: World,
     body: BodyId,
@@ -536,8 +537,8 @@ impl Tissue {
             ..BodyDefinition::of(&mesh)
         });
         let body = body.expect("a body");
-        for (node, place) in (0..).zip(&mesh.positions) {
-            if place.y > 0.49 * Self::SIZE[1] {
+        for (node, position) in (0..).zip(&mesh.positions) {
+            if position.y > 0.49 * Self::SIZE[1] {
                 world.body_mut(body).expect("the body").pin(node).expect("a node");
             }
         }
@@ -560,7 +561,7 @@ impl Tissue {
 
     fn positions(&self) -> Vec<DVec3> {
         let body = self.world.body(self.body).expect("the body");
-        body.positions().iter().map(|place| place.as_dvec3()).collect()
+        body.positions().iter().map(|position| position.as_dvec3()).collect()
     }
 
     fn energy(&self) -> f64 {
@@ -570,7 +571,7 @@ impl Tissue {
 }
 
 #[test]
-fn light_nodes_of_elements_take_fewer_substeps_and_move_as_without_added_mass() {
+fn light_nodes_of_elements_need_fewer_substeps_and_move_the_same() {
     for (nu, viscous) in [(0.3, 0.0), (0.45, 0.0), (0.3, 1e-5)] {
         let world = WorldDefinition {
             max_substeps: 100_000,
@@ -598,13 +599,13 @@ fn light_nodes_of_elements_take_fewer_substeps_and_move_as_without_added_mass() 
             let squares = a.iter().zip(b).map(|(a, b)| a.distance_squared(*b));
             (squares.sum::<f64>() / a.len() as f64).sqrt()
         };
-        let way = mean(&start, &plain.positions());
+        let displacement = mean(&start, &plain.positions());
         let apart = mean(&scaled.positions(), &plain.positions());
-        // Half the part that is added is missing of the phase, of some 9 radians of the slowest wave.
+        // The phase lags by half the added fraction, of about 9 radians of the slowest wave.
         let part = f64::from(Tissue::PART);
         assert!(
-            apart < 0.5 * part * 9.0 * way,
-            "nu {nu}, {viscous} s: {apart:e} m of {way:e}"
+            apart < 0.5 * part * 9.0 * displacement,
+            "nu {nu}, {viscous} s: {apart:e} m of {displacement:e}"
         );
     }
 }
@@ -635,9 +636,9 @@ fn a_step_of_elements_meets_its_tolerance() {
     assert!(error <= f64::from(TOLERANCE), "{error:e} m, {report:?}");
 }
 
-/// Where an organ swings down, a few of its elements become so stiff that they ask for more substeps than are allowed.
+/// Where an organ swings down, a few of its elements become so stiff that they need more substeps than are allowed.
 #[test]
-fn motion_that_makes_a_few_elements_stiff_refuses_no_step() {
+fn elements_stiffened_by_motion_refuse_no_step() {
     const PART: f32 = 0.01;
     const STEPS: u32 = 90;
     let mesh = Mesh::organ(0.15, 0.15 / 8.0).expect("a mesh");
@@ -658,9 +659,14 @@ fn motion_that_makes_a_few_elements_stiff_refuses_no_step() {
             ..BodyDefinition::of(&mesh)
         });
         let body = body.expect("a body");
-        let held = mesh.positions.iter().map(|place| place.x).fold(f32::INFINITY, f32::min) + 0.015;
-        for (node, place) in (0..).zip(&mesh.positions) {
-            if place.x < held {
+        let held = mesh
+            .positions
+            .iter()
+            .map(|position| position.x)
+            .fold(f32::INFINITY, f32::min)
+            + 0.015;
+        for (node, position) in (0..).zip(&mesh.positions) {
+            if position.x < held {
                 world.body_mut(body).expect("the body").pin(node).expect("a node");
             }
         }
@@ -683,7 +689,7 @@ fn motion_that_makes_a_few_elements_stiff_refuses_no_step() {
             added = added.max(now.solver_report().added_mass / mass);
             most = most.max(report.substeps);
             lowest = lowest.min(now.energy(Vec3::NEG_Y * G).gravitational - start);
-            // Leapfrog's own energy differs by the squares of what is fast.
+            // Leapfrog's own energy differs by the squares of the fast frequencies.
             assert!(
                 energy(&world) - start < -2e-2 * lowest,
                 "{} of {lowest} J",
@@ -693,7 +699,7 @@ fn motion_that_makes_a_few_elements_stiff_refuses_no_step() {
         Some((most, added))
     };
     let (most, _) = run(0.0, 10_000).expect("enough substeps");
-    // As many as three fifths of what it takes.
+    // Three fifths of the substeps that it needs.
     let allowed = 3 * most / 5;
     assert_eq!(run(0.0, allowed), None);
     let (taken, added) = run(PART, allowed).expect("no step is refused");

@@ -1,4 +1,4 @@
-//! How bodies move: VERLET, IMPLICIT, NEWTON, states of rest, storages, threads.
+//! Solvers: VERLET, IMPLICIT, NEWTON, static equilibria, storages, threads.
 
 mod auto;
 mod budget;

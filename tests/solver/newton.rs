@@ -23,7 +23,7 @@ fn newton(parts: &Parts, world: WorldDefinition, order: u32, storage: Storage) -
 
 const OMEGA_SQUARED: f64 = 100.0 / 0.75;
 
-/// How far the spring is stretched after each step, by the formula of this order in `f64`, begun with order 1.
+/// The stretch of the spring after each step, by the formula of this order in `f64`. The first step has order 1.
 fn discrete(order: u32, h: f64, steps: usize) -> Vec<f64> {
     let (mut now, mut last) = ([0.05, 0.0], [0.05, 0.0]);
     let mut stretches = Vec::new();
@@ -53,7 +53,7 @@ fn two_masses_follow_the_discrete_solution() {
                 assert!(scene.body().solver_report().has_converged);
                 let x = scene.positions();
                 let error = (x[0].distance(x[1]) - 0.1 - expected).abs() / 0.05;
-                // Of the stretch; positions are read as f32, which rounds 0.15 to 7e-9.
+                // Relative to the stretch; positions are read as `f32`, which rounds 0.15 to 7e-9.
                 assert!(error < 1e-6, "order {order}, {h} s, step {step}: {error:.2e}");
             }
         }
@@ -74,7 +74,8 @@ fn a_step_is_the_true_implicit_step_at_every_contrast() {
                 let report = scene.body().solver_report();
                 assert!(report.has_converged, "{report:?}");
                 let error = largest_difference(&scene.positions(), &expected);
-                // Positions are rounded to 8e-9 m along each axis, and PACKED has rest lengths in one that differ by 1.2e-8 m.
+                // Positions are rounded to 8e-9 m along each axis, and rest lengths in one run of PACKED differ by
+                // 1.2e-8 m.
                 let allowed = 1e-6 * moved + 3e-8;
                 assert!(
                     error < allowed,
@@ -85,9 +86,9 @@ fn a_step_is_the_true_implicit_step_at_every_contrast() {
     }
 }
 
-/// A chain of forty that hangs from a pin: each spring is stretched by the weight of all that is below it.
+/// A chain of forty nodes hangs from a pin: the weight of all nodes below a spring stretches it.
 #[test]
-fn a_chain_hangs_as_far_at_every_step_in_every_storage() {
+fn a_chain_has_the_same_sag_for_every_step_and_storage() {
     let (count, mass, stiffness) = (40, 0.01, 50.0);
     let mut parts = Parts::chain(count + 1, Vec3::Y * -0.1, mass, stiffness);
     parts.masses[0] = 0.0;
@@ -96,7 +97,7 @@ fn a_chain_hangs_as_far_at_every_step_in_every_storage() {
     let extension = pull * (count * (count + 1)) as f64 / 2.0;
     for (index, storage) in STORAGES.into_iter().enumerate() {
         for (order, h, steps) in [(1, 1.0_f32, 400), (2, 0.1, 4000), (2, 1.0 / 60.0, 20_000)] {
-            // Every storage solves the same equation: the long run once.
+            // Every storage solves the same equation: the long run is made once.
             if steps > 10_000 && index > 0 {
                 continue;
             }
@@ -110,21 +111,21 @@ fn a_chain_hangs_as_far_at_every_step_in_every_storage() {
 }
 
 #[test]
-fn springs_that_come_and_go_are_taken_in_and_need_no_memory_in_a_step() {
-    springs_that_come_and_go_are_taken_in_and_need_no_memory_in_a_step_of(&[Storage::FastLink]);
+fn spring_changes_take_effect_without_allocation_in_a_step() {
+    spring_changes_take_effect_without_allocation_in_a_step_of(&[Storage::FastLink]);
 }
 
 #[test]
 #[ignore = "long"]
-fn springs_that_come_and_go_are_taken_in_and_need_no_memory_in_a_step_in_other_storages() {
-    springs_that_come_and_go_are_taken_in_and_need_no_memory_in_a_step_of(&[
+fn spring_changes_take_effect_without_allocation_in_a_step_in_other_storages() {
+    spring_changes_take_effect_without_allocation_in_a_step_of(&[
         Storage::Packed,
         Storage::Efficient,
         Storage::DynamicBulk,
     ]);
 }
 
-fn springs_that_come_and_go_are_taken_in_and_need_no_memory_in_a_step_of(storages: &[Storage]) {
+fn spring_changes_take_effect_without_allocation_in_a_step_of(storages: &[Storage]) {
     for &storage in storages {
         let mut parts = uneven_block(1.0);
         parts.node_dampings.fill(0.05);
@@ -161,7 +162,8 @@ fn springs_that_come_and_go_are_taken_in_and_need_no_memory_in_a_step_of(storage
     }
 }
 
-/// What rounds positions to `f32` is kept: a step of 10 us moves what is slower than half of a last place.
+/// NEWTON keeps the rounding error of `f32` positions: steps of 10 us move nodes by less than half a unit in the last
+/// place.
 #[test]
 fn slow_motion_is_not_lost_in_short_steps() {
     let parts = Parts::nodes(vec![Vec3::X * 0.9], 1.0);
@@ -173,23 +175,23 @@ fn slow_motion_is_not_lost_in_short_steps() {
         .expect("a velocity");
     let start = scene.positions()[0].x;
     scene.run(1e-5, 10_000);
-    let gone = scene.positions()[0].x - start;
-    // A last place of 0.9 is 6e-8.
-    assert!((gone - 1e-5).abs() < 4e-8, "{gone:e}");
+    let displacement = scene.positions()[0].x - start;
+    // A unit in the last place of 0.9 is 6e-8.
+    assert!((displacement - 1e-5).abs() < 4e-8, "{displacement:e}");
 }
 
 #[test]
-fn any_number_of_threads_and_a_step_put_back_lead_to_the_same_state() {
-    any_number_of_threads_and_a_step_put_back_lead_to_the_same_state_of(3);
+fn any_number_of_threads_and_a_rollback_give_the_same_state() {
+    any_number_of_threads_and_a_rollback_give_the_same_state_of(3);
 }
 
 #[test]
 #[ignore = "long"]
-fn two_threads_and_a_step_put_back_lead_to_the_same_state() {
-    any_number_of_threads_and_a_step_put_back_lead_to_the_same_state_of(2);
+fn two_threads_and_a_rollback_give_the_same_state() {
+    any_number_of_threads_and_a_rollback_give_the_same_state_of(2);
 }
 
-fn any_number_of_threads_and_a_step_put_back_lead_to_the_same_state_of(thread_count: u32) {
+fn any_number_of_threads_and_a_rollback_give_the_same_state_of(thread_count: u32) {
     let parts = Parts::block([20, 20, 18], 0.01, 1e-4, 20.0);
     let run = |thread_count: u32| {
         let mut scene = newton(
@@ -203,7 +205,7 @@ fn any_number_of_threads_and_a_step_put_back_lead_to_the_same_state_of(thread_co
         );
         scene.body_mut().pin(0).expect("a node");
         scene.step(2e-3);
-        // A way with more energy than a number holds: put back.
+        // A displacement with more energy than `f32` can represent: rolled back.
         let before = scene.positions();
         scene.body_mut().move_pin(0, Vec3::X * 1e30).expect("a pin");
         assert_eq!(scene.world.step(2e-3).expect("a step").bodies_restored, 1);
@@ -211,12 +213,12 @@ fn any_number_of_threads_and_a_step_put_back_lead_to_the_same_state_of(thread_co
         scene.step(2e-3);
         scene.world.state_hash()
     };
-    assert!(parts.positions.len() >= 8192, "large enough to be shared");
+    assert!(parts.positions.len() >= 8192, "large enough for several threads");
     assert_eq!(run(1), run(thread_count));
 }
 
 #[test]
-fn damping_along_springs_takes_what_it_should() {
+fn damping_along_springs_dissipates_the_right_energy() {
     let (mut parts, _) = two_masses();
     parts.spring_damping = 2.0;
     let (h, steps) = (1e-4_f64, 1000);
@@ -229,7 +231,7 @@ fn damping_along_springs_takes_what_it_should() {
     let x = scene.positions();
     let error = (x[0].distance(x[1]) - 0.1 - exact).abs() / 0.05;
     assert!(error < 1e-4, "{error:.2e}");
-    // A mesh turned and pulled, where directions change within a step.
+    // A rotated and stretched mesh, where directions change within a step.
     let mut parts = uneven_block(1.0);
     parts.spring_damping = 0.05;
     let mut scene = newton(&parts, HANGING, 2, Storage::Packed);

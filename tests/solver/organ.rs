@@ -1,5 +1,5 @@
-//! A soft organ of uneven tetrahedra against its motion and its rest shape in `f64`: order 2, the true motion within a small part,
-//! one rest shape for every solver.
+//! A soft organ of uneven tetrahedra against its motion and its rest shape in `f64`: second-order accurate, close to
+//! the true motion, and the same rest shape with every solver.
 
 use crate::support::bodies::{FREE, Parts, Scene, largest_difference};
 use crate::support::organ::{gravity, organ, rms};
@@ -7,7 +7,7 @@ use crate::support::statics::damp;
 use glam::DVec3;
 use sinew::{BodyDefinition, RestStateDefinition, Solver, Storage, WorldDefinition};
 
-/// Under a part of Earth's gravity; VERLET in steps that are substeps.
+/// Under a fraction of Earth's gravity; each step of VERLET is one substep.
 fn scene(parts: &Parts, pull: f32, solver: Solver, storage: Storage, substeps: u32) -> Scene {
     let world = WorldDefinition {
         gravity: gravity(pull),
@@ -21,21 +21,21 @@ fn scene(parts: &Parts, pull: f32, solver: Solver, storage: Storage, substeps: u
     })
 }
 
-/// Where the nodes are after `duration` seconds in `f64`, in steps of 20 to 50 us, and how far they went, RMS.
+/// Returns the positions after `duration` seconds in `f64`, in steps of 20 to 50 us, and the RMS displacement.
 fn true_motion(parts: &Parts, pull: f32, duration: f64, steps: usize) -> (Vec<DVec3>, f64) {
     let mut reference = parts.reference(gravity(pull));
     let start = reference.positions.clone();
     reference.run(duration / steps as f64, steps);
-    let way = rms(&reference.positions, &start);
-    (reference.positions, way)
+    let displacement = rms(&reference.positions, &start);
+    (reference.positions, displacement)
 }
 
-/// In 0.1 s under a tenth of Earth's gravity it goes 4 mm.
+/// In 0.1 s under a tenth of Earth's gravity it moves by 4 mm.
 #[test]
 fn errors_fall_with_the_square_of_the_step() {
     let parts = organ(0.2, 0.02, 3000.0);
     let duration = 0.1;
-    let (expected, way) = true_motion(&parts, 0.1, duration, 5000);
+    let (expected, displacement) = true_motion(&parts, 0.1, duration, 5000);
     for (solver, storage, finest) in [
         (Solver::Verlet, Storage::Packed, 100),
         (Solver::Verlet, Storage::DynamicBulk, 100),
@@ -47,10 +47,10 @@ fn errors_fall_with_the_square_of_the_step() {
         let [coarse, fine] = [finest / 2, finest].map(|steps| {
             let mut scene = scene(&parts, 0.1, solver, storage, substeps);
             scene.run((duration / steps as f64) as f32, steps);
-            rms(&scene.positions(), &expected) / way
+            rms(&scene.positions(), &expected) / displacement
         });
         let ratio = coarse / fine;
-        // Not far above 4 either, which would be a coarse step that is not resolved.
+        // Not far above 4 either: that would mean that the coarse step is not resolved.
         assert!(
             (3.3..4.7).contains(&ratio),
             "{solver:?}, {storage:?}: {coarse:.2e} to {fine:.2e}, {ratio:.2}"
@@ -58,23 +58,23 @@ fn errors_fall_with_the_square_of_the_step() {
     }
 }
 
-/// In 0.25 s under Earth's gravity it falls until it hangs by its side, 13 cm.
+/// In 0.25 s under Earth's gravity it falls by 13 cm, until it hangs by its side.
 #[test]
 fn half_a_millisecond_follows_the_true_motion() {
     let parts = organ(0.2, 0.02, 10_000.0);
-    let (expected, way) = true_motion(&parts, 1.0, 0.25, 5000);
+    let (expected, displacement) = true_motion(&parts, 1.0, 0.25, 5000);
     for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
         let mut scene = scene(&parts, 1.0, solver, Storage::Packed, 0);
         scene.run(5e-4, 500);
-        let error = rms(&scene.positions(), &expected) / way;
-        // A tenth is asked for; 8e-4 comes of the implicit formula, 1e-4 of VERLET.
+        let error = rms(&scene.positions(), &expected) / displacement;
+        // The requested accuracy is 0.1; the implicit formula has an error of 8e-4, VERLET of 1e-4.
         let allowed = if solver == Solver::Verlet { 1e-3 } else { 3e-3 };
         assert!(error < allowed, "{solver:?}: {error:.2e}");
     }
 }
 
 #[test]
-fn the_rest_shape_is_one_for_every_solver() {
+fn the_rest_shape_is_the_same_for_every_solver() {
     let mut parts = organ(0.2, 0.02, 10_000.0);
     damp(&mut parts, 10.0);
     let start: Vec<DVec3> = parts.positions.iter().map(|p| p.as_dvec3()).collect();

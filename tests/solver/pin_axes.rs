@@ -1,4 +1,4 @@
-//! Nodes held along some axes alone: symmetry planes, rails and sliding supports, in every solver and storage.
+//! Nodes held along single axes: symmetry planes, rails and sliding supports, with every solver and storage.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use crate::support::motion::Mode;
@@ -25,8 +25,8 @@ const REST: RestStateDefinition = RestStateDefinition {
     iterations: 0,
 };
 
-/// Every solver with every storage; equations are solved far.
-fn each() -> impl Iterator<Item = (Solver, Storage)> {
+/// Returns every solver with every storage; equations are solved accurately.
+fn solvers_and_storages() -> impl Iterator<Item = (Solver, Storage)> {
     SOLVERS
         .into_iter()
         .flat_map(|solver| STORAGES.map(|storage| (solver, storage)))
@@ -54,15 +54,15 @@ fn settle(scene: &mut Scene) {
     scene.world.rest_state(scene.id, &REST).expect("a state of rest");
 }
 
-/// Two nodes 0.1 m apart along `way`, of which the first is held for good: 0.5 kg on a spring of 50 N/m, at rest.
-fn bead(way: Vec3) -> Parts {
-    let mut parts = Parts::nodes(vec![Vec3::ZERO, way], 0.5);
+/// Two nodes 0.1 m apart along `direction`, of which the first is pinned: 0.5 kg on a spring of 50 N/m, at rest.
+fn bead(direction: Vec3) -> Parts {
+    let mut parts = Parts::nodes(vec![Vec3::ZERO, direction], 0.5);
     parts.masses[0] = 0.0;
     parts.join(0, 1, 50.0);
     parts
 }
 
-/// Leapfrog and the formula of order 2 have exact solutions; what acts across the rail is the pin's.
+/// Leapfrog and the formula of order 2 have exact solutions; the pin carries all forces across the rail.
 #[test]
 fn a_bead_on_a_rail_is_an_oscillator() {
     let world = WorldDefinition {
@@ -73,7 +73,7 @@ fn a_bead_on_a_rail_is_an_oscillator() {
     let (h, stretch) = (0.01_f32, 0.05);
     let mut parts = bead(Vec3::X * 0.15);
     parts.rest_lengths[0] = 0.1;
-    for which in each() {
+    for which in solvers_and_storages() {
         let mut scene = scene(&parts, world, which);
         hold(&mut scene, 1, YZ);
         let mut mode = Mode::new(10.0, 0.0, stretch, 0.0);
@@ -86,10 +86,10 @@ fn a_bead_on_a_rail_is_an_oscillator() {
             } else {
                 mode.now[0]
             };
-            let place = scene.positions()[1];
-            let error = (place.x - 0.1 - expected).abs() / stretch;
+            let position = scene.positions()[1];
+            let error = (position.x - 0.1 - expected).abs() / stretch;
             assert!(error < 1e-5, "{which:?}, step {step}: {error:.2e}");
-            assert_eq!([place.y, place.z], [0.0; 2], "{which:?}");
+            assert_eq!([position.y, position.z], [0.0; 2], "{which:?}");
             let velocity = scene.velocities()[1];
             assert_eq!([velocity.y, velocity.z], [0.0; 2], "{which:?}");
             let weight = DVec3::new(0.0, 0.5 * 9.81, -0.5 * 3.0);
@@ -102,18 +102,18 @@ fn a_bead_on_a_rail_is_an_oscillator() {
     }
 }
 
-/// A spring at a slant: across the rail the pin holds against it too, mean over the step.
+/// A spring at an angle: the pin also balances its force across the rail, averaged over the step.
 #[test]
-fn a_bead_drawn_aslant_moves_as_along_its_rail() {
+fn a_bead_pulled_at_an_angle_moves_along_its_rail() {
     let mut parts = bead(Vec3::new(0.2, 0.1, 0.0));
     parts.rest_lengths[0] = 0.12;
     let world = WorldDefinition { substeps: 1, ..HANGING };
-    // What the spring does to the bead, N.
+    // The spring force on the bead (N).
     let pull = |x: f64| {
         let length = x.hypot(0.1);
         -50.0 * (1.0 - 0.12_f32 as f64 / length) * DVec3::new(x, 0.1, 0.0)
     };
-    for which in each() {
+    for which in solvers_and_storages() {
         let h = if which.0 == Solver::Verlet { 1e-3_f32 } else { 2.5e-4 };
         let mut scene = scene(&parts, world, which);
         hold(&mut scene, 1, YZ);
@@ -129,7 +129,7 @@ fn a_bead_drawn_aslant_moves_as_along_its_rail() {
                 mean += pull(x) / 64.0;
             }
             let error = (scene.positions()[1].x - x).abs();
-            // Order 2 in the step; the reference's own error is 4e-7.
+            // Second order in the step; the reference's own error is 4e-7.
             assert!(error < 2e-4, "{which:?}, step {step}: {error:.2e}");
             let held = force(&scene, 1);
             let expected = 0.5 * 9.81 - mean.y;
@@ -146,7 +146,7 @@ fn a_bead_drawn_aslant_moves_as_along_its_rail() {
 fn a_pendulum_held_in_its_plane_stays_there() {
     let parts = bead(Vec3::new(0.06, -0.08, 0.0));
     let world = WorldDefinition { substeps: 8, ..HANGING };
-    for which in each() {
+    for which in solvers_and_storages() {
         let mut plane = scene(&parts, world, which);
         let mut held = scene(&parts, world, which);
         hold(&mut held, 1, Z);
@@ -166,13 +166,14 @@ fn a_pendulum_held_in_its_plane_stays_there() {
     }
 }
 
-/// A block about the origin, and the eighth of it with x, y and z above 0: the node of the whole for each of its own.
+/// Returns a block about the origin, its octant with x, y and z above 0, and the whole block's node for each node of
+/// the octant.
 fn symmetric(cells: usize) -> (Parts, Parts, Vec<usize>) {
     let spacing = 0.01;
     let mut whole = Parts::block([2 * cells; 3], spacing, 1e-3, 20.0);
     let centre = Vec3::splat(cells as f32 * spacing);
     whole.positions.iter_mut().for_each(|position| *position -= centre);
-    let eighth = Parts::block([cells; 3], spacing, 1e-3, 20.0);
+    let octant = Parts::block([cells; 3], spacing, 1e-3, 20.0);
     let nearest = |place: &Vec3| {
         let distances = whole.positions.iter().map(|other| other.distance(*place));
         let mut nearest = (f32::INFINITY, 0);
@@ -184,54 +185,54 @@ fn symmetric(cells: usize) -> (Parts, Parts, Vec<usize>) {
         assert!(nearest.0 < 1e-3 * spacing);
         nearest.1
     };
-    let nodes = eighth.positions.iter().map(nearest).collect();
-    (whole, eighth, nodes)
+    let nodes = octant.positions.iter().map(nearest).collect();
+    (whole, octant, nodes)
 }
 
-/// The planes through the origin that a node lies in.
-fn planes(place: Vec3) -> [bool; 3] {
-    place.to_array().map(|coordinate| coordinate.abs() < 1e-6)
+/// Returns which planes through the origin contain a node.
+fn planes(position: Vec3) -> [bool; 3] {
+    position.to_array().map(|coordinate| coordinate.abs() < 1e-6)
 }
 
-/// Both in a world without gravity, the eighth with its planes held.
-fn symmetric_scenes([whole, eighth]: [&Parts; 2], which: (Solver, Storage)) -> [Scene; 2] {
-    let [whole, mut part] = [whole, eighth].map(|parts| scene(parts, FREE, which));
-    for (node, place) in (0..).zip(&eighth.positions) {
-        if planes(*place) != [false; 3] {
-            hold(&mut part, node, planes(*place));
+/// Puts both in a world without gravity, with the symmetry planes of the octant held.
+fn symmetric_scenes([whole, octant]: [&Parts; 2], which: (Solver, Storage)) -> [Scene; 2] {
+    let [whole, mut part] = [whole, octant].map(|parts| scene(parts, FREE, which));
+    for (node, position) in (0..).zip(&octant.positions) {
+        if planes(*position) != [false; 3] {
+            hold(&mut part, node, planes(*position));
         }
     }
     [whole, part]
 }
 
-/// Pulls a block apart along x with 40 N for each kg at its ends.
+/// Pulls a block apart along x with 40 N per kg at its ends.
 fn pull(scene: &mut Scene, parts: &Parts) {
-    let reach = parts.positions.iter().map(|place| place.x).fold(0.0, f32::max);
-    for (node, (place, &mass)) in (0..).zip(parts.positions.iter().zip(&parts.masses)) {
-        if place.x.abs() > 0.999 * reach {
-            let force = Vec3::X * place.x.signum() * 40.0 * mass;
+    let reach = parts.positions.iter().map(|position| position.x).fold(0.0, f32::max);
+    for (node, (position, &mass)) in (0..).zip(parts.positions.iter().zip(&parts.masses)) {
+        if position.x.abs() > 0.999 * reach {
+            let force = Vec3::X * position.x.signum() * 40.0 * mass;
             scene.body_mut().apply_force(node, force).expect("a node");
         }
     }
 }
 
 #[test]
-fn an_eighth_with_symmetry_planes_moves_as_the_whole() {
+fn an_octant_with_symmetry_planes_moves_as_the_whole() {
     for solver in SOLVERS {
         for storage in [Storage::Packed, Storage::DynamicBulk] {
-            let (block, eighth, nodes) = symmetric(3);
-            let [mut whole, mut part] = symmetric_scenes([&block, &eighth], (solver, storage));
+            let (block, octant, nodes) = symmetric(3);
+            let [mut whole, mut part] = symmetric_scenes([&block, &octant], (solver, storage));
             let mut moved = 0.0_f64;
             for _ in 0..40 {
                 pull(&mut whole, &block);
-                pull(&mut part, &eighth);
+                pull(&mut part, &octant);
                 whole.step(0.002);
                 part.step(0.002);
                 let all = whole.positions();
                 let same: Vec<DVec3> = nodes.iter().map(|&node| all[node]).collect();
                 let error = largest_difference(&part.positions(), &same);
                 assert!(error < 1e-6, "{solver:?}, {storage:?}: {error:.2e} m");
-                let start: Vec<DVec3> = eighth.positions.iter().map(|place| place.as_dvec3()).collect();
+                let start: Vec<DVec3> = octant.positions.iter().map(|position| position.as_dvec3()).collect();
                 moved = moved.max(largest_difference(&part.positions(), &start));
             }
             assert!(moved > 2e-3, "{moved}");
@@ -239,25 +240,25 @@ fn an_eighth_with_symmetry_planes_moves_as_the_whole() {
     }
 }
 
-/// At rest the plane holds what the forces pull.
+/// At rest the plane balances the applied forces.
 #[test]
-fn symmetry_planes_hold_what_is_pulled() {
-    for which in each() {
-        let (block, eighth, nodes) = symmetric(2);
-        let [mut whole, mut part] = symmetric_scenes([&block, &eighth], which);
+fn symmetry_planes_balance_the_applied_forces() {
+    for which in solvers_and_storages() {
+        let (block, octant, nodes) = symmetric(2);
+        let [mut whole, mut part] = symmetric_scenes([&block, &octant], which);
         pull(&mut whole, &block);
-        pull(&mut part, &eighth);
+        pull(&mut part, &octant);
         settle(&mut whole);
         settle(&mut part);
         let all = whole.positions();
         let same: Vec<DVec3> = nodes.iter().map(|&node| all[node]).collect();
         let error = largest_difference(&part.positions(), &same);
         assert!(error < 1e-7, "{which:?}: {error:.2e} m");
-        let stretched = part.positions().iter().map(|place| place.x).fold(0.0, f64::max) - 0.02;
+        let stretched = part.positions().iter().map(|position| position.x).fold(0.0, f64::max) - 0.02;
         assert!(stretched > 1e-4, "{stretched}");
         let mut held = DVec3::ZERO;
-        for (node, place) in (0..).zip(&eighth.positions) {
-            let [x, y, z] = planes(*place);
+        for (node, position) in (0..).zip(&octant.positions) {
+            let [x, y, z] = planes(*position);
             if x | y | z {
                 let force = force(&part, node);
                 let free = DVec3::select(BVec3::new(x, y, z), DVec3::ZERO, force);
@@ -265,11 +266,11 @@ fn symmetry_planes_hold_what_is_pulled() {
                 held += force;
             }
         }
-        let pulled: f64 = (eighth.positions.iter().zip(&eighth.masses))
-            .filter(|(place, _)| place.x > 0.015)
+        let pulled: f64 = (octant.positions.iter().zip(&octant.masses))
+            .filter(|(position, _)| position.x > 0.015)
             .map(|(_, &mass)| 40.0 * f64::from(mass))
             .sum();
-        // A block that is pulled along x presses on no plane across it as a whole.
+        // A block that is pulled along x has no net force on the planes across it.
         assert!(
             held.distance(-pulled * DVec3::X) < 1e-5 * pulled,
             "{which:?}: {held}, {pulled}"
@@ -278,7 +279,7 @@ fn symmetry_planes_hold_what_is_pulled() {
 }
 
 #[test]
-fn a_led_axis_is_where_it_is_led_and_free_axes_go_on() {
+fn a_driven_axis_reaches_its_target_and_free_axes_keep_moving() {
     let parts = Parts::nodes(vec![Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO], 0.5);
     let falling = WorldDefinition {
         gravity: Vec3::new(2.0, -9.81, 0.0),
@@ -289,7 +290,7 @@ fn a_led_axis_is_where_it_is_led_and_free_axes_go_on() {
         tolerance: 1e-4,
         ..falling
     };
-    for which in each() {
+    for which in solvers_and_storages() {
         for world in [falling, cut, careful] {
             let mut scene = scene(&parts, world, which);
             hold(&mut scene, 0, Y);
@@ -299,12 +300,12 @@ fn a_led_axis_is_where_it_is_led_and_free_axes_go_on() {
                 let body = scene.body_mut();
                 body.move_pin(0, Vec3::new(-50.0, target, f32::MAX)).expect("a pin");
                 scene.step(0.01);
-                let (place, velocity) = (scene.positions()[0], scene.velocities()[0]);
-                assert_eq!(place.y, f64::from(target), "{which:?}");
+                let (position, velocity) = (scene.positions()[0], scene.velocities()[0]);
+                assert_eq!(position.y, f64::from(target), "{which:?}");
                 assert!((velocity.y - 3.0).abs() < 1e-4, "{which:?}: {velocity}");
-                assert_eq!(place.z, 3.0, "{which:?}");
+                assert_eq!(position.z, 3.0, "{which:?}");
                 assert!((velocity.x - 0.02 * step as f64).abs() < 1e-6, "{which:?}: {velocity}");
-                // What is led has no kinetic energy of its own.
+                // A driven axis has no kinetic energy of its own.
                 let kinetic = scene.body().energy(world.gravity).kinetic;
                 let other = scene.velocities()[1].length_squared();
                 let expected = 0.25 * (velocity.x.powi(2) + other);
@@ -318,9 +319,9 @@ fn a_led_axis_is_where_it_is_led_and_free_axes_go_on() {
             let error = (falls[0].x - 1.0 - falls[1].x).abs();
             assert!(error < 2e-7, "{which:?}: {error:.2e}");
             scene.step(0.01);
-            let (place, velocity) = (scene.positions()[0], scene.velocities()[0]);
+            let (position, velocity) = (scene.positions()[0], scene.velocities()[0]);
             assert_eq!(
-                (place.y, velocity.y),
+                (position.y, velocity.y),
                 (f64::from(2.0 + 0.03 * steps as f32), 0.0),
                 "{which:?}"
             );
@@ -328,12 +329,13 @@ fn a_led_axis_is_where_it_is_led_and_free_axes_go_on() {
     }
 }
 
-/// Implicit equations with a node that is led into a body: what is led belongs to them.
+/// Implicit equations with a node that is driven into a body: its prescribed motion belongs to the equations.
 #[test]
-fn a_led_axis_carries_its_springs_along() {
+fn a_driven_axis_moves_its_springs() {
     let (mass, stiffness) = (0.5, 50.0);
-    for which in each() {
-        // Along x the lead is a spring's end; the other end is a mass that follows by the solver's own formula.
+    for which in solvers_and_storages() {
+        // Along x the driven node is the end of a spring; the other end is a mass that follows by the solver's own
+        // formula.
         let mut parts = Parts::nodes(vec![Vec3::ZERO, Vec3::X * 0.1], mass);
         parts.join(0, 1, stiffness);
         let mut led = scene(&parts, WorldDefinition { substeps: 1, ..FREE }, which);
@@ -355,11 +357,11 @@ fn a_led_axis_carries_its_springs_along() {
     }
 }
 
-/// A sheet of tissue that lies on sliding supports, held aside by rails at two sides.
+/// Holds a sheet of tissue on sliding supports, with rails at two sides.
 fn on_supports(parts: &Parts, scene: &mut Scene) -> Vec<u32> {
     let mut held = Vec::new();
-    for (node, place) in (0..).zip(&parts.positions) {
-        let axes = [place.x < 1e-6, place.y < 1e-6, place.z < 1e-6];
+    for (node, position) in (0..).zip(&parts.positions) {
+        let axes = [position.x < 1e-6, position.y < 1e-6, position.z < 1e-6];
         if axes != [false; 3] {
             hold(scene, node, axes);
             held.push(node);
@@ -372,28 +374,28 @@ fn on_supports(parts: &Parts, scene: &mut Scene) -> Vec<u32> {
 fn supports_carry_the_weight() {
     let parts = Parts::block([3, 4, 2], 0.01, 1e-3, 50.0);
     let weight = 9.81 * parts.masses.iter().map(|&mass| f64::from(mass)).sum::<f64>();
-    for which in each() {
+    for which in solvers_and_storages() {
         let mut scene = scene(&parts, HANGING, which);
         let held = on_supports(&parts, &mut scene);
         let all = |scene: &Scene| held.iter().map(|&node| force(scene, node)).sum::<DVec3>();
         settle(&mut scene);
         let error = all(&scene).distance(weight * DVec3::Y);
         assert!(error < 1e-5 * weight, "{which:?}: {error:.2e} of {weight} N");
-        let sunk = scene.positions()[4 * 4].y;
-        assert!(sunk < 0.04 - 1e-5, "{sunk}");
-        // And it stays so.
-        let places = scene.positions();
+        let sag = scene.positions()[4 * 4].y;
+        assert!(sag < 0.04 - 1e-5, "{sag}");
+        // It stays there.
+        let positions = scene.positions();
         for _ in 0..10 {
             scene.step(0.005);
             let error = all(&scene).distance(weight * DVec3::Y);
             assert!(error < 1e-3 * weight, "{which:?}: {error:.2e} of {weight} N");
         }
-        let error = largest_difference(&places, &scene.positions());
+        let error = largest_difference(&positions, &scene.positions());
         assert!(error < 1e-7, "{which:?}: {error:.2e}");
     }
 }
 
-/// On a slope a spring holds what pulls along it, and the rail what presses on it.
+/// On a slope a spring balances the force along the slope, and the rail the force across it.
 #[test]
 fn a_bead_rests_on_its_slope() {
     let slope = 0.6_f64;
@@ -403,7 +405,7 @@ fn a_bead_rests_on_its_slope() {
         ..FREE
     };
     let parts = bead(Vec3::X * 0.1);
-    for which in each() {
+    for which in solvers_and_storages() {
         let mut bead = scene(&parts, world, which);
         hold(&mut bead, 1, Y);
         settle(&mut bead);
@@ -433,9 +435,9 @@ fn a_bead_rests_on_its_slope() {
 }
 
 #[test]
-fn all_axes_are_a_pin_to_the_bit() {
+fn all_axes_are_bitwise_a_pin() {
     let parts = Parts::block([2; 3], 0.02, 1e-3, 30.0);
-    for which in each() {
+    for which in solvers_and_storages() {
         let mut scenes = [(); 3].map(|()| scene(&parts, HANGING, which));
         let [pinned, whole, changed] = &mut scenes;
         pinned.body_mut().pin(0).expect("a node");
@@ -447,7 +449,7 @@ fn all_axes_are_a_pin_to_the_bit() {
             for scene in &mut scenes {
                 let target = Vec3::splat(1e-3 * step as f32);
                 scene.body_mut().move_pin(0, target).expect("a pin");
-                // Holding it again the same way changes nothing.
+                // Holding it again at the same axes changes nothing.
                 hold(scene, 0, [true; 3]);
                 scene.step(0.004);
             }
@@ -476,12 +478,12 @@ fn all_axes_are_a_pin_to_the_bit() {
     }
 }
 
-/// A free node flies on along what is let go of, and stops along what is held.
+/// A free node keeps its velocity along released axes, and stops along held axes.
 #[test]
-fn axes_change_while_it_runs() {
+fn axes_can_change_during_the_run() {
     let parts = Parts::nodes(vec![Vec3::ZERO, Vec3::ONE], 0.5);
     let pull = Vec3::new(1.0, 1.0, 0.0);
-    for which in each() {
+    for which in solvers_and_storages() {
         let mut scene = Scene::with(&parts, FREE, |definition| BodyDefinition {
             solver: which.0,
             storage: which.1,
@@ -490,9 +492,9 @@ fn axes_change_while_it_runs() {
         });
         let speeds = [Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO];
         scene.body_mut().set_velocities(&speeds).expect("velocities");
-        let near = |scene: &Scene, place: [f64; 3], velocity: [f64; 3]| {
-            let error = scene.positions()[0].distance(place.into());
-            assert!(error < 1e-6, "{which:?}: at {}, not {place:?}", scene.positions()[0]);
+        let near = |scene: &Scene, position: [f64; 3], velocity: [f64; 3]| {
+            let error = scene.positions()[0].distance(position.into());
+            assert!(error < 1e-6, "{which:?}: at {}, not {position:?}", scene.positions()[0]);
             let error = scene.velocities()[0].distance(velocity.into());
             assert!(error < 1e-5, "{which:?}: {}, not {velocity:?}", scene.velocities()[0]);
         };
@@ -501,22 +503,22 @@ fn axes_change_while_it_runs() {
         near(&scene, [0.1, 0.2, 0.3], [1.0, 0.0, 3.0]);
         scene.step(0.1);
         near(&scene, [0.2, 0.2, 0.6], [1.0, 0.0, 3.0]);
-        // Led along y, then let go of there and held along z; x does not notice.
+        // Driven along y, then released there and held along z; x is unaffected.
         scene.body_mut().move_pin(0, Vec3::Y * 0.5).expect("a pin");
         scene.step(0.1);
         hold(&mut scene, 0, Z);
         near(&scene, [0.3, 0.5, 0.9], [1.0, 3.0, 0.0]);
         scene.step(0.1);
         near(&scene, [0.4, 0.8, 0.9], [1.0, 3.0, 0.0]);
-        // A change forgets where it was to be led, and forces along what is held now.
+        // A change discards the target position, and forces along the axes that are now held.
         scene.body_mut().move_pin(0, Vec3::splat(9.0)).expect("a pin");
         scene.body_mut().apply_force(0, pull).expect("a node");
         hold(&mut scene, 0, YZ);
         scene.step(0.1);
-        let places = scene.positions()[0];
+        let positions = scene.positions()[0];
         assert!(
-            (places.y - 0.8).abs() < 1e-6 && (places.z - 0.9).abs() < 1e-6,
-            "{which:?}: {places}"
+            (positions.y - 0.8).abs() < 1e-6 && (positions.z - 0.9).abs() < 1e-6,
+            "{which:?}: {positions}"
         );
         let gained = scene.velocities()[0].x - 1.0;
         assert!((gained - 0.2).abs() < 1e-5, "{which:?}: {gained}");
@@ -530,7 +532,8 @@ fn axes_change_while_it_runs() {
     }
 }
 
-/// Half of the nodes of a body held along axes as it comes, dampings of both kinds, forces, gravity, a ball that goes through all.
+/// Half of the nodes of a body are held along arbitrary axes, with both kinds of damping, forces, gravity, and a ball
+/// that moves through all of it.
 fn thrown(which: (Solver, Storage), world: WorldDefinition) -> (Scene, Vec<[bool; 3]>) {
     let mut random = Random::new(7);
     let mut parts = Parts::block([4; 3], 0.01, 1e-3, 30.0);
@@ -557,22 +560,22 @@ fn thrown(which: (Solver, Storage), world: WorldDefinition) -> (Scene, Vec<[bool
 }
 
 #[test]
-fn what_is_held_never_moves() {
-    what_is_held_never_moves_of(HANGING);
+fn held_axes_never_move() {
+    held_axes_never_move_of(HANGING);
 }
 
 #[test]
 #[ignore = "long"]
-fn what_is_held_never_moves_in_steps_to_a_tolerance() {
-    what_is_held_never_moves_of(WorldDefinition {
+fn held_axes_never_move_in_steps_to_a_tolerance() {
+    held_axes_never_move_of(WorldDefinition {
         tolerance: 1e-4,
         max_substeps: 64,
         ..HANGING
     });
 }
 
-fn what_is_held_never_moves_of(world: WorldDefinition) {
-    for which in each() {
+fn held_axes_never_move_of(world: WorldDefinition) {
+    for which in solvers_and_storages() {
         let (mut scene, axes) = thrown(which, world);
         let start = scene.positions();
         let ball = ToolDefinition {
@@ -594,15 +597,15 @@ fn what_is_held_never_moves_of(world: WorldDefinition) {
             let place = Vec3::new(0.02, depth, 0.018);
             scene.world.set_pose(ball, place, None).expect("a pose");
             if scene.world.step(0.002).is_err() {
-                // Contact has no order to speak of.
+                // Contact has no order of convergence.
                 assert!(world.tolerance > 0.0);
                 break;
             }
-            let (places, velocities) = (scene.positions(), scene.velocities());
+            let (positions, velocities) = (scene.positions(), scene.velocities());
             let mut fastest = 0.0_f64;
             for (node, &axes) in axes.iter().enumerate() {
                 let axes = BVec3::from(axes);
-                let moved = DVec3::select(axes, places[node] - start[node], DVec3::ZERO);
+                let moved = DVec3::select(axes, positions[node] - start[node], DVec3::ZERO);
                 let speed = DVec3::select(axes, velocities[node], DVec3::ZERO);
                 assert_eq!(
                     (moved, speed),
@@ -611,15 +614,16 @@ fn what_is_held_never_moves_of(world: WorldDefinition) {
                 );
                 fastest = fastest.max(velocities[node].length());
             }
-            // The ball goes at 0.5 m/s; a node gives way by four times that at most, for each of the contacts at it.
+            // The ball moves at 0.5 m/s; each of the contacts at a node gives it at most four times that speed.
             assert!(fastest < 3.0, "{which:?}, step {step}: {fastest} m/s");
         }
     }
 }
 
-/// A ball comes from aside: what it gives along the free axis is momentum, what it gives along the held one is the pin's.
+/// A ball arrives sideways: its impulse along the free axis becomes momentum, its impulse along the held axis goes to
+/// the pin.
 #[test]
-fn a_tool_moves_what_is_free_to_move() {
+fn a_tool_moves_free_axes_only() {
     for solver in SOLVERS {
         for (axes, aside) in [(Y, 0.006), (Y, 0.009), (Z, 0.006), (YZ, 0.008)] {
             let parts = Parts::nodes(vec![Vec3::ZERO, Vec3::splat(9.0)], 0.5);
@@ -667,10 +671,10 @@ fn a_tool_moves_what_is_free_to_move() {
     }
 }
 
-/// A ball rubs past a node that is led: it takes it along as fast as itself and no faster, and nothing keeps the lead from its end; what is
-/// let go of afterwards has the velocity it was led with.
+/// A ball rubs past a driven node: friction moves it at most as fast as the ball, and the prescribed motion reaches its
+/// target. A released axis keeps the driven velocity.
 #[test]
-fn a_tool_rubs_what_is_led() {
+fn a_tool_rubs_a_driven_node() {
     for solver in SOLVERS {
         for substeps in [1, 3] {
             let parts = Parts::nodes(vec![Vec3::ZERO, Vec3::splat(9.0)], 0.5);
@@ -708,11 +712,11 @@ fn a_tool_rubs_what_is_led() {
     }
 }
 
-/// Springs come and go between steps that are left open: held axes do not notice, and free ones have what the bead had.
+/// Springs are added and removed between open steps: held axes are unaffected, and free axes follow the reference.
 #[test]
-fn cuts_leave_what_is_held() {
+fn cuts_keep_held_axes() {
     let parts = bead(Vec3::new(0.2, 0.1, 0.0));
-    for which in each() {
+    for which in solvers_and_storages() {
         let mut scene = scene(&parts, HANGING, which);
         hold(&mut scene, 1, Y);
         scene.run(0.005, 4);
@@ -729,14 +733,15 @@ fn cuts_leave_what_is_held() {
         scene.body_mut().add_spring(0, 1, 70.0, Some(0.1)).expect("a spring");
         same(&scene);
         scene.step(0.005);
-        let (place, velocity) = (scene.positions()[1], scene.velocities()[1]);
-        assert_eq!((place.y, velocity.y), (f64::from(0.1_f32), 0.0), "{which:?}");
+        let (position, velocity) = (scene.positions()[1], scene.velocities()[1]);
+        assert_eq!((position.y, velocity.y), (f64::from(0.1_f32), 0.0), "{which:?}");
     }
 }
 
-/// Straight against what is held a tool goes in, as at a pinned node, and feels next to nothing, as it does a hair beside that.
+/// A tool that moves straight against held axes enters the tissue, as at a pinned node, with almost no force, also
+/// slightly beside the node.
 #[test]
-fn a_tool_goes_in_where_nothing_gives_way() {
+fn a_tool_enters_where_all_axes_are_held() {
     for solver in SOLVERS {
         for aside in [0.0, 1e-9, 1e-6] {
             let parts = Parts::nodes(vec![Vec3::ZERO, Vec3::splat(9.0)], 0.5);
@@ -764,40 +769,40 @@ fn a_tool_goes_in_where_nothing_gives_way() {
     }
 }
 
-/// What slides on a plane keeps its momentum along it and its spin about the normal.
+/// A body sliding on a plane keeps its momentum along the plane and its spin about the normal.
 #[test]
 fn a_sliding_body_keeps_its_momentum() {
     let parts = Parts::block([3; 3], 0.01, 1e-3, 30.0);
     let total: f64 = parts.masses.iter().map(|&mass| f64::from(mass)).sum();
-    for which in each() {
+    for which in solvers_and_storages() {
         let world = WorldDefinition {
             gravity: Vec3::NEG_Y,
             ..FREE
         };
-        // However well equations are solved.
+        // This holds for any accuracy of the solver.
         let mut scene = Scene::with(&parts, world, |definition| BodyDefinition {
             solver: which.0,
             storage: which.1,
             accuracy: if which.0 == Solver::Implicit { 0.3 } else { 0.0 },
             ..definition
         });
-        for (node, place) in (0..).zip(&parts.positions) {
-            if place.y == 0.0 {
+        for (node, position) in (0..).zip(&parts.positions) {
+            if position.y == 0.0 {
                 hold(&mut scene, node, Y);
             }
         }
         let mut random = Random::new(9);
         let spin = Vec3::Y * 5.0;
-        let speed = |place: &Vec3| Vec3::X * 0.3 + spin.cross(*place) + 0.05 * random.vector();
+        let speed = |position: &Vec3| Vec3::X * 0.3 + spin.cross(*position) + 0.05 * random.vector();
         let speeds: Vec<Vec3> = parts.positions.iter().map(speed).collect();
         scene.body_mut().set_velocities(&speeds).expect("velocities");
         let sums = |scene: &Scene| {
             let nodes = scene.positions().into_iter().zip(scene.velocities()).zip(&parts.masses);
             nodes.fold(
                 (DVec3::ZERO, DVec3::ZERO),
-                |(momentum, spin), ((place, velocity), &mass)| {
+                |(momentum, spin), ((position, velocity), &mass)| {
                     let own = velocity * f64::from(mass);
-                    (momentum + own, spin + place.cross(own))
+                    (momentum + own, spin + position.cross(own))
                 },
             )
         };
@@ -816,10 +821,10 @@ fn a_sliding_body_keeps_its_momentum() {
     }
 }
 
-/// Tetrahedra of each law, home springs and bending: what is held stays, supports carry what is not drawn home, and a step of
-/// IMPLICIT is that of NEWTON.
+/// Tetrahedra of each law, anchor springs and bending: held axes do not move, supports carry all forces except those of
+/// anchor springs, and a step of IMPLICIT agrees with NEWTON.
 #[test]
-fn elements_and_terms_are_held_too() {
+fn elements_and_terms_respect_held_axes() {
     let mesh = Mesh::block([0.08; 3], [5; 3]).expect("a block");
     for (poisson_ratio, bending) in [(0.3, 0.0), (0.45, 0.0), (0.3, 1e-3)] {
         let definition = BodyDefinition {
@@ -849,8 +854,8 @@ fn elements_and_terms_are_held_too() {
             let mut scene = Scene { world, id };
             let low = |coordinate: f32| coordinate < -0.0399;
             let mut held = Vec::new();
-            for (node, place) in (0..).zip(&mesh.positions) {
-                let axes = place.to_array().map(low);
+            for (node, position) in (0..).zip(&mesh.positions) {
+                let axes = position.to_array().map(low);
                 if axes != [false; 3] {
                     hold(&mut scene, node, axes);
                     held.push((node, BVec3::from(axes)));
@@ -866,8 +871,8 @@ fn elements_and_terms_are_held_too() {
             let mut sum = DVec3::ZERO;
             for &(node, axes) in &held {
                 sum += force(&scene, node);
-                let place = scene.positions()[node as usize];
-                let moved = DVec3::select(axes, place - start[node as usize], DVec3::ZERO);
+                let position = scene.positions()[node as usize];
+                let moved = DVec3::select(axes, position - start[node as usize], DVec3::ZERO);
                 assert_eq!(moved, DVec3::ZERO, "{solver:?}");
             }
             let weight = 9.81 * 1000.0 * f64::from(0.08_f32).powi(3);
@@ -883,17 +888,17 @@ fn elements_and_terms_are_held_too() {
     }
 }
 
-/// The preconditioner knows what is held: an eighth with its planes takes no more products than the whole.
+/// The preconditioner includes held axes: an octant with its planes takes no more products than the whole.
 #[test]
-fn planes_make_an_equation_no_harder() {
+fn symmetry_planes_need_no_more_products() {
     let world = WorldDefinition { substeps: 1, ..HANGING };
-    let (whole, eighth, _) = symmetric(7);
+    let (whole, octant, _) = symmetric(7);
     let solve = |parts: &Parts, planes_held: bool| {
         let mut scene = scene(parts, world, (Solver::Implicit, Storage::Packed));
-        for (node, place) in (0..).zip(&parts.positions) {
-            if planes_held && planes(*place) != [false; 3] {
-                hold(&mut scene, node, planes(*place));
-            } else if !planes_held && place.y.abs() < 1e-6 {
+        for (node, position) in (0..).zip(&parts.positions) {
+            if planes_held && planes(*position) != [false; 3] {
+                hold(&mut scene, node, planes(*position));
+            } else if !planes_held && position.y.abs() < 1e-6 {
                 scene.body_mut().pin(node).expect("a node");
             }
         }
@@ -902,7 +907,7 @@ fn planes_make_an_equation_no_harder() {
         assert!(report.has_converged);
         report.iterations
     };
-    let (products, of_pinned) = (solve(&eighth, true), solve(&whole, false));
+    let (products, of_pinned) = (solve(&octant, true), solve(&whole, false));
     assert!(
         20 * products <= 19 * of_pinned,
         "{products} products, {of_pinned} of the whole"
@@ -910,10 +915,10 @@ fn planes_make_an_equation_no_harder() {
 }
 
 #[test]
-fn what_cannot_be_held_is_refused() {
+fn invalid_axes_are_refused() {
     let mut parts = Parts::chain(3, Vec3::X * 0.1, 0.01, 50.0);
     parts.masses[0] = 0.0;
-    for which in each() {
+    for which in solvers_and_storages() {
         let mut scene = scene(&parts, HANGING, which);
         scene.step(1e-3);
         let before = scene.world.state_hash();
@@ -929,7 +934,7 @@ fn what_cannot_be_held_is_refused() {
         assert_eq!(scene.world.state_hash(), before, "{which:?}");
         hold(&mut scene, 1, X);
         assert_ne!(scene.world.state_hash(), before, "{which:?}");
-        // Where nothing moves the axes are all that differs.
+        // Where nothing moves only the axes differ.
         let [x, y] = [X, Y].map(|axes| {
             let mut scene = self::scene(&parts, HANGING, which);
             hold(&mut scene, 1, axes);
@@ -939,9 +944,9 @@ fn what_cannot_be_held_is_refused() {
     }
 }
 
-/// A step that is refused or that leads to infinity leaves what is held, and where it is led, as it was.
+/// A step that is refused or ends in infinity leaves held axes and their targets unchanged.
 #[test]
-fn a_step_that_is_not_taken_changes_nothing() {
+fn a_refused_step_changes_nothing() {
     let mut parts = Parts::chain(3, Vec3::X * 0.1, 0.01, 1e6);
     parts.rest_lengths.fill(0.09);
     let few = WorldDefinition {
@@ -964,8 +969,8 @@ fn a_step_that_is_not_taken_changes_nothing() {
     assert_eq!(scenes[0].positions()[1].y, f64::from(1e-4_f32));
 }
 
-/// A sheet large enough for all threads and for the pipeline, of which the rims slide on rails and some nodes are led.
-fn rimmed(world: WorldDefinition, solver: Solver, side: u32) -> Scene {
+/// A sheet large enough for all threads and for the pipeline. Its borders slide on rails and some nodes are driven.
+fn sheet_on_rails(world: WorldDefinition, solver: Solver, side: u32) -> Scene {
     let mesh = Mesh::cloth([1.0; 2], [side; 2]).expect("a cloth");
     let mut world = World::new(world).expect("a world");
     let id = world
@@ -980,11 +985,15 @@ fn rimmed(world: WorldDefinition, solver: Solver, side: u32) -> Scene {
         .expect("a body");
     let mut scene = Scene { world, id };
     let mut random = Random::new(10);
-    for (node, place) in (0..).zip(&mesh.positions) {
-        let axes = [place.x.abs() > 0.499, random.below(300) == 0, place.z.abs() > 0.499];
+    for (node, position) in (0..).zip(&mesh.positions) {
+        let axes = [
+            position.x.abs() > 0.499,
+            random.below(300) == 0,
+            position.z.abs() > 0.499,
+        ];
         hold(&mut scene, node, axes);
         if axes[1] && !axes[0] {
-            let target = *place + 1e-3 * random.vector();
+            let target = *position + 1e-3 * random.vector();
             scene.body_mut().move_pin(node, target).expect("a pin");
         }
     }
@@ -994,7 +1003,7 @@ fn rimmed(world: WorldDefinition, solver: Solver, side: u32) -> Scene {
 }
 
 #[test]
-fn threads_change_no_bit() {
+fn any_number_of_threads_is_bitwise_identical() {
     for (solver, substeps, side) in [(Solver::Verlet, 12, 179), (Solver::Implicit, 1, 95)] {
         let hashes = [1, 2].map(|threads| {
             let world = WorldDefinition {
@@ -1002,7 +1011,7 @@ fn threads_change_no_bit() {
                 substeps,
                 ..HANGING
             };
-            let mut scene = rimmed(world, solver, side);
+            let mut scene = sheet_on_rails(world, solver, side);
             scene.run(0.006, 2);
             scene.world.state_hash()
         });
@@ -1010,9 +1019,9 @@ fn threads_change_no_bit() {
     }
 }
 
-/// A step of several substeps goes through the pipeline; as many steps of one do not.
+/// A step of several substeps goes through the pipeline; the same number of single-substep steps does not.
 #[test]
-fn the_pipeline_leads_as_single_substeps_do() {
+fn the_pipeline_agrees_with_single_substeps() {
     const H: f32 = 1.0 / 4096.0;
     let scene = |thread_count: u32, substeps: u32| {
         let world = WorldDefinition {
@@ -1020,17 +1029,17 @@ fn the_pipeline_leads_as_single_substeps_do() {
             substeps,
             ..FREE
         };
-        rimmed(world, Solver::Verlet, 179)
+        sheet_on_rails(world, Solver::Verlet, 179)
     };
     let (mut together, mut one_by_one) = (scene(2, 16), scene(1, 1));
     for scene in [&mut together, &mut one_by_one] {
-        // Nothing is led: a lead is a matter of the step.
+        // Nothing is driven: a target is reached once per step.
         let count = scene.body().node_count() as u32;
         for node in 0..count {
             if let Ok(force) = scene.body().pin_force(node) {
                 assert_eq!(force, Vec3::ZERO);
-                let place = scene.body().positions()[node as usize];
-                scene.body_mut().move_pin(node, place).expect("a pin");
+                let position = scene.body().positions()[node as usize];
+                scene.body_mut().move_pin(node, position).expect("a pin");
             }
         }
     }

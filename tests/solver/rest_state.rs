@@ -1,4 +1,4 @@
-//! States of rest: against formulas, against what motion with damping comes to, and what is refused.
+//! Static equilibria: against formulas, against the end of damped motion, and refused cases.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use crate::support::euler::uneven_block;
@@ -28,7 +28,7 @@ fn hanging_chain(count: usize) -> Parts {
 }
 
 #[test]
-fn a_chain_hangs_as_far_whatever_its_solver_and_storage() {
+fn a_chain_has_the_same_sag_for_every_solver_and_storage() {
     let count = 100;
     let parts = hanging_chain(count);
     let extension = 0.01 * 9.81 / 50.0 * (count * (count + 1)) as f64 / 2.0;
@@ -45,7 +45,7 @@ fn a_chain_hangs_as_far_whatever_its_solver_and_storage() {
             assert!(error < 1e-6, "{solver:?}, {storage:?}: {error:.2e}, {report:?}");
             assert!(report.error <= 1e-6 * (10.0 + extension), "{report:?}");
             assert!(scene.velocities().iter().all(|&velocity| velocity == DVec3::ZERO));
-            // The pin carries all.
+            // The pin carries everything.
             let held = scene.body().pin_force(0).expect("a pin");
             let weight = 0.01 * 9.81 * count as f32;
             assert!(
@@ -56,8 +56,8 @@ fn a_chain_hangs_as_far_whatever_its_solver_and_storage() {
     }
 }
 
-/// Nodes between two pins at one height: the ways from node to node have one horizontal pull, and vertical ones that differ by
-/// a weight (the discrete catenary).
+/// Nodes between two pins at equal height: all links have the same horizontal force, and their vertical forces differ
+/// by one weight (the discrete catenary).
 #[test]
 fn a_chain_between_two_pins_is_a_catenary() {
     let (count, mass, stiffness) = (41_usize, 0.01, 400.0_f32);
@@ -68,26 +68,26 @@ fn a_chain_between_two_pins_is_a_catenary() {
     let weight = f64::from(mass) * f64::from(HANGING.gravity.y);
     let links = count - 1;
     let rest = f64::from(0.03_f32);
-    // The ways of all links for a horizontal pull.
+    // The vectors of all links for a horizontal force.
     let chain = |pull: f64| -> Vec<DVec3> {
         let up = |link: usize| -weight * ((links as f64 - 1.0) / 2.0 - link as f64);
-        let way = |link: usize| {
-            // The pull of a link on its lower-numbered node's neighbour points along the link.
+        let vector = |link: usize| {
+            // The force of a link on the neighbor of its lower-numbered node points along the link.
             let force = DVec3::new(pull, -up(link), 0.0);
             force.normalize() * (rest + force.length() / f64::from(stiffness))
         };
-        (0..links).map(way).collect()
+        (0..links).map(vector).collect()
     };
     let span = f64::from(parts.positions[count - 1].x) - f64::from(parts.positions[0].x);
     let (mut low, mut high) = (0.0, 100.0);
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
-        let reach: f64 = chain(middle).iter().map(|way| way.x).sum();
+        let reach: f64 = chain(middle).iter().map(|vector| vector.x).sum();
         if reach < span { low = middle } else { high = middle }
     }
     let mut expected = vec![DVec3::ZERO];
-    for way in chain(low) {
-        expected.push(expected[expected.len() - 1] + way);
+    for vector in chain(low) {
+        expected.push(expected[expected.len() - 1] + vector);
     }
     let mut scene = Scene::new(&parts, HANGING);
     let report = settle(&mut scene);
@@ -96,41 +96,41 @@ fn a_chain_between_two_pins_is_a_catenary() {
 }
 
 #[test]
-fn it_is_where_motion_with_damping_comes_to() {
-    it_is_where_motion_with_damping_comes_to_of(1.0);
+fn it_is_where_damped_motion_ends() {
+    it_is_where_damped_motion_ends_of(1.0);
 }
 
 #[test]
 #[ignore = "long"]
-fn it_is_where_motion_with_damping_comes_to_at_a_contrast() {
-    it_is_where_motion_with_damping_comes_to_of(1e3);
+fn it_is_where_damped_motion_ends_at_a_contrast() {
+    it_is_where_damped_motion_ends_of(1e3);
 }
 
-fn it_is_where_motion_with_damping_comes_to_of(contrast: f32) {
+fn it_is_where_damped_motion_ends_of(contrast: f32) {
     let mut parts = uneven_block(contrast);
     parts.node_dampings.fill(0.05);
     for storage in STORAGES {
-        let mut moved = kept_in(storage, &parts);
+        let mut moved = with_storage(storage, &parts);
         moved.run(1.0 / 60.0, 600);
-        let mut found = kept_in(storage, &parts);
+        let mut found = with_storage(storage, &parts);
         let report = settle(&mut found);
         let error = largest_difference(&moved.positions(), &found.positions()) / parts.size();
         assert!(error < 1e-5, "{storage:?}, 1 : {contrast}: {error:.2e}, {report:?}");
         assert!(report.energy_after < report.energy_before);
         // It stays there.
-        let there = found.positions();
+        let before = found.positions();
         found.run(1.0 / 60.0, 10);
-        let strayed = largest_difference(&there, &found.positions()) / parts.size();
-        assert!(strayed < 1e-6, "{storage:?}: {strayed:.2e}");
+        let deviation = largest_difference(&before, &found.positions()) / parts.size();
+        assert!(deviation < 1e-6, "{storage:?}: {deviation:.2e}");
     }
 }
 
-fn kept_in(storage: Storage, parts: &Parts) -> Scene {
+fn with_storage(storage: Storage, parts: &Parts) -> Scene {
     Scene::with(parts, HANGING, |definition| BodyDefinition { storage, ..definition })
 }
 
 #[test]
-fn bad_starts_fall_in_energy_to_where_no_force_is_left() {
+fn bad_starts_lose_energy_until_forces_balance() {
     let parts = uneven_block(1.0);
     let mut random = Random::new(3);
     let size = parts.size() as f32;
@@ -159,14 +159,14 @@ fn bad_starts_fall_in_energy_to_where_no_force_is_left() {
             (report.energy_before / before - 1.0).abs() < 1e-4,
             "{name}: {before} J, {report:?}"
         );
-        // What rounding positions by 1e-8 m does to the forces of twenty springs of 20 N/m.
+        // The force error of twenty springs of 20 N/m when positions are rounded to 1e-8 m.
         assert!(report.residual < 4e-6, "{name}: {report:?}");
         let left = forces_left(&scene, &parts);
         assert!(left < 1e-5, "{name}: {left:.2e} N, {report:?}");
     }
 }
 
-/// The largest force on a node that is not pinned, N, in `f64` at the positions that are told.
+/// Returns the largest force on a free node (N), in `f64` at the reported positions.
 fn forces_left(scene: &Scene, parts: &Parts) -> f64 {
     let mut reference = parts.reference(HANGING.gravity);
     reference.positions = scene.positions();
@@ -177,9 +177,9 @@ fn forces_left(scene: &Scene, parts: &Parts) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// A row of three, pressed together: it is level where it is straight, and lowest where it is bent.
+/// A compressed row of three nodes: the straight shape is an unstable equilibrium, the bent shape is the minimum.
 #[test]
-fn a_place_that_is_level_but_not_lowest_is_left() {
+fn an_unstable_equilibrium_is_left() {
     let mut parts = Parts::chain(3, Vec3::X * 0.1, 0.01, 50.0);
     parts.rest_lengths.fill(0.125);
     parts.masses[0] = 0.0;
@@ -199,15 +199,15 @@ fn constant_forces_count_and_stay_pending() {
     settle(&mut scene);
     // Four springs of 50 N/m.
     assert!((scene.positions()[4].y + 0.4 + 4.0 * 2.0 / 50.0).abs() < 1e-6);
-    let there = scene.positions();
+    let before = scene.positions();
     scene.step(0.01);
-    assert!(largest_difference(&there, &scene.positions()) < 1e-7);
+    assert!(largest_difference(&before, &scene.positions()) < 1e-7);
     scene.step(0.01);
-    assert!(largest_difference(&there, &scene.positions()) > 1e-3);
+    assert!(largest_difference(&before, &scene.positions()) > 1e-3);
 }
 
 #[test]
-fn a_body_without_pins_rests_where_nothing_pulls_it() {
+fn a_body_without_pins_rests_without_forces() {
     let mut parts = Parts::block([3, 3, 3], 0.05, 0.01, 20.0);
     let expected = parts.clone();
     for (node, position) in parts.positions.iter_mut().enumerate() {
@@ -224,7 +224,7 @@ fn a_body_without_pins_rests_where_nothing_pulls_it() {
 }
 
 #[test]
-fn what_has_no_rest_or_is_not_found_is_refused_and_nothing_changes() {
+fn a_missing_equilibrium_is_refused_and_changes_nothing() {
     let cut = |parts: &mut Parts| parts.stiffnesses[50] = 0.0;
     let mut torn = hanging_chain(100);
     cut(&mut torn);
@@ -233,13 +233,13 @@ fn what_has_no_rest_or_is_not_found_is_refused_and_nothing_changes() {
         for solver in SOLVERS {
             let mut scene = Scene::with(&parts, HANGING, |definition| BodyDefinition { solver, ..definition });
             scene.step(0.01);
-            let (hash, there) = (scene.world.state_hash(), scene.positions());
+            let (hash, before) = (scene.world.state_hash(), scene.positions());
             match scene.world.rest_state(scene.id, &DEFAULT) {
                 Err(Error::InvalidArgument(said)) => assert!(said.contains(message), "{said}"),
                 other => panic!("{other:?}"),
             }
             assert_eq!(scene.world.state_hash(), hash);
-            assert_eq!(scene.positions(), there);
+            assert_eq!(scene.positions(), before);
         }
     }
     let mut scene = Scene::new(&hanging_chain(100), HANGING);
@@ -262,7 +262,7 @@ fn what_has_no_rest_or_is_not_found_is_refused_and_nothing_changes() {
 }
 
 #[test]
-fn springs_that_were_removed_hold_nothing() {
+fn removed_springs_hold_nothing() {
     for storage in STORAGES {
         let mut scene = Scene::with(&hanging_chain(6), HANGING, |definition| BodyDefinition {
             storage,
@@ -284,16 +284,16 @@ fn springs_that_were_removed_hold_nothing() {
     }
 }
 
-/// A body that lies in one point, on a spring without length, has no extent of its own to go by.
+/// A body whose nodes all lie at one point, on a spring of zero length, has no length scale of its own.
 #[test]
-fn a_bob_hangs_from_the_pin_it_began_in() {
+fn a_bob_hangs_from_the_pin_at_its_start() {
     for gravity in [Vec3::Y * -9.81, Vec3::new(1.0, -9.0, 0.3), Vec3::ZERO] {
         let mut parts = Parts::nodes(vec![Vec3::ZERO; 2], 0.1);
         parts.masses[0] = 0.0;
         parts.join(0, 1, 50.0);
         let mut scene = Scene::new(&parts, WorldDefinition { gravity, ..FREE });
         settle(&mut scene);
-        let off = scene.positions()[1].distance(gravity.as_dvec3() * (0.1 / 50.0));
-        assert!(off <= 1e-8 * f64::from(gravity.length()), "{gravity}: {off} m");
+        let error = scene.positions()[1].distance(gravity.as_dvec3() * (0.1 / 50.0));
+        assert!(error <= 1e-8 * f64::from(gravity.length()), "{gravity}: {error} m");
     }
 }

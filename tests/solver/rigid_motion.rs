@@ -1,7 +1,7 @@
-//! The same body turned and moved has the same motion, turned and moved: springs from Young's modulus, finite elements, and every term.
-//!
-//! Rest shapes stay where they are; only where nodes start, gravity and tools are turned and moved. What rounding makes of the start
-//! belongs to it: the body beside the origin starts where the moved one does, turned back.
+//! A rotated and translated body has the rotated and translated motion: springs from Young's modulus, finite elements,
+//! and every term.
+//! Rest shapes stay in place; only starting positions, gravity and tools are rotated and translated. The reference body
+//! starts at the moved body's rounded positions, transformed back, so that rounding of the start does not count.
 
 use crate::support::bodies::{FREE, Random, largest_difference};
 use glam::{DQuat, DVec3, Quat, Vec3};
@@ -11,15 +11,16 @@ use sinew::{
     World, WorldDefinition,
 };
 
-/// Of a body's size, what the same motion may differ by. VERLET is off by up to 6e-7, NEWTON by 9e-8. IMPLICIT does not solve again what
-/// rounded coordinates would make of its residual, and where one of two bodies solves one equation more they are up to 4.4e-6 apart.
+/// The allowed difference of both motions, relative to the body's size. VERLET is off by up to 6e-7, NEWTON by 9e-8.
+/// IMPLICIT does not solve again for the residual that rounded coordinates cause; where one of the bodies solves one
+/// equation more they differ by up to 4.4e-6.
 const SAME: [(Solver, f64); 3] = [(Solver::Verlet, 1e-6), (Solver::Implicit, 1e-5), (Solver::Newton, 1e-6)];
 /// m
 const SPACING: f32 = 0.0125;
 const DOWN: Vec3 = Vec3::new(1.0, -4.0, 2.0);
 const RADIUS: f32 = 0.02;
 
-/// A turn, then a move.
+/// A rotation, then a translation.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     turn: DQuat,
@@ -32,22 +33,22 @@ impl Motion {
         offset: DVec3::ZERO,
     };
 
-    fn of(&self, place: DVec3) -> DVec3 {
-        self.turn * place + self.offset
+    fn of(&self, position: DVec3) -> DVec3 {
+        self.turn * position + self.offset
     }
 
-    fn back(&self, place: DVec3) -> DVec3 {
-        self.turn.inverse() * (place - self.offset)
+    fn back(&self, position: DVec3) -> DVec3 {
+        self.turn.inverse() * (position - self.offset)
     }
 
-    /// What a coordinate is rounded by on its way out, m, for each axis.
+    /// Returns the rounding error of a coordinate of the moved body, for each axis (m).
     fn rounding(&self, size: f64) -> f64 {
         let farthest = (self.offset.length() + size) as f32;
         0.5 * f64::from(farthest.next_up() - farthest) * 3.0_f64.sqrt()
     }
 }
 
-/// A body, and where its nodes start.
+/// A body and its starting positions.
 struct Case<'a> {
     name: &'static str,
     definition: BodyDefinition<'a>,
@@ -55,7 +56,7 @@ struct Case<'a> {
     is_pressed: bool,
 }
 
-/// A body in a world of its own, as it is beside the origin or moved.
+/// A body in a world of its own, at the origin or moved.
 struct Scene {
     world: World,
     body: BodyId,
@@ -91,7 +92,7 @@ impl Scene {
         if case.is_pressed {
             let ball = ToolDefinition {
                 pose: Pose {
-                    position: scene.place_of_ball(0.0),
+                    position: scene.ball_position(0.0),
                     orientation: Quat::IDENTITY,
                 },
                 ..ToolDefinition::new(Shape::Sphere { radius: RADIUS })
@@ -101,8 +102,8 @@ impl Scene {
         scene
     }
 
-    /// Above the middle of the upper face, and going into it.
-    fn place_of_ball(&self, down: f64) -> Vec3 {
+    /// Returns the ball's position, above the center of the upper face and moving into it.
+    fn ball_position(&self, down: f64) -> Vec3 {
         let above = 0.025 + f64::from(RADIUS) + 0.002;
         self.motion.of(DVec3::Y * (above - down)).as_vec3()
     }
@@ -113,20 +114,20 @@ impl Scene {
 
     fn step(&mut self, dt: f32, part: f64) {
         if let Some(ball) = self.ball {
-            let place = self.place_of_ball(0.01 * part);
-            self.world.set_pose(ball, place, None).expect("a pose");
+            let position = self.ball_position(0.01 * part);
+            self.world.set_pose(ball, position, None).expect("a pose");
         }
         let report = self.world.step(dt).expect("a step");
         assert_eq!(report.bodies_restored, 0);
     }
 
-    /// Where nodes are beside the origin.
-    fn places(&self) -> Vec<DVec3> {
+    /// Returns the positions transformed back to the origin.
+    fn positions(&self) -> Vec<DVec3> {
         let positions = self.body().positions().iter();
         positions.map(|p| self.motion.back(p.as_dvec3())).collect()
     }
 
-    /// What holds the pins, N, turned back.
+    /// Returns the forces on the pins, rotated back (N).
     fn held(&self, pins: &[u32]) -> Vec<DVec3> {
         let force = |&node: &u32| self.body().pin_force(node).expect("a pin").as_dvec3();
         pins.iter()
@@ -135,7 +136,7 @@ impl Scene {
     }
 }
 
-/// The nodes of the end at low x.
+/// Returns the nodes of the end at low x.
 fn pins(rest: &[Vec3]) -> Vec<u32> {
     let low = rest.iter().map(|p| p.x).fold(f32::INFINITY, f32::min);
     let held = (0..).zip(rest).filter(|(_, p)| p.x < low + 0.1 * SPACING);
@@ -158,8 +159,8 @@ fn motions() -> Vec<Motion> {
     [turned.as_slice(), &[moved, both]].concat()
 }
 
-/// Holds a case to its image under each motion.
-fn assert_moves_with_it(case: &Case) {
+/// Compares a case with its image under each motion.
+fn assert_moves_with_the_scene(case: &Case) {
     assert_moves_by(case, &motions());
 }
 
@@ -178,30 +179,34 @@ fn assert_moves_by(case: &Case, motions: &[Motion]) {
             let still: Vec<Vec3> = moved.iter().map(|p| motion.back(p.as_dvec3()).as_vec3()).collect();
             let mut still = Scene::new(case, solver, &still, Motion::NONE);
             let mut moved = Scene::new(case, solver, &moved, motion);
-            let mut way = 0.0;
+            let mut largest_displacement = 0.0;
             for step in 1..=steps {
                 for scene in [&mut still, &mut moved] {
                     scene.step(dt, f64::from(step) / f64::from(steps));
                 }
-                let (expected, found) = (still.places(), moved.places());
+                let (expected, found) = (still.positions(), moved.positions());
                 let first: Vec<DVec3> = case.start.iter().map(|p| p.as_dvec3()).collect();
-                way = largest_difference(&expected, &first).max(way);
-                let off = largest_difference(&found, &expected);
+                largest_displacement = largest_difference(&expected, &first).max(largest_displacement);
+                let error = largest_difference(&found, &expected);
                 assert!(
-                    off < same * size + motion.rounding(size),
-                    "{}, {solver:?}, {motion:?}, step {step}: off by {off:.1e} m of {size} m",
+                    error < same * size + motion.rounding(size),
+                    "{}, {solver:?}, {motion:?}, step {step}: off by {error:.1e} m of {size} m",
                     case.name
                 );
                 let (expected, found) = (still.held(&pins), moved.held(&pins));
                 let most = expected.iter().map(|force| force.length()).fold(0.0, f64::max);
-                let off = largest_difference(&found, &expected) / most;
+                let error = largest_difference(&found, &expected) / most;
                 assert!(
-                    off < 1e-3,
-                    "{}, {solver:?}, {motion:?}, step {step}: forces off by {off:.1e}",
+                    error < 1e-3,
+                    "{}, {solver:?}, {motion:?}, step {step}: forces off by {error:.1e}",
                     case.name
                 );
             }
-            assert!(way > 0.02 * size, "{}, {solver:?}: it hardly moves: {way} m", case.name);
+            assert!(
+                largest_displacement > 0.02 * size,
+                "{}, {solver:?}: it hardly moves: {largest_displacement} m",
+                case.name
+            );
         }
     }
 }
@@ -258,7 +263,7 @@ impl Block {
         }
     }
 
-    /// Springs that are given.
+    /// Springs given by the caller.
     fn springs(&self) -> BodyDefinition<'static> {
         BodyDefinition {
             masses: Values::Uniform(1e-3),
@@ -283,13 +288,13 @@ fn springs_move_with_the_scene() {
         poisson_ratio: 0.0,
         ..TISSUE
     };
-    assert_moves_with_it(&block.case("springs from Young's modulus", block.material(from_modulus)));
+    assert_moves_with_the_scene(&block.case("springs from Young's modulus", block.material(from_modulus)));
     let volume = BodyDefinition {
         volume_stiffness: 1500.0,
         spring_dampings: Values::Uniform(0.01),
         ..block.springs()
     };
-    assert_moves_with_it(&block.case("volume and damping along springs", volume));
+    assert_moves_with_the_scene(&block.case("volume and damping along springs", volume));
     let stiffening = BodyDefinition {
         spring_law: SpringLaw::Exponential {
             steepness: 8.0,
@@ -297,24 +302,24 @@ fn springs_move_with_the_scene() {
         },
         ..block.springs()
     };
-    assert_moves_with_it(&block.case("springs that stiffen", stiffening));
+    assert_moves_with_the_scene(&block.case("springs that stiffen", stiffening));
 }
 
 #[test]
 fn elements_move_with_the_scene() {
     let block = Block::new();
-    assert_moves_with_it(&block.case("tetrahedra", block.material(TISSUE)));
+    assert_moves_with_the_scene(&block.case("tetrahedra", block.material(TISSUE)));
     let rings = Material {
         poisson_ratio: 0.45,
         ..TISSUE
     };
-    assert_moves_with_it(&block.case("tetrahedra that keep volume by rings", block.material(rings)));
+    assert_moves_with_the_scene(&block.case("tetrahedra that keep volume by rings", block.material(rings)));
     let fibres = BodyDefinition {
         fibre_directions: &block.fibres,
         fibre_stiffnesses: Values::Uniform(6000.0),
         ..block.material(TISSUE)
     };
-    assert_moves_with_it(&block.case("tetrahedra with fibres", fibres));
+    assert_moves_with_the_scene(&block.case("tetrahedra with fibres", fibres));
 }
 
 #[test]
@@ -324,7 +329,7 @@ fn pressed_tissue_moves_with_the_scene() {
 
 #[test]
 #[ignore = "long"]
-fn pressed_tissue_moves_with_the_scene_however_it_turns() {
+fn pressed_tissue_moves_with_the_scene_under_every_rotation() {
     pressed_tissue_moves_with_the_scene_of(&motions()[..3]);
 }
 
@@ -354,7 +359,7 @@ fn sheets_that_bend_move_with_the_scene() {
         *p + Vec3::Y * 0.004 * along * along
     });
     let start: Vec<Vec3> = lifted.collect();
-    assert_moves_with_it(&Case {
+    assert_moves_with_the_scene(&Case {
         name: "a curved sheet that bends",
         definition: BodyDefinition {
             masses: Values::Uniform(2e-4),

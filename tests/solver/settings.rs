@@ -1,4 +1,4 @@
-//! Settings that change between steps: they act as if the body had been made with them, and bad ones change nothing.
+//! Settings that change between steps act as if the body had been created with them; invalid settings change nothing.
 
 use glam::Vec3;
 use sinew::{
@@ -11,7 +11,7 @@ use crate::support::scene::SOLVERS;
 
 const DT: f32 = 0.01;
 
-/// Changes some settings of a body.
+/// Changes settings of a body.
 fn set(world: &mut World, id: BodyId, change: impl FnOnce(&mut BodySettings)) -> sinew::Result<()> {
     let mut settings = world.body(id)?.settings();
     change(&mut settings);
@@ -19,7 +19,7 @@ fn set(world: &mut World, id: BodyId, change: impl FnOnce(&mut BodySettings)) ->
 }
 
 #[test]
-fn damping_that_is_set_slows_as_its_law_says() {
+fn new_damping_slows_by_its_law() {
     // One free node: v' = -c/m v, so v(t) = v0 exp(-c t / m), which VERLET solves exactly.
     let (mass, damping, time) = (0.02_f32, 0.1_f32, 0.5_f64);
     let mut scene = Scene::new(&Parts::nodes(vec![Vec3::ZERO], mass), FREE);
@@ -44,9 +44,9 @@ fn damping_that_is_set_slows_as_its_law_says() {
 }
 
 #[test]
-fn a_damped_block_moves_as_one_that_was_made_damped() {
+fn a_block_damped_later_moves_as_one_created_damped() {
     let mut parts = Parts::block([4, 3, 3], 0.02, 1e-3, 100.0);
-    // A node so light that mass scaling concerns it.
+    // A node so light that mass scaling affects it.
     parts.masses[20] = 1e-5;
     let mut damped = parts.clone();
     damped.node_dampings.fill(1e-3);
@@ -64,7 +64,7 @@ fn a_damped_block_moves_as_one_that_was_made_damped() {
     }
 }
 
-/// Sheets of one triangle each above each other, the upper one falling.
+/// Sheets of one triangle each, one above the other; the upper one falls.
 fn sheets(contact: BodyContact) -> (World, BodyId) {
     let mut world = World::new(WorldDefinition {
         gravity: Vec3::Y * -10.0,
@@ -76,7 +76,7 @@ fn sheets(contact: BodyContact) -> (World, BodyId) {
         Vec3::new(0.0, 0.0, 2.0),
         Vec3::new(1.0, 0.0, -1.0),
     ];
-    let above = below.map(|place| 0.2 * place + Vec3::Y * 0.02);
+    let above = below.map(|position| 0.2 * position + Vec3::Y * 0.02);
     let mut upper = None;
     for (positions, mass) in [(below, 0.0), (above, 0.01)] {
         let masses = [mass; 3];
@@ -105,10 +105,10 @@ fn sheets(contact: BodyContact) -> (World, BodyId) {
 }
 
 #[test]
-fn a_body_that_is_to_meet_others_does_so_from_then_on() {
+fn body_contact_takes_effect_when_enabled() {
     let height = |world: &World, id| world.body(id).expect("the body").positions()[0].y;
     let (mut world, id) = sheets(BodyContact::NOTHING);
-    // It would fall 5 cm in 0.1 s, through the other.
+    // It would fall 5 cm in 0.1 s, through the other sheet.
     let mut twin = World::load(&world.save().expect("a snapshot"), 1, None).expect("a world");
     set(&mut world, id, |it| it.with_bodies = true).expect("flags");
     assert!(world.body(id).expect("the body").settings().with_bodies);
@@ -118,7 +118,7 @@ fn a_body_that_is_to_meet_others_does_so_from_then_on() {
     }
     assert!(height(&twin, id) < -0.1, "{}", height(&twin, id));
     assert!(height(&world, id).abs() < 0.01, "{}", height(&world, id));
-    // And no longer.
+    // Then contact is disabled again.
     set(&mut world, id, |it| it.with_bodies = false).expect("flags");
     for _ in 0..20 {
         world.step(DT).expect("a step");
@@ -127,7 +127,7 @@ fn a_body_that_is_to_meet_others_does_so_from_then_on() {
 }
 
 #[test]
-fn thickness_that_is_set_is_kept_off_tools_and_tissue() {
+fn new_thickness_is_kept_off_tools_and_tissue() {
     let (mut world, id) = sheets(BodyContact {
         with_bodies: true,
         ..BodyContact::NOTHING
@@ -135,7 +135,9 @@ fn thickness_that_is_set_is_kept_off_tools_and_tissue() {
     let rest = |world: &mut World| {
         (0..200).for_each(|_| assert!(world.step(DT).is_ok()));
         let positions = world.body(id).expect("the body").positions();
-        positions.iter().fold(f32::INFINITY, |low, place| low.min(place.y))
+        positions
+            .iter()
+            .fold(f32::INFINITY, |low, position| low.min(position.y))
     };
     assert!(rest(&mut world) < 1e-3);
     set(&mut world, id, |it| it.thickness = 5e-3).expect("a thickness");
@@ -173,7 +175,7 @@ fn thickness_that_is_set_is_kept_off_tools_and_tissue() {
 }
 
 #[test]
-fn a_body_sleeps_once_it_is_told_to() {
+fn a_body_sleeps_once_sleep_is_enabled() {
     let mut parts = Parts::chain(4, Vec3::Y * -0.01, 1e-3, 50.0);
     parts.masses[0] = 0.0;
     parts.node_dampings.fill(0.02);
@@ -200,7 +202,7 @@ fn a_body_sleeps_once_it_is_told_to() {
 }
 
 #[test]
-fn substeps_that_are_set_are_taken() {
+fn new_substeps_are_taken() {
     let parts = Parts::chain(3, Vec3::X, 0.01, 1.0);
     let mut scene = Scene::new(&parts, FREE);
     scene.world.set_substeps(7, 10).expect("substeps");
@@ -209,7 +211,7 @@ fn substeps_that_are_set_are_taken() {
     assert_eq!(scene.step(DT).substeps, 1);
     assert!(scene.world.set_substeps(0, 0).is_err());
     assert_eq!(scene.world.substeps(), [0, 10]);
-    // With a tolerance as many as that needs.
+    // With a tolerance the number of substeps follows the tolerance.
     let strict = WorldDefinition {
         substeps: 1,
         tolerance: 1e-7,

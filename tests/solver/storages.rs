@@ -1,4 +1,4 @@
-//! The storages of Halic et al. and PACKED: one body's motion, its edits, its memory to the byte, full rows.
+//! The storages of Halic et al. and PACKED: the motion of one body, its edits, its exact memory use, full rows.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use sinew::{BodyDefinition, Error, Storage, StorageReport, Values, WorldDefiniti
 
 const OF_THE_PAPER: [Storage; 3] = [Storage::Efficient, Storage::FastLink, Storage::DynamicBulk];
 
-/// A scene with a body of these parts, kept like this.
+/// Creates a scene with a body of these parts in this storage.
 fn scene(parts: &Parts, storage: Storage, springs_per_node: u32) -> Scene {
     let mut world = sinew::World::new(FREE).expect("a world");
     let definition = BodyDefinition {
@@ -23,7 +23,7 @@ fn scene(parts: &Parts, storage: Storage, springs_per_node: u32) -> Scene {
     Scene { world, id }
 }
 
-/// The least places that every row of the body needs, and a few more.
+/// Returns the smallest row width for the body, plus spare slots.
 fn width_with_spare(parts: &Parts, spare: u32) -> u32 {
     degrees(parts).into_iter().max().unwrap_or(0) as u32 + spare
 }
@@ -36,11 +36,11 @@ fn degrees(parts: &Parts) -> Vec<usize> {
     degrees
 }
 
-/// The pairs of a body, each as the lower node and the higher.
+/// Returns the pairs of a body, each with the lower node first.
 fn pairs(scene: &Scene) -> BTreeSet<[u32; 2]> {
     let list = scene.body().spring_pairs().expect("memory");
     let set: BTreeSet<_> = list.iter().copied().collect();
-    assert_eq!(set.len(), list.len(), "a pair is told twice");
+    assert_eq!(set.len(), list.len(), "a pair is reported twice");
     set
 }
 
@@ -52,7 +52,7 @@ fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// A sheet with springs to all 8 neighbours, each a little different, which swings.
+/// A swinging sheet with slightly different springs to all 8 neighbors.
 fn swinging_sheet(side: usize, random: &mut Random) -> Parts {
     let positions = (0..side * side).map(|i| Vec3::new((i % side) as f32, 0.0, (i / side) as f32) * 0.01);
     let mut parts = Parts::nodes(positions.collect(), 1e-3);
@@ -69,7 +69,7 @@ fn swinging_sheet(side: usize, random: &mut Random) -> Parts {
     parts
 }
 
-/// An organ, which swings.
+/// A swinging organ.
 fn organ(random: &mut Random) -> Parts {
     let mesh = Mesh::organ(0.1, 0.012).expect("an organ");
     let mut parts = Parts::nodes(mesh.positions.clone(), 1e-3);
@@ -79,7 +79,7 @@ fn organ(random: &mut Random) -> Parts {
     parts
 }
 
-/// Some springs go and others come, between the steps of a body in motion.
+/// Adds and removes springs between the steps of a moving body.
 fn edit_in_motion(parts: &Parts, seed: u64) {
     const H: f32 = 5e-4;
     let mut random = Random::new(seed);
@@ -193,7 +193,7 @@ fn each_spring_has_its_own_damping() {
 }
 
 #[test]
-fn nodes_at_one_place_are_pushed_apart_alike() {
+fn coincident_nodes_separate_in_every_storage() {
     let mut parts = Parts::nodes(vec![Vec3::ZERO; 2], 1e-3);
     parts.springs.push([1, 0]);
     parts.stiffnesses.push(10.0);
@@ -210,27 +210,28 @@ fn nodes_at_one_place_are_pushed_apart_alike() {
     }
 }
 
-/// What the paper's formulas give, from sizes as a C compiler lays them out: (by the springs that exist, in all).
-fn formula(storage: Storage, degrees: &[usize], places: usize, damped: bool) -> (usize, usize) {
+/// Returns the memory by the paper's formulas, with sizes as a C compiler lays them out: (of existing springs, of all
+/// slots).
+fn formula(storage: Storage, degrees: &[usize], slots: usize, damped: bool) -> (usize, usize) {
     const POINTER: usize = size_of::<*const ()>();
     const COUNT: usize = size_of::<usize>();
-    // A neighbour, a stiffness, a rest length; a damping where springs are damped.
+    // A neighbor, a stiffness, a rest length; a damping where springs are damped.
     let link = if damped { 16 } else { 12 };
     let (nodes, links) = (degrees.len(), degrees.iter().sum::<usize>());
     match storage {
         Storage::Packed => unreachable!("it has no formula"),
-        // With the pointer to the next a link is filled up to whole pointers: room for a damping, used or not.
+        // With the pointer to the next, a link is padded to whole pointers: room for a damping, used or not.
         Storage::Efficient => {
             let element = 16 + POINTER;
             (links * element, links * element + nodes * POINTER)
         }
-        Storage::FastLink => (links * link, nodes * places * link),
-        // The first array of a node has its pointer, its length and what comes next in a table.
+        Storage::FastLink => (links * link, nodes * slots * link),
+        // A table holds the pointer, length and successor of each node's first array.
         Storage::DynamicBulk => {
             let header = POINTER + COUNT + POINTER;
             let chunk = |&degree: &usize| {
-                let arrays = degree.div_ceil(places);
-                header * arrays.max(1) + arrays * places * link
+                let arrays = degree.div_ceil(slots);
+                header * arrays.max(1) + arrays * slots * link
             };
             (links * link, degrees.iter().map(chunk).sum())
         }
@@ -238,20 +239,20 @@ fn formula(storage: Storage, degrees: &[usize], places: usize, damped: bool) -> 
 }
 
 #[test]
-fn memory_is_what_the_formulas_say() {
+fn memory_agrees_with_the_formulas() {
     for damped in [false, true] {
         let mut parts = swinging_sheet(12, &mut Random::new(47));
         parts.spring_damping = if damped { 1e-4 } else { 0.0 };
         for storage in OF_THE_PAPER {
-            for places in [8, 12, 31] {
-                let mut scene = scene(&parts, storage, places);
+            for slots in [8, 12, 31] {
+                let mut scene = scene(&parts, storage, slots);
                 let mut degrees = degrees(&parts);
                 let check = |scene: &Scene, degrees: &[usize]| {
                     let report = report(scene);
                     assert_eq!(
                         (report.bytes_used, report.bytes_reserved),
-                        formula(storage, degrees, places as usize, damped),
-                        "{storage:?}, {places} places, damped {damped}"
+                        formula(storage, degrees, slots as usize, damped),
+                        "{storage:?}, {slots} slots, damped {damped}"
                     );
                 };
                 check(&scene, &degrees);
@@ -275,9 +276,9 @@ fn memory_is_what_the_formulas_say() {
 #[test]
 fn arrays_are_added_as_a_node_needs_them() {
     let parts = swinging_sheet(6, &mut Random::new(48));
-    for places in [1, 3, 4, 5] {
-        let scene = scene(&parts, Storage::DynamicBulk, places);
-        let (used, reserved) = formula(Storage::DynamicBulk, &degrees(&parts), places as usize, false);
+    for slots in [1, 3, 4, 5] {
+        let scene = scene(&parts, Storage::DynamicBulk, slots);
+        let (used, reserved) = formula(Storage::DynamicBulk, &degrees(&parts), slots as usize, false);
         assert_eq!(
             (report(&scene).bytes_used, report(&scene).bytes_reserved),
             (used, reserved)
@@ -286,7 +287,7 @@ fn arrays_are_added_as_a_node_needs_them() {
 }
 
 #[test]
-fn rows_are_as_long_as_the_longest_where_none_is_asked_for() {
+fn the_default_row_width_is_that_of_the_longest_row() {
     let parts = organ(&mut Random::new(49));
     let degrees = degrees(&parts);
     let longest = degrees.iter().copied().max().unwrap_or(0);
@@ -296,8 +297,8 @@ fn rows_are_as_long_as_the_longest_where_none_is_asked_for() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_and_changes_nothing() {
-    // Node 1 has two springs, the others have fewer; two places each.
+fn edits_that_do_not_fit_are_refused_and_change_nothing() {
+    // Node 1 has two springs, the others have fewer; each has two slots.
     let mut parts = Parts::nodes((0..5).map(|i| Vec3::X * i as f32).collect(), 0.1);
     parts.join(0, 1, 10.0);
     parts.join(1, 2, 10.0);
@@ -306,7 +307,7 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
     scene.run(1e-3, 3);
     let seen = |scene: &Scene| (scene.world.state_hash(), report(scene), pairs(scene));
     let before = seen(&scene);
-    // The row of the first node is full, and that of the second.
+    // The rows of the first and second nodes are full.
     for (a, b) in [(1, 3), (3, 1)] {
         let refused = scene.body_mut().add_spring(a, b, 10.0, None);
         let Err(Error::Capacity(message)) = refused else {
@@ -315,7 +316,7 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
         assert!(message.contains("node 1 "), "{message}");
         assert_eq!(seen(&scene), before);
     }
-    // A pair that is there already is refused as such, full row or not; so is one that is not there.
+    // An existing pair is refused as such, full row or not; so is the removal of a missing pair.
     for refused in [
         scene.body_mut().add_spring(1, 0, 10.0, None),
         scene.body_mut().remove_spring(0, 3),
@@ -323,13 +324,13 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
         assert!(matches!(refused, Err(Error::InvalidArgument(_))), "{refused:?}");
     }
     assert_eq!(seen(&scene), before);
-    // A freed place is used again, as often as one likes.
+    // A freed slot is used again any number of times.
     for _ in 0..10 {
         scene.body_mut().remove_spring(0, 1).expect("a spring");
-        scene.body_mut().add_spring(3, 1, 10.0, None).expect("a free place");
+        scene.body_mut().add_spring(3, 1, 10.0, None).expect("a free slot");
         assert!(scene.body_mut().add_spring(0, 1, 10.0, None).is_err());
         scene.body_mut().remove_spring(1, 3).expect("a spring");
-        scene.body_mut().add_spring(0, 1, 10.0, None).expect("a free place");
+        scene.body_mut().add_spring(0, 1, 10.0, None).expect("a free slot");
         assert_eq!(report(&scene), before.1);
     }
     assert_eq!(pairs(&scene), before.2);
@@ -380,7 +381,7 @@ fn pairs_are_joined_once_in_every_storage() {
 #[test]
 fn nodes_without_springs_fall_freely() {
     for storage in STORAGES {
-        // Every third node has a spring to the next, and there is a tile in which none has any.
+        // Every third node has a spring to the next, and one tile has no springs.
         let mut parts = Parts::nodes((0..2000).map(|i| Vec3::X * (0.01 * i as f32)).collect(), 1e-3);
         for node in (0..500).step_by(3) {
             parts.join(node, node + 1, 5.0);
@@ -396,7 +397,7 @@ fn nodes_without_springs_fall_freely() {
 }
 
 #[test]
-fn a_body_without_springs_takes_some() {
+fn a_body_without_springs_accepts_springs() {
     let parts = Parts::nodes((0..3).map(|i| Vec3::X * i as f32).collect(), 0.5);
     for storage in STORAGES {
         let mut scene = scene(&parts, storage, 0);
@@ -417,7 +418,7 @@ fn a_hub_of_thousands_is_pulled_from_all_sides() {
         DVec3::new(angle.cos(), angle.sin(), 0.0).as_vec3()
     };
     let mut parts = Parts::nodes((0..RAYS).map(ray).collect(), 1e-3);
-    // Rows of so many places for each node would be too much: FAST_LINK is left out.
+    // Rows with this many slots per node would be too large: FAST_LINK is left out.
     parts.positions.push(Vec3::new(0.1, 0.2, 0.3));
     parts.masses.push(10.0);
     parts.node_dampings.push(0.0);
@@ -469,7 +470,7 @@ fn a_list_of_a_million_links_is_dropped() {
 }
 
 #[test]
-fn more_places_than_memory_can_hold_are_refused() {
+fn more_slots_than_memory_are_refused() {
     let parts = Parts::nodes(vec![Vec3::ZERO; 100_000], 1.0);
     let mut world = sinew::World::new(FREE).expect("a world");
     let definition = BodyDefinition {

@@ -1,4 +1,4 @@
-//! Results are the same to the bit, however many threads share a step, and whoever's they are.
+//! Results are bitwise identical for any number of threads and for the host's job system.
 
 use std::thread;
 
@@ -25,9 +25,9 @@ fn on_threads(count: u32, task: Task) {
 
 fn never(_count: u32, _task: Task) {}
 
-/// Nobody may ask for this.
-fn unwanted(count: u32, _task: Task) {
-    panic!("{count} tasks for a world that is not worth them");
+/// A job system that must not be called.
+fn must_not_be_called(count: u32, _task: Task) {
+    panic!("{count} tasks for a world too small for tasks");
 }
 
 fn threads(thread_count: u32) -> WorldDefinition {
@@ -44,7 +44,7 @@ fn tasks(thread_count: u32, run: &'static (dyn Fn(u32, Task) + Sync)) -> WorldDe
     }
 }
 
-/// A cloth with so many quads a side, held at a corner.
+/// Adds a cloth with this many quads per side, held at a corner.
 fn add_cloth(world: &mut World, quads: u32) -> BodyId {
     let mesh = Mesh::cloth([0.3, 0.3], [quads, quads]).expect("a cloth");
     let definition = BodyDefinition {
@@ -58,7 +58,7 @@ fn add_cloth(world: &mut World, quads: u32) -> BodyId {
     body
 }
 
-/// Two large cloths and five small ones, of which one is gone again, over a ball.
+/// Two large cloths and five small ones, one of which is removed, over a ball.
 fn scene(definition: WorldDefinition) -> World {
     let mut world = World::new(definition).expect("a world");
     for quads in [7, 95, 20, 31, 99, 3, 40] {
@@ -79,7 +79,7 @@ fn scene(definition: WorldDefinition) -> World {
     world
 }
 
-/// What is seen of a world after a few steps.
+/// Returns the observable state of a world after a few steps.
 fn moved(definition: WorldDefinition) -> (u64, Vec<Vec<Vec3>>, String) {
     let mut world = scene(definition);
     let mut reports = String::new();
@@ -91,7 +91,7 @@ fn moved(definition: WorldDefinition) -> (u64, Vec<Vec<Vec3>>, String) {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_bits() {
+fn any_number_of_threads_is_bitwise_identical() {
     let alone = moved(threads(1));
     let sizes = alone.1.iter().map(Vec::len);
     assert_eq!(sizes.clone().filter(|&size| size >= 8192).count(), 2);
@@ -117,7 +117,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 }
 
 #[test]
-fn a_step_that_is_refused_says_so_whoever_takes_it() {
+fn a_refused_step_is_reported_with_any_threads() {
     for definition in [threads(1), threads(2), tasks(2, &on_threads), tasks(2, &never)] {
         let mut world = scene(definition);
         let hash = world.state_hash();
@@ -128,14 +128,14 @@ fn a_step_that_is_refused_says_so_whoever_takes_it() {
 }
 
 #[test]
-fn a_job_system_is_asked_for_what_is_worth_it_alone() {
-    let mut small = World::new(tasks(4, &unwanted)).expect("a world");
+fn a_job_system_gets_only_large_tasks() {
+    let mut small = World::new(tasks(4, &must_not_be_called)).expect("a world");
     small.step(0.01).expect("nothing to do");
     add_cloth(&mut small, 20);
     small.step(0.01).expect("one small body");
     add_cloth(&mut small, 3);
     small.step(0.01).expect("two small bodies");
-    let mut alone = scene(tasks(1, &unwanted));
+    let mut alone = scene(tasks(1, &must_not_be_called));
     alone.step(0.01).expect("one thread");
 }
 
@@ -150,10 +150,10 @@ fn too_many_threads_are_refused_by_name() {
 }
 
 #[test]
-fn worlds_may_go_to_other_threads_and_be_looked_at_by_several() {
-    fn may<T: Send + Sync>(_: &T) {}
+fn worlds_are_send_and_sync() {
+    fn is_send_and_sync<T: Send + Sync>(_: &T) {}
     let mut world = scene(threads(2));
-    may(&world);
+    is_send_and_sync(&world);
     world.step(0.01).expect("a step");
     let world = thread::spawn(move || {
         world.step(0.01).expect("a step on another thread");

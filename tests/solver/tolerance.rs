@@ -1,5 +1,5 @@
-//! The tolerance of a step: what a step adds to the error of a position stays below it, on an organ, a cloth and a chain, each step
-//! compared with the true motion, in `f64`, from the state that it began with.
+//! The tolerance of a step: the position error that a step adds stays below it, for an organ, a cloth and a chain. Each
+//! step is compared with the true motion in `f64` from the same state.
 
 use crate::support::bodies::{FREE, Parts, Scene, largest_difference};
 use crate::support::organ::{cloth, gravity, organ};
@@ -7,14 +7,14 @@ use crate::support::scene::SOLVERS;
 use glam::Vec3;
 use sinew::{BodyDefinition, Error, Solver, WorldDefinition};
 
-/// A chain that lies level, held at one end.
+/// A horizontal chain, held at one end.
 fn level_chain() -> Parts {
     let mut parts = Parts::chain(24, Vec3::X * 0.02, 2e-3, 40.0);
     parts.masses[0] = 0.0;
     parts
 }
 
-/// The largest error that a step of a motion from rest adds, over the tolerance.
+/// Returns the largest error that a step of a motion from rest adds, relative to the tolerance.
 fn largest_error(name: &str, parts: &Parts, solver: Solver, tolerance: f32, h: f32, steps: usize) -> f64 {
     let world = WorldDefinition {
         gravity: gravity(1.0),
@@ -28,7 +28,7 @@ fn largest_error(name: &str, parts: &Parts, solver: Solver, tolerance: f32, h: f
         reference.positions = scene.positions();
         reference.velocities = scene.velocities();
         let report = scene.step(h);
-        // Leapfrog, in steps of 50 us at most and a tenth of those taken.
+        // Leapfrog, in steps of at most 50 us and a tenth of the steps taken.
         let fine = (10 * report.substeps as usize).max((h / 5e-5) as usize);
         reference.run(f64::from(h) / fine as f64, fine);
         let error = largest_difference(&scene.positions(), &reference.positions);
@@ -48,7 +48,7 @@ fn a_step_adds_no_more_than_its_tolerance() {
     ] {
         for tolerance in [1e-3_f32, 1e-4, 1e-5] {
             for (h, steps) in [(1e-3, 60), (1.0 / 60.0, 12)] {
-                // Solved equations cost more than steps: fewer of them.
+                // Solved equations cost more than explicit steps: fewer of them.
                 let implicit = (tolerance > 5e-5).then_some((Solver::Implicit, steps / 4));
                 for (solver, steps) in [(Solver::Verlet, steps)].into_iter().chain(implicit) {
                     let error = largest_error(name, &parts, solver, tolerance, h, steps);
@@ -62,7 +62,7 @@ fn a_step_adds_no_more_than_its_tolerance() {
     }
 }
 
-/// What is held at its side, with a tolerance that eight substeps do not meet.
+/// A body held at its side, with a tolerance that eight substeps do not meet.
 #[test]
 fn a_tolerance_that_cannot_be_met_changes_nothing() {
     let world = WorldDefinition {
@@ -86,7 +86,7 @@ fn a_tolerance_that_cannot_be_met_changes_nothing() {
 }
 
 #[test]
-fn fixed_substeps_know_no_tolerance() {
+fn fixed_substeps_ignore_the_tolerance() {
     for solver in SOLVERS {
         let run = |tolerance: f32| {
             let world = WorldDefinition {

@@ -1,7 +1,7 @@
-//! VERLET against motions that are known in closed form: oscillators, damping, falls, waves, the pendulum.
+//! VERLET against motions with closed-form solutions: oscillators, damping, falls, waves, the pendulum.
 //!
-//! "Discrete" is the integrator's own exact solution, with omega_h = (2/h) asin(h omega / 2): the difference from it is
-//! rounding, or a mistake.
+//! "Discrete" is the integrator's own exact solution, with omega_h = (2/h) asin(h omega / 2): any difference from it is
+//! rounding or a bug.
 
 use std::f64::consts::PI;
 
@@ -12,12 +12,13 @@ use crate::support::motion::{
 use glam::{DVec3, Vec3};
 use sinew::{Error, WorldDefinition};
 
-/// The phase of an oscillation at rest at first, from its displacement and velocity; `theta` is what a step turns it by.
+/// Returns the phase of an oscillation that starts at rest, from its displacement and velocity; `theta` is the phase of
+/// one step.
 fn phase(q: f64, v: f64, h: f64, theta: f64, steps: usize) -> f64 {
     unwrapped((-v * h / theta.sin()).atan2(q), steps as f64 * theta)
 }
 
-/// The phase of the two masses after so many steps of `h`, and what a step turns it by.
+/// Returns the phase of the two masses after this many steps of `h`, and the phase of one step.
 fn two_masses_phase(h: f32, steps: usize) -> (f64, f64) {
     let mut scene = Scene::new(&two_masses().0, FREE);
     for _ in 0..steps {
@@ -27,13 +28,14 @@ fn two_masses_phase(h: f32, steps: usize) -> (f64, f64) {
     let h = f64::from(h);
     let theta = 2.0 * (h * omega() / 2.0).asin();
     let amplitude = q.hypot(v * h / theta.sin());
-    // Rounding makes it walk: by up to 17 millionths in 4000 steps of h omega 1.5, over two dozen beginnings and all kernels.
+    // Rounding makes the phase drift by up to 1.7e-5 in 4000 steps of h omega 1.5, over two dozen starts and all SIMD
+    // levels.
     assert!((amplitude / STRETCH - 1.0).abs() < 3e-5, "amplitude {amplitude}");
     (phase(q, v, h, theta, steps), theta)
 }
 
 #[test]
-fn two_masses_turn_as_the_discrete_solution() {
+fn two_masses_follow_the_discrete_phase() {
     for x in [0.05, 0.2, 0.8, 1.5] {
         let steps = 4000;
         let (phase, theta) = two_masses_phase((x / omega()) as f32, steps);
@@ -43,7 +45,7 @@ fn two_masses_turn_as_the_discrete_solution() {
 }
 
 #[test]
-fn two_masses_converge_at_order_two() {
+fn two_masses_converge_with_second_order() {
     let errors = [1.0, 2.0, 4.0].map(|finer| {
         let h = (0.2 / finer / omega()) as f32;
         let steps = (1000.0 * finer) as usize;
@@ -84,7 +86,8 @@ fn two_masses_are_bounded_below_the_limit_and_refused_above() {
     }
 }
 
-/// The deviation of a damped oscillator from exp(-zeta omega t) cos(omega sqrt(1 - zeta²) t), and of its rate of decay.
+/// Returns the deviation of a damped oscillator from exp(-zeta omega t) cos(omega sqrt(1 - zeta²) t), and of its decay
+/// rate.
 fn damped_error(parts: &Parts, zeta: f64, h: f32, steps: usize) -> (f64, f64) {
     let mut scene = Scene::new(parts, FREE);
     let omega = omega();
@@ -103,7 +106,7 @@ fn damped_error(parts: &Parts, zeta: f64, h: f32, steps: usize) -> (f64, f64) {
 }
 
 #[test]
-fn damped_oscillators_converge_at_order_two_and_decay_alike() {
+fn damped_oscillators_converge_with_second_order_and_decay_alike() {
     for zeta in [0.05, 0.2] {
         let (mut at_nodes, reduced) = two_masses();
         let rate = 2.0 * zeta * omega();
@@ -129,7 +132,7 @@ fn damped_oscillators_converge_at_order_two_and_decay_alike() {
 }
 
 #[test]
-fn nodes_reach_their_terminal_velocity_at_every_step() {
+fn nodes_reach_their_terminal_velocity_with_every_step() {
     let g = 9.81_f32;
     let gravity = WorldDefinition {
         gravity: Vec3::NEG_Y * g,
@@ -149,8 +152,8 @@ fn nodes_reach_their_terminal_velocity_at_every_step() {
                 let terminal = f64::from(g) / rate;
                 let expected = -(-rate * t).exp_m1() * terminal;
                 let error = (velocity.y + expected) / terminal;
-                // The target is 1e-5. A half kick rounds the velocity twice and the factor once, by 6e-8 each, and
-                // damping forgets by s/2 a half kick: 3.6e-7/s of it can stand.
+                // The target is 1e-5. A half kick rounds the velocity twice and the factor once, by 6e-8 each. Damping
+                // forgets a fraction s/2 per half kick, so an error of 3.6e-7/s can remain.
                 let s = rate * f64::from(h);
                 let allowed = f64::max(1e-5, 3.6e-7 / s);
                 assert!(error.abs() < allowed, "h {h}, node {node}, t {t}: {error:e}");
@@ -176,7 +179,8 @@ fn bodies_fall_alike_far_from_the_origin() {
         for body in &bodies {
             let parts = body.moved(glam::Quat::IDENTITY, Vec3::new(-offset, offset, 0.3 * offset));
             let mut scene = Scene::new(&parts, gravity);
-            // Of the centre of mass: the roundings of its places make a body's nodes tremble against each other.
+            // This is the motion of the center of mass: rounded positions make the nodes of a body vibrate against each
+            // other.
             let centre = |vectors: &[DVec3]| {
                 let weighted = vectors.iter().zip(&parts.masses).map(|(v, &m)| *v * f64::from(m));
                 weighted.sum::<DVec3>() / parts.masses.iter().map(|&m| f64::from(m)).sum::<f64>()
@@ -209,7 +213,7 @@ fn bodies_fall_alike_far_from_the_origin() {
 }
 
 #[test]
-fn all_modes_of_a_chain_turn_as_the_discrete_solution() {
+fn all_modes_of_a_chain_follow_the_discrete_phase() {
     let (free, spacing, mass, stiffness) = (100, 0.01_f32, 0.01_f32, 100.0_f32);
     let parts = fixed_chain(free, spacing, mass, stiffness);
     let h = 0.004_f32;
@@ -217,7 +221,7 @@ fn all_modes_of_a_chain_turn_as_the_discrete_solution() {
         let angle = mode as f64 * PI / (free + 1) as f64;
         let shape: Vec<f64> = (0..free + 2).map(|i| (angle * i as f64).sin()).collect();
         let norm: f64 = shape.iter().map(|s| s * s).sum();
-        // So large that springs are stretched by 0.4 of their length, and stay in order.
+        // Large enough to stretch springs by 0.4 of their length without inverting their order.
         let amplitude = 0.2 * f64::from(spacing) / (angle / 2.0).sin();
         let mut started = parts.clone();
         for (position, s) in started.positions.iter_mut().zip(&shape) {
@@ -239,7 +243,7 @@ fn all_modes_of_a_chain_turn_as_the_discrete_solution() {
         let error = phase(q, v, f64::from(h), theta, steps) / (steps as f64 * theta) - 1.0;
         assert!(error.abs() < 1e-6, "mode {mode}: {error:e}");
         let kept = q.hypot(v * f64::from(h) / theta.sin()) / amplitude - 1.0;
-        // Positions of up to 1 m are rounded in each of the steps; the highest mode is 2 mm large.
+        // Positions of up to 1 m are rounded in each step; the amplitude of the highest mode is 2 mm.
         assert!(kept.abs() < 3e-4, "mode {mode}: amplitude off by {kept:e}");
     }
 }
@@ -250,7 +254,7 @@ fn waves_travel_at_their_speed() {
     let h = 0.001;
     let mut scene = Scene::new(&waves.parts, FREE);
     waves.start(&mut scene);
-    // c = spacing sqrt(k/m) is one node in 10 ms: what the ends do has not come to the middle in 2 s.
+    // c = spacing sqrt(k/m) is one node in 10 ms: disturbances from the ends have not reached the middle in 2 s.
     let steps = 2000;
     scene.run(h, steps);
     let (speed, dispersed) = waves.speed(&scene, f64::from(h) * steps as f64, 200);
@@ -287,7 +291,7 @@ fn a_pendulum_from_150_degrees_keeps_its_period() {
     );
 }
 
-/// Two nodes sink in thick air at a speed at which a short substep takes them less than the last place of their coordinates.
+/// Two nodes sink in thick air so slowly that a short substep moves them by less than a unit in the last place.
 #[test]
 fn slow_motion_is_not_lost_in_short_substeps() {
     const RATE: f32 = 100.0;
@@ -309,11 +313,11 @@ fn slow_motion_is_not_lost_in_short_substeps() {
         // v' = -G - RATE v from rest.
         let (rate, time) = (f64::from(RATE), steps * f64::from(dt));
         let expected = -f64::from(G) / rate * (time - (1.0 - (-rate * time).exp()) / rate);
-        for (place, start) in scene.positions().iter().zip(start) {
-            let way = place.x - start.x;
+        for (position, start) in scene.positions().iter().zip(start) {
+            let displacement = position.x - start.x;
             assert!(
-                (way / expected - 1.0).abs() < 1e-3,
-                "{dt} s in {substeps}: {way:e} m of {expected:e}"
+                (displacement / expected - 1.0).abs() < 1e-3,
+                "{dt} s in {substeps}: {displacement:e} m of {expected:e}"
             );
         }
     }

@@ -1,4 +1,5 @@
-//! What VERLET keeps: energy over a million steps, momentum, the motion itself when the whole scene is turned or moved.
+//! Quantities that VERLET conserves: energy over a million steps, momentum, and the motion itself when the whole scene
+//! is rotated or translated.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use crate::support::organ::of_elements;
@@ -9,7 +10,7 @@ use sinew::{BodyDefinition, Material, Model, Solver, Viscosity, World, WorldDefi
 const STEPS: usize = 1_000_000;
 const WINDOW: usize = 20_000;
 
-/// The mean energy of the first and of the last window of a million steps, and the spread of the first.
+/// Returns the mean energy of the first and the last window of a million steps, and the spread of the first.
 fn energy_over_a_million_steps(scene: &mut Scene, h: f32) -> (f64, f64, f64) {
     let window = |scene: &mut Scene| {
         let (mut sum, mut low, mut high) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
@@ -37,8 +38,8 @@ fn two_masses_keep_their_energy_in_the_mean() {
     two_masses_keep_their_energy_of(4);
 }
 
-/// Roundings make the energy walk at random, by some 7e-5 in a million steps. The target of 1e-4 is for the drift behind
-/// that, the mean of several starts; each stays within the walk.
+/// Rounding makes the energy walk at random, by about 7e-5 in a million steps. The target of 1e-4 is for the drift
+/// behind the walk, the mean of several starts; each start stays within the walk.
 fn two_masses_keep_their_energy_of(starts: u32) {
     let omega = 200.0_f64.sqrt();
     let x = 0.2;
@@ -65,9 +66,9 @@ fn two_masses_keep_their_energy_of(starts: u32) {
     assert!(starts < 4 || mean.abs() < 1e-4, "mean drift {mean:e}");
 }
 
-/// The modes of a block trade energy, and each shows (h omega)²/8 less or more of its own: at h omega = 0.5 the mean of a
-/// window moves by 1e-4 in `f64` too. Roundings add a random walk of 2e-4 in a million steps. So here it is the floor of
-/// 1e-3 that holds, for every seed.
+/// The modes of a block exchange energy, and each contributes (h omega)²/8 less or more than its own. At h omega = 0.5
+/// the mean of a window moves by 1e-4 in `f64` too. Rounding adds a random walk of 2e-4 in a million steps. So the
+/// limit here is 1e-3, for every seed.
 #[test]
 fn a_block_keeps_its_energy() {
     let mut parts = Parts::block([1, 1, 1], 0.1, 0.8, 400.0);
@@ -120,7 +121,7 @@ fn momentum_is_kept() {
     }
 }
 
-/// A block that is out of shape and swings under gravity, held at one side.
+/// A deformed block that swings under gravity, held at one side.
 fn swinging() -> Parts {
     let mut parts = Parts::block([3, 2, 2], 0.05, 0.01, 40.0);
     let mut random = Random::new(3);
@@ -134,10 +135,10 @@ fn swinging() -> Parts {
 }
 
 #[test]
-fn the_motion_turns_and_moves_with_the_scene() {
+fn the_motion_rotates_and_translates_with_the_scene() {
     let gravity = Vec3::new(1.0, -9.0, 2.0);
     let parts = swinging();
-    // Half a swing; roundings add up from 5e-8 after one step as the root of their number.
+    // Half a swing; rounding errors grow from 5e-8 after one step with the square root of the number of steps.
     let steps = 60;
     let h = 2e-3;
     let mut still = Scene::new(&parts, WorldDefinition { gravity, ..FREE });
@@ -164,13 +165,13 @@ fn the_motion_turns_and_moves_with_the_scene() {
 }
 
 #[test]
-fn the_motion_is_that_of_the_discrete_equations() {
+fn the_motion_follows_the_discrete_equations() {
     let gravity = Vec3::new(1.0, -9.0, 2.0);
     let mut parts = swinging();
     for (damping, mass) in parts.node_dampings.iter_mut().zip(&parts.masses) {
         *damping = 0.5 * mass;
     }
-    // One long step with whole kicks inside moves as many short ones.
+    // One long step with whole kicks inside agrees with as many short ones.
     for substeps in [1, 5] {
         let definition = WorldDefinition {
             gravity,
@@ -194,9 +195,10 @@ fn the_motion_is_that_of_the_discrete_equations() {
     }
 }
 
-/// A cube of viscous elements spins freely, in substeps so short that roundings of its coordinates are a part of each way.
+/// A cube of viscous elements spins freely, in substeps so short that coordinate rounding is a large part of each
+/// displacement.
 #[test]
-fn what_is_viscous_keeps_its_angular_momentum() {
+fn a_viscous_body_keeps_its_angular_momentum() {
     const SPIN: f32 = 5.0;
     let mesh = Mesh::block([1.5; 3], [2; 3]).expect("a block");
     let mut world = World::new(WorldDefinition {
@@ -216,7 +218,7 @@ fn what_is_viscous_keeps_its_angular_momentum() {
     let velocities: Vec<Vec3> = mesh
         .positions
         .iter()
-        .map(|place| Vec3::Y.cross(*place) * SPIN)
+        .map(|position| Vec3::Y.cross(*position) * SPIN)
         .collect();
     world
         .body_mut(body)
@@ -225,11 +227,11 @@ fn what_is_viscous_keeps_its_angular_momentum() {
         .expect("velocities");
     let momentum = |world: &World| -> DVec3 {
         let body = world.body(body).expect("the body");
-        let places = body.positions().iter().zip(body.velocities()).enumerate();
-        places
-            .map(|(node, (place, velocity))| {
+        let positions = body.positions().iter().zip(body.velocities()).enumerate();
+        positions
+            .map(|(node, (position, velocity))| {
                 let mass = f64::from(body.node_mass(node as u32).expect("a node"));
-                place.as_dvec3().cross(velocity.as_dvec3()) * mass
+                position.as_dvec3().cross(velocity.as_dvec3()) * mass
             })
             .sum()
     };
@@ -240,12 +242,12 @@ fn what_is_viscous_keeps_its_angular_momentum() {
     }
     assert!(substeps > 20_000, "{substeps} substeps");
     let lost = (momentum(&world) - start).length() / start.length();
-    // Where coordinates were rounded anew each substep some 5e-4 was lost.
+    // Rounding coordinates again in each substep would lose about 5e-4.
     assert!(lost < 2e-6, "{lost:e}");
 }
 
-/// A block of eight nodes, or more, that one face holds and that is released 10 % longer: the most energy of 600 steps, as a part of what was put in, and
-/// how many substeps the steps took after the first second.
+/// Returns the maximum energy of 600 steps relative to the initial energy, and the substeps of each step after the
+/// first second. The block of at least eight nodes is held by one face and released 10 % longer.
 fn stretched(cells: u32, young_modulus: f32, substeps: u32) -> (f64, Vec<u32>) {
     let mut world = World::new(WorldDefinition { substeps, ..FREE }).expect("a world");
     let mesh = Mesh::block([0.1; 3], [cells; 3]).expect("a mesh");
@@ -264,10 +266,10 @@ fn stretched(cells: u32, young_modulus: f32, substeps: u32) -> (f64, Vec<u32>) {
     let longer: Vec<Vec3> = mesh
         .positions
         .iter()
-        .map(|place| Vec3::new(-0.05 + 1.1 * (place.x + 0.05), place.y, place.z))
+        .map(|position| Vec3::new(-0.05 + 1.1 * (position.x + 0.05), position.y, position.z))
         .collect();
-    for (node, place) in (0..).zip(&mesh.positions) {
-        if place.x < -0.04 {
+    for (node, position) in (0..).zip(&mesh.positions) {
+        if position.x < -0.04 {
             body.pin(node).expect("a pin");
         }
     }
@@ -290,10 +292,10 @@ fn stretched(cells: u32, young_modulus: f32, substeps: u32) -> (f64, Vec<u32>) {
     (most / start - 1.0, counts)
 }
 
-/// Substeps that follow the stiffness of what oscillates change in phase with it, which feeds it: taken in two and three by turns, this block gained half of
-/// its energy in 1.5 s.
+/// Substeps that follow the stiffness change in phase with the oscillation and feed it energy. With alternating two and
+/// three substeps this block gained half of its energy in 1.5 s.
 #[test]
-fn substeps_that_a_body_chooses_feed_it_no_more_than_fixed_ones() {
+fn automatic_substeps_add_no_more_energy_than_fixed_ones() {
     for (cells, young_modulus) in [(1, 1e4), (1, 3e3), (2, 2e4), (3, 1e5)] {
         let (chosen, counts) = stretched(cells, young_modulus, 0);
         let (fixed, _) = stretched(cells, young_modulus, counts[0]);

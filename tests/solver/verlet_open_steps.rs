@@ -1,5 +1,5 @@
-//! A step leaves the half kick that closes it to the next. Nobody may see that: whatever happens between steps, bodies
-//! move as leapfrog in `f64` does that closes every step, and reading or refusing changes nothing.
+//! A step defers its closing half kick to the next step. Callers must not notice: whatever happens between steps,
+//! bodies move as leapfrog in `f64` with every step closed. Reads and refused steps change nothing.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use crate::support::reference::Reference;
@@ -19,7 +19,7 @@ fn scene(parts: &Parts, substeps: u32) -> Scene {
     )
 }
 
-/// A block whose masses, springs and dampings differ.
+/// A block with varying masses, springs and dampings.
 fn uneven(random: &mut Random, damping: f32) -> Parts {
     let mut parts = Parts::block([4, 3, 2], 0.05, 0.01, 40.0);
     for (mass, node_damping) in parts.masses.iter_mut().zip(&mut parts.node_dampings) {
@@ -32,7 +32,7 @@ fn uneven(random: &mut Random, damping: f32) -> Parts {
     parts
 }
 
-/// Steps the reference as `scene` is stepped: the mean of what holds [`HELD`], N.
+/// Steps the reference in the same way as `scene`, and returns the mean force on [`HELD`] (N).
 fn step_reference(reference: &mut Reference, mass: f64, dt: f32, substeps: u32) -> glam::DVec3 {
     let h = f64::from(dt) / f64::from(substeps);
     let mut holding = glam::DVec3::ZERO;
@@ -49,7 +49,7 @@ fn step_reference(reference: &mut Reference, mass: f64, dt: f32, substeps: u32) 
 }
 
 #[test]
-fn whatever_happens_between_steps_finds_closed_velocities() {
+fn changes_between_steps_act_on_closed_velocities() {
     for (substeps, damping) in [(1, 0.0), (3, 0.0), (1, 0.02), (3, 0.5)] {
         let mut random = Random::new(70);
         let parts = uneven(&mut random, damping);
@@ -128,7 +128,7 @@ fn whatever_happens_between_steps_finds_closed_velocities() {
                 let force = scene.body().pin_force(HELD).expect("a pin").as_dvec3();
                 assert!(force.distance(holding) < 1e-3, "{named}: {force} N, {holding} N");
             }
-            // Roundings must not add up over all these steps.
+            // Rounding errors must not add up over all these steps.
             reference.positions = scene.positions();
             reference.velocities = scene.velocities();
         }
@@ -136,7 +136,7 @@ fn whatever_happens_between_steps_finds_closed_velocities() {
 }
 
 #[test]
-fn what_is_edited_keeps_the_velocities_that_were_read() {
+fn edits_keep_the_velocities_that_were_read() {
     for damping in [0.0, 0.05, 5.0] {
         let mut random = Random::new(71);
         let mut scene = scene(&uneven(&mut random, damping), 1);
@@ -171,7 +171,7 @@ fn reading_changes_nothing() {
 }
 
 #[test]
-fn a_step_that_is_refused_leaves_an_open_body_as_it_was() {
+fn a_refused_step_leaves_an_open_body_unchanged() {
     let mut random = Random::new(73);
     let parts = uneven(&mut random, 0.02);
     let definition = WorldDefinition {
@@ -191,7 +191,7 @@ fn a_step_that_is_refused_leaves_an_open_body_as_it_was() {
 }
 
 #[test]
-fn a_body_that_a_tool_comes_near_to_is_closed_from_then_on() {
+fn steps_are_closed_while_a_tool_is_near() {
     let parts = Parts::block([4, 4, 1], 0.02, 1e-3, 20.0);
     let [mut alone, mut touched] = [scene(&parts, 2), scene(&parts, 2)];
     let far = Vec3::new(-0.1, 0.0, 0.0);
@@ -203,7 +203,7 @@ fn a_body_that_a_tool_comes_near_to_is_closed_from_then_on() {
         touched.step(1e-3);
         assert_eq!(alone.velocities(), touched.velocities());
     }
-    // Beside the body, as near as 0.5 mm, and touching nothing.
+    // Beside the body, at a distance of 0.5 mm, without contact.
     for step in 0..110 {
         let distance = 0.1 - 0.001 * (step as f32).min(94.5);
         let beside = touched.positions()[0].as_vec3() - distance * Vec3::X;
@@ -211,7 +211,7 @@ fn a_body_that_a_tool_comes_near_to_is_closed_from_then_on() {
         alone.step(1e-3);
         touched.step(1e-3);
     }
-    // Rounded otherwise.
+    // The results differ by rounding.
     assert_ne!(alone.velocities(), touched.velocities());
     let difference = largest_difference(&alone.velocities(), &touched.velocities());
     assert!(difference < 1e-5, "{difference:e} m/s");

@@ -1,4 +1,4 @@
-//! A large body takes several substeps in one go, tile by tile. No bit may show it.
+//! A large body takes several substeps in one pass, tile by tile. The results are bitwise identical to single substeps.
 
 use std::ops::Range;
 
@@ -6,11 +6,11 @@ use crate::support::bodies::{FREE, Parts, Random, Scene};
 use glam::Vec3;
 use sinew::WorldDefinition;
 
-/// A sheet of `side` x `side` nodes, joined to all eight about them, with some long springs, pins and unlike masses.
+/// A sheet of `side` x `side` nodes, joined to all eight neighbors, with some long springs, pins and different masses.
 fn sheet(side: usize, long_springs: usize, damping: f32, random: &mut Random) -> Parts {
     let node = |row: usize, column: usize| row * side + column;
-    let place = |index: usize| Vec3::new((index % side) as f32, 0.0, (index / side) as f32) * 0.01;
-    let mut parts = Parts::nodes((0..side * side).map(place).collect(), 1e-3);
+    let position = |index: usize| Vec3::new((index % side) as f32, 0.0, (index / side) as f32) * 0.01;
+    let mut parts = Parts::nodes((0..side * side).map(position).collect(), 1e-3);
     for row in 0..side {
         for column in 0..side {
             let mut join = |r: usize, c: usize| {
@@ -56,17 +56,17 @@ fn moving(parts: &Parts, definition: WorldDefinition) -> Scene {
 }
 
 #[test]
-fn many_substeps_in_a_step_are_as_many_steps() {
-    many_substeps_in_a_step_are_as_many_steps_of(0..1);
+fn many_substeps_agree_with_as_many_steps() {
+    many_substeps_agree_with_as_many_steps_of(0..1);
 }
 
 #[test]
 #[ignore = "long"]
-fn many_substeps_in_a_step_are_as_many_steps_in_the_other_cases() {
-    many_substeps_in_a_step_are_as_many_steps_of(1..3);
+fn many_substeps_agree_with_as_many_steps_in_the_other_cases() {
+    many_substeps_agree_with_as_many_steps_of(1..3);
 }
 
-fn many_substeps_in_a_step_are_as_many_steps_of(cases: Range<usize>) {
+fn many_substeps_agree_with_as_many_steps_of(cases: Range<usize>) {
     const H: f32 = 1.0 / 4096.0;
     for (side, long_springs, damping) in [(200, 30, 0.0), (230, 0, 0.0), (230, 0, 1e-4)]
         .into_iter()
@@ -85,7 +85,7 @@ fn many_substeps_in_a_step_are_as_many_steps_of(cases: Range<usize>) {
             for (substeps, (positions, velocities)) in [16, 40].into_iter().zip([&ends[0], &ends[4]]) {
                 let mut scene = moving(&parts, world(substeps, threads));
                 if substeps == 40 {
-                    // As many substeps before.
+                    // The same number of substeps before.
                     scene = moving(&parts, world(62, threads));
                     scene.step(62.0 * H);
                 } else {
@@ -100,7 +100,7 @@ fn many_substeps_in_a_step_are_as_many_steps_of(cases: Range<usize>) {
 }
 
 #[test]
-fn a_tool_far_away_changes_no_bit_of_a_large_body() {
+fn a_distant_tool_leaves_a_large_body_bitwise_identical() {
     let parts = sheet(230, 0, 1e-4, &mut Random::new(82));
     let run = |tool: Option<Vec3>| {
         let mut scene = moving(&parts, world(40, 2));

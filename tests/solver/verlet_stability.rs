@@ -1,7 +1,7 @@
-//! VERLET where it is hard: bad starts, large ratios, violent pins and forces, long and changing steps.
+//! VERLET in hard cases: bad starts, large ratios, violent pins and forces, long and varying steps.
 //!
 //! Leapfrog keeps a shadow energy; the energy itself is at most E0 / (1 - (h omega)²/4). The library keeps h omega to
-//! 0.8 of its limit of 2 at the positions as they are, or to 0.9 of one that holds anywhere.
+//! 0.8 of its limit of 2 at the current positions, or to 0.9 of a limit that holds for all positions.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use crate::support::organ::of_elements;
@@ -33,20 +33,20 @@ fn pin_where(parts: &mut Parts, held: impl Fn(Vec3) -> bool) {
     }
 }
 
-/// Steps `scene`: everything stays finite, and the energy stays at or below `most`.
-fn watch(scene: &mut Scene, name: &str, h: f32, steps: usize, most: f64) {
+/// Steps `scene` and checks that everything stays finite and that the energy stays at or below `most`.
+fn watch(scene: &mut Scene, name: &str, h: f32, steps: usize, energy_limit: f64) {
     for step in 0..steps {
         scene.step(h);
         assert!(scene.is_finite(), "{name}, step {step} of {h} s");
         let energy = scene.energy();
         assert!(
-            energy <= most,
-            "{name}, step {step} of {h} s: {energy} J, at most {most}"
+            energy <= energy_limit,
+            "{name}, step {step} of {h} s: {energy} J, at most {energy_limit}"
         );
     }
 }
 
-/// A block and bad places to start it from.
+/// Returns a block and bad positions to start it from.
 fn bad_starts() -> (Parts, [(&'static str, Vec<Vec3>); 3]) {
     let parts = Parts::block([3, 3, 3], 0.05, 0.01, 100.0);
     let mut random = Random::new(11);
@@ -63,9 +63,9 @@ fn bad_starts() -> (Parts, [(&'static str, Vec<Vec3>); 3]) {
     )
 }
 
-/// Across a spring that is pressed to L the stiffness is k (1 - L0/L), without bound as nodes pass through each other:
-/// a step just below the limit does not follow that, and a body that is folded for good and not damped heats up, in
-/// `f64` as well (20 times in a minute of frames). With short steps the bound holds; with frames the body stays finite.
+/// The transverse stiffness of a spring compressed to L is k (1 - L0/L), without bound as nodes pass through each
+/// other. A step just below the limit does not follow that. An undamped body that stays folded heats up, in `f64` as
+/// well (20 times in a minute of frames). With short steps the bound holds; with frames the body stays finite.
 #[test]
 fn bad_starts_stay_finite_and_gain_no_energy_in_short_steps() {
     let (parts, starts) = bad_starts();
@@ -75,14 +75,14 @@ fn bad_starts_stay_finite_and_gain_no_energy_in_short_steps() {
             scene.body_mut().set_positions(positions).expect("positions");
             let start = scene.energy();
             assert!(start > 0.0);
-            let most = if h > 1e-3 { f64::INFINITY } else { SHADOW * start };
-            watch(&mut scene, name, h, steps, most);
+            let energy_limit = if h > 1e-3 { f64::INFINITY } else { SHADOW * start };
+            watch(&mut scene, name, h, steps, energy_limit);
         }
     }
 }
 
 #[test]
-fn bad_starts_lose_energy_where_it_is_damped() {
+fn bad_starts_lose_energy_with_damping() {
     let (parts, starts) = bad_starts();
     let (mut at_nodes, mut along) = (parts.clone(), parts);
     damp(&mut at_nodes, 10.0);
@@ -95,7 +95,7 @@ fn bad_starts_lose_energy_where_it_is_damped() {
             watch(&mut scene, name, FRAME, 300, SHADOW * start);
             watch(&mut scene, name, 1.0, 5, start);
             let energy = scene.body().energy(Vec3::ZERO);
-            // What is flattened stays flat: nothing pushes it out of its plane. The rest unfold more or less.
+            // Flattened bodies stay flat: nothing pushes them out of the plane. The others unfold more or less.
             assert!(energy.elastic < start, "{name}: {energy:?} of {start}");
             assert!(energy.kinetic < 1e-6 * start, "{name}: {energy:?} of {start}");
         }
@@ -119,7 +119,7 @@ fn springs_with_any_damping_gain_no_energy() {
 }
 
 #[test]
-fn nodes_in_one_place_part_along_one_direction() {
+fn coincident_nodes_separate_along_one_direction() {
     let mut parts = Parts::nodes(vec![Vec3::new(0.3, 0.2, 0.1); 3], 0.1);
     parts.springs = vec![[0, 1], [1, 2]];
     parts.stiffnesses = vec![50.0; 2];
@@ -137,7 +137,7 @@ fn nodes_in_one_place_part_along_one_direction() {
     assert!(momentum.length() < 1e-6 * scene.velocities()[2].length());
     watch(&mut scene, "coincident", 1e-3, 5000, SHADOW * start);
 
-    // A spring of no length is an isotropic oscillator: two opposite bobs through one point.
+    // A spring of zero length is an isotropic oscillator: two opposite bobs through one point.
     let mut bobs = Parts::nodes(vec![Vec3::X, Vec3::NEG_X], 1.0);
     bobs.join(0, 1, 50.0);
     bobs.rest_lengths[0] = 0.0;
@@ -155,7 +155,7 @@ fn nodes_in_one_place_part_along_one_direction() {
     }
 }
 
-/// The largest error of a spring's stretch in a hanging chain, over the largest stretch.
+/// Returns the largest stretch error of a spring in a hanging chain, relative to the largest stretch.
 fn hanging_error(parts: &Parts, h: f32, steps: usize) -> f64 {
     let mut scene = Scene::new(parts, gravity());
     scene.run(h, steps);
@@ -213,7 +213,7 @@ fn a_step_far_above_the_limit_is_cut_or_refused() {
             Ok(report) => {
                 assert!(report.substeps as f32 >= 1.0 / limit, "{report:?}");
                 assert!(scene.is_finite());
-                // What gravity can give: the block falls by no more than twice its static sag.
+                // The energy of gravity: the block falls by at most twice its static sag.
                 assert!(scene.energy() <= energy + 0.1 * energy.abs() + 1e-3);
             }
             Err(Error::Unstable { report, allowed }) => {
@@ -226,12 +226,12 @@ fn a_step_far_above_the_limit_is_cut_or_refused() {
     }
 }
 
-/// A sheet in a plane through the origin, stretched and held at its rim, that is struck across its plane.
+/// A sheet in a plane through the origin, stretched and held at its border, that is struck across its plane.
 fn drum() -> (Parts, Vec<Vec3>) {
     const SIDE: usize = 12;
     const SPACING: f32 = 1.0 / 64.0;
-    let place = |node: usize| SPACING * Vec3::new((node % SIDE) as f32, 0.0, (node / SIDE) as f32);
-    let mut parts = Parts::nodes((0..SIDE * SIDE).map(place).collect(), 1e-4);
+    let position = |node: usize| SPACING * Vec3::new((node % SIDE) as f32, 0.0, (node / SIDE) as f32);
+    let mut parts = Parts::nodes((0..SIDE * SIDE).map(position).collect(), 1e-4);
     for node in 0..SIDE * SIDE {
         let (column, row) = (node % SIDE, node / SIDE);
         for (last, neighbour) in [(column, node + 1), (row, node + SIDE)] {
@@ -244,7 +244,7 @@ fn drum() -> (Parts, Vec<Vec3>) {
     damp(&mut parts, 60.0);
     let rim = (SIDE - 1) as f32 * SPACING;
     pin_where(&mut parts, |p| {
-        [p.x, p.z].iter().any(|&place| place == 0.0 || place == rim)
+        [p.x, p.z].iter().any(|&position| position == 0.0 || position == rim)
     });
     let struck = parts
         .masses
@@ -254,9 +254,10 @@ fn drum() -> (Parts, Vec<Vec3>) {
     (parts, struck)
 }
 
-/// Processors may take a hundred times as long for subnormal numbers: squares of velocities and of ways are none.
+/// Processors can take a hundred times as long for subnormal numbers: squares of velocities and of displacements must
+/// not be subnormal.
 #[test]
-fn what_comes_to_rest_has_no_subnormal_numbers() {
+fn a_body_coming_to_rest_has_no_subnormal_numbers() {
     let is_normal_or_zero = |value: f32| value == 0.0 || (value * value).is_normal();
     let (parts, struck) = drum();
     for (solver, storage, frames) in [
@@ -286,18 +287,18 @@ fn what_comes_to_rest_has_no_subnormal_numbers() {
             );
         }
         for &[a, b] in &parts.springs {
-            let way = scene.body().positions()[b as usize] - scene.body().positions()[a as usize];
-            let values = way.to_array();
+            let span = scene.body().positions()[b as usize] - scene.body().positions()[a as usize];
+            let values = span.to_array();
             assert!(
                 values.into_iter().all(is_normal_or_zero),
-                "{solver:?}, {storage:?}: {way:?}"
+                "{solver:?}, {storage:?}: {span:?}"
             );
         }
     }
 }
 
 #[test]
-fn a_stretched_pin_that_is_let_go_comes_to_rest() {
+fn a_released_pin_comes_to_rest() {
     let mut parts = Parts::chain(6, Vec3::X * 0.02, 0.01, 50.0);
     damp(&mut parts, 4.0);
     parts.masses[0] = 0.0;
@@ -308,7 +309,7 @@ fn a_stretched_pin_that_is_let_go_comes_to_rest() {
     let held = scene.energy();
     scene.body_mut().unpin(5).expect("a pin");
     watch(&mut scene, "let go", FRAME, 1200, SHADOW * held);
-    // A chain of springs has no shape, but lengths.
+    // A chain of springs has no shape, only lengths.
     for pair in scene.positions().windows(2) {
         let error = pair[0].distance(pair[1]) / 0.02 - 1.0;
         assert!(error.abs() < 1e-4, "{error:e}");
@@ -318,7 +319,7 @@ fn a_stretched_pin_that_is_let_go_comes_to_rest() {
 }
 
 #[test]
-fn a_pin_gives_the_body_no_more_than_its_work() {
+fn a_pin_adds_no_more_energy_than_its_work() {
     for h in [1e-4_f32, 1e-3, FRAME, 0.2] {
         let mut parts = Parts::block([3, 3, 3], 0.05, 0.01, 100.0);
         pin_where(&mut parts, |p| p.y == 0.0);
@@ -356,7 +357,7 @@ fn the_work_of_a_pin_is_the_energy_of_the_body() {
         work += force.as_dvec3().dot((to - at).as_dvec3());
         at = to;
     }
-    // The force holds the pin's own weight too, and its height counts; its speed does not.
+    // The pin force also carries the pin's own weight, and its height counts; its speed does not.
     let gained = scene.energy() - start;
     assert!(
         mass > 0.0 && (gained / work - 1.0).abs() < 2e-3,
@@ -378,14 +379,14 @@ fn a_body_at_ten_kilometres_moves_as_at_the_origin() {
         let expected: Vec<DVec3> = near.positions().iter().map(|p| *p + offset.as_dvec3()).collect();
         let error = largest_difference(&far.positions(), &expected);
         assert!(error < half_ulp + 2e-6, "{error:e}");
-        // Velocities are not rounded on their way out.
+        // Velocities are not rounded on output.
         let error = largest_difference(&far.velocities(), &near.velocities());
         assert!(error < 1e-4, "{error:e} m/s");
     }
 }
 
 #[test]
-fn frames_of_changing_length_lead_to_the_same_rest_shape() {
+fn frames_of_varying_length_reach_the_same_rest_shape() {
     let mut parts = Parts::block([2, 2, 2], 0.05, 0.01, 100.0);
     pin_where(&mut parts, |p| p.x == 0.0);
     damp(&mut parts, 4.0);
@@ -435,7 +436,7 @@ fn a_force_of_a_million_newtons_leaves_the_body_finite_or_unchanged() {
     }
 }
 
-/// A step that may be refused, and then has changed nothing; whether it was taken.
+/// Takes a step that may be refused without changes, and returns true if it was taken.
 fn step_or_refuse(scene: &mut Scene, h: f32) -> bool {
     let before = (scene.world.state_hash(), scene.positions(), scene.velocities());
     match scene.world.step(h) {
@@ -452,7 +453,7 @@ fn step_or_refuse(scene: &mut Scene, h: f32) -> bool {
 }
 
 #[test]
-fn steps_from_ten_microseconds_to_a_second_never_leave_the_finite() {
+fn steps_from_ten_microseconds_to_a_second_stay_finite() {
     let (parts, starts) = bad_starts();
     let mut random = Random::new(14);
     for exponent in 0..=10 {
@@ -501,10 +502,10 @@ fn steps_of_absurd_length_are_taken_or_refused() {
     }
 }
 
-/// The bound on the step must not go stale where a small stiff part of a large body changes.
+/// The bound on the step must not become stale where a small stiff part of a large body changes.
 #[test]
 fn a_stiff_corner_of_a_large_body_stays_stable() {
-    // A node held from six sides by springs of 1 mm, and far away springs of 10 m that hardly pull.
+    // Springs of 1 mm hold a node from six sides; far away are springs of 10 m that hardly pull.
     let mut parts = Parts::nodes(vec![Vec3::ZERO], 0.001);
     for direction in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
         parts.positions.push(1e-3 * direction);
@@ -524,7 +525,7 @@ fn a_stiff_corner_of_a_large_body_stays_stable() {
     for i in 1..=6 {
         scene.body_mut().pin(i).expect("a pin");
     }
-    // Drawn out to ten times their length, the springs hold the node across as well: omega² grows from 2 to 5.6 k/m.
+    // Stretched to ten times their length, the springs also hold the node transversely: omega² grows from 2 to 5.6 k/m.
     for step in 1..=10 {
         for i in 1..=6 {
             let to = parts.positions[i as usize] * (1.0 + 0.9 * step as f32);
@@ -551,7 +552,7 @@ fn a_stiff_corner_of_a_large_body_stays_stable() {
 }
 
 #[test]
-fn drawn_elements_take_substeps_near_what_their_law_allows() {
+fn stretched_elements_take_substeps_near_the_bound_of_their_law() {
     const NU: f64 = 0.3;
     let mesh = sinew::mesh::Mesh::block([0.04; 3], [3; 3]).expect("a block");
     let stable = |stretch: f32, across: f32| {
@@ -571,7 +572,7 @@ fn drawn_elements_take_substeps_near_what_their_law_allows() {
         let drawn: Vec<_> = mesh
             .positions
             .iter()
-            .map(|place| *place * glam::vec3(stretch, across, across))
+            .map(|position| *position * glam::vec3(stretch, across, across))
             .collect();
         world
             .body_mut(body)
@@ -580,7 +581,8 @@ fn drawn_elements_take_substeps_near_what_their_law_allows() {
             .expect("positions");
         f64::from(world.step(1e-7).expect("a step").stable_substep)
     };
-    // How stiff the law is along a stretch, in parts of E: St Venant and Kirchhoff's with `kappa / 2 (J - 1)^2` for all of lambda.
+    // The stiffness of the law along a stretch, relative to E: St. Venant-Kirchhoff with `kappa / 2 (J - 1)^2` for all
+    // of lambda.
     let (lambda, mu) = (NU / ((1.0 + NU) * (1.0 - 2.0 * NU)), 0.5 / (1.0 + NU));
     let stiff = |stretch: f64, across: f64| {
         let stress = mu * (stretch * stretch - 1.0);
@@ -596,10 +598,10 @@ fn drawn_elements_take_substeps_near_what_their_law_allows() {
     }
 }
 
-/// An organ that is suddenly twice as long becomes stiffer within the first step than any of its forces say before. Where fewer substeps than are
-/// allowed would do, they are found.
+/// An organ that is suddenly twice as long stiffens within the first step, before any force shows it. A step is refused
+/// only where it needs more substeps than are allowed.
 #[test]
-fn a_sudden_stretch_is_refused_only_where_it_needs_more_substeps_than_are_allowed() {
+fn a_sudden_stretch_is_refused_only_if_it_needs_too_many_substeps() {
     let mesh = sinew::mesh::Mesh::organ(0.15, 0.0187).expect("an organ");
     let mut taken = 0;
     for (stretch, dt) in [(1.5, 1.0 / 30.0), (2.0, FRAME), (2.0, 1.0 / 30.0), (3.0, FRAME)] {
@@ -610,13 +612,17 @@ fn a_sudden_stretch_is_refused_only_where_it_needs_more_substeps_than_are_allowe
         };
         let id = world.create_body(&definition).expect("a body");
         let body = world.body_mut(id).expect("the body");
-        let left = mesh.positions.iter().map(|place| place.x).fold(f32::INFINITY, f32::min);
+        let left = mesh
+            .positions
+            .iter()
+            .map(|position| position.x)
+            .fold(f32::INFINITY, f32::min);
         body.pin_box(Vec3::splat(-9.0), Vec3::new(left + 0.0075, 9.0, 9.0))
             .expect("pins");
         let drawn: Vec<Vec3> = mesh
             .positions
             .iter()
-            .map(|place| Vec3::new(left + (place.x - left) * stretch, place.y, place.z))
+            .map(|position| Vec3::new(left + (position.x - left) * stretch, position.y, position.z))
             .collect();
         body.set_positions(&drawn).expect("positions");
         match world.step(dt) {
@@ -634,10 +640,11 @@ fn a_sudden_stretch_is_refused_only_where_it_needs_more_substeps_than_are_allowe
     assert!(taken >= 2, "only {taken} of the steps were taken");
 }
 
-/// Two tetrahedra apart, the larger so much stiffer that its bound at rest is above that of the smaller with its springs. Where the smaller is
-/// stretched, its springs count all the same: the substep is no longer than for the smaller alone.
+/// Two separate tetrahedra, the larger so stiff that its bound at rest is above that of the smaller with its springs.
+/// Where the smaller one is stretched, its springs still count: the substep is no longer than for the smaller one
+/// alone.
 #[test]
-fn springs_count_beside_stiffer_elements_elsewhere() {
+fn springs_count_beside_distant_stiffer_elements() {
     let corners = |edge: f32, at: f32| [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|p| edge * p + at * Vec3::X);
     let edges = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
     let stable = |positions: &[Vec3], moved: &[Vec3], stiffness: f32| {
@@ -666,17 +673,17 @@ fn springs_count_beside_stiffer_elements_elsewhere() {
             .body_mut(body)
             .expect("a body")
             .set_positions(moved)
-            .expect("places");
+            .expect("positions");
         world.step(1e-7).expect("a step").stable_substep
     };
     let bound = |stable: f32| 1.0 / (stable * stable);
     let (edge, stretched) = (0.01, 2.0);
     let small = corners(edge, 0.0);
-    // As stiff as the elements, and with them just below what the larger one has.
-    let of_elements = bound(stable(&small, &small, 0.0));
-    let of_springs = bound(stable(&small, &small, 1.0)) - of_elements;
-    let stiffness = of_elements / of_springs;
-    let larger = 1.05 * edge * bound(stable(&small, &small, stiffness)) / of_elements;
+    // As stiff as the elements, and with them just below the bound of the larger one.
+    let element_bound = bound(stable(&small, &small, 0.0));
+    let spring_bound = bound(stable(&small, &small, 1.0)) - element_bound;
+    let stiffness = element_bound / spring_bound;
+    let larger = 1.05 * edge * bound(stable(&small, &small, stiffness)) / element_bound;
     let large = corners(larger, 1.0);
     let moved = small.map(|p| stretched * p);
     let alone = stable(&small, &moved, stiffness);

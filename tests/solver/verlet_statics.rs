@@ -1,5 +1,5 @@
-//! Rest shapes that VERLET comes to under damping, against statics: chains, a catenary, patches of lattice and triangles
-//! under even stress (Cauchy-Born), and that a body at rest keeps its shape for a million steps.
+//! Rest shapes of VERLET under damping, against statics: chains, a catenary, patches of lattice and triangles under
+//! uniform stress (Cauchy-Born). A body at rest keeps its shape for a million steps.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use crate::support::statics::{Catenary, G, Patch, cubic_cell, damp, hanging_chain, stress, triangle_cell, uniaxial};
@@ -14,12 +14,12 @@ fn gravity() -> WorldDefinition {
 }
 
 #[test]
-fn a_chain_hangs_as_far_at_every_step() {
+fn a_chain_has_the_same_sag_for_every_step() {
     let (links, mass, spacing) = (10, 0.1_f32, 0.02_f32);
     let (mut parts, extension) = hanging_chain(links, spacing, mass, 50.0);
     let length = f64::from(spacing) * links as f64;
-    // The slowest mode has omega = 3.3 1/s. A node in f32 stops h omega² dx = rate ulp / 2 short of its place: the
-    // shorter the step, the less the damping may be.
+    // The slowest mode has omega = 3.3 1/s. A node in `f32` stops h omega² dx = rate ulp / 2 short of its rest
+    // position: shorter steps need less damping.
     for (h, rate, duration) in [
         (1.0_f32, 2.0_f32, 40.0_f32),
         (1.0 / 60.0, 2.0, 30.0),
@@ -38,9 +38,9 @@ fn a_chain_hangs_as_far_at_every_step() {
     }
 }
 
-/// The chain that IMPLICIT, NEWTON and states of rest are tried with too. Its slowest mode has omega = 2.7 1/s.
+/// The chain that IMPLICIT, NEWTON and static equilibria are also tested with. Its slowest mode has omega = 2.7 1/s.
 #[test]
-fn a_chain_of_forty_hangs_as_far_in_every_storage() {
+fn a_chain_of_forty_has_the_same_sag_in_every_storage() {
     let (links, spacing) = (40, 0.1_f32);
     let (mut parts, extension) = hanging_chain(links, spacing, 0.01, 50.0);
     damp(&mut parts, 2.0);
@@ -61,7 +61,7 @@ fn a_chain_of_forty_hangs_as_far_in_every_storage() {
 }
 
 #[test]
-fn a_chain_held_at_both_ends_hangs_as_the_discrete_catenary() {
+fn a_chain_held_at_both_ends_is_a_discrete_catenary() {
     let mut chain = Catenary::new();
     damp(&mut chain.parts, 2.0);
     let mut scene = Scene::new(&chain.parts, gravity());
@@ -70,7 +70,7 @@ fn a_chain_held_at_both_ends_hangs_as_the_discrete_catenary() {
     assert!(error < 1e-6, "{error:e}");
 }
 
-/// Loads a patch and lets it come to rest: how far it then is from its deformation.
+/// Loads a patch, lets it come to rest, and returns its distance from the expected deformation.
 fn error_at_rest(patch: &Patch, h: f32, steps: usize) -> f64 {
     let mut scene = Scene::new(&patch.parts, FREE);
     for _ in 0..steps {
@@ -81,12 +81,12 @@ fn error_at_rest(patch: &Patch, h: f32, steps: usize) -> f64 {
 }
 
 #[test]
-fn a_lattice_patch_stretches_as_its_lattice() {
+fn a_lattice_patch_stretches_by_its_moduli() {
     let (spacing, stiffness) = (0.05_f64, 100.0);
     let springs = cubic_cell(spacing, stiffness);
     let volume = spacing.powi(3);
 
-    // What the lattice is when strains are small, and how E shifts with them.
+    // The moduli of the lattice at small strains, and the shift of E with strain.
     let young = 5.0 * stiffness / (2.0 * spacing);
     for strain in [1e-5, -1e-5, 1e-3, -1e-3] {
         let f = uniaxial(0, 1.0 + strain, &[1, 2], &springs, volume);
@@ -108,7 +108,7 @@ fn a_lattice_patch_stretches_as_its_lattice() {
 }
 
 #[test]
-fn a_triangle_patch_stretches_as_its_lattice() {
+fn a_triangle_patch_stretches_by_its_moduli() {
     let (side, stiffness) = (0.05, 100.0);
     let (directions, area) = triangle_cell(side, stiffness);
     let stiff = 2.0 * stiffness / 3.0_f64.sqrt();
@@ -131,8 +131,8 @@ fn a_triangle_patch_stretches_as_its_lattice() {
 #[test]
 #[ignore = "long"]
 fn a_free_body_at_rest_keeps_its_shape_for_a_million_steps() {
-    // What `x += h v` rounds away is 4e-9 m a step, and adds up in vibrations that nothing ends, and in a
-    // slow way through space.
+    // `x += h v` rounds by 4e-9 m per step; these errors add up to undamped vibrations and to a slow drift through
+    // space.
     for (rate, bound) in [(0.0, 3e-4), (0.1, 2e-5), (1.0, 5e-6)] {
         for kernel in [Kernel::Best, Kernel::Portable] {
             let mut parts = Parts::block([1, 1, 2], 0.0371, 0.01, 100.0);

@@ -1,5 +1,5 @@
-//! The step as a contract: the tolerance is kept, a step that is refused changes nothing, a body that would overflow is
-//! put back, and springs may come and go while all of it moves.
+//! The step as a contract: the tolerance is kept, a refused step changes nothing, a body that would overflow is rolled
+//! back, and springs can be added and removed in motion.
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use glam::{DVec3, Vec3};
@@ -7,7 +7,7 @@ use sinew::{Error, WorldDefinition};
 
 const GRAVITY: Vec3 = Vec3::new(1.0, -9.0, 2.0);
 
-/// A block that is out of shape, held at one side.
+/// A deformed block, held at one side.
 fn swinging(seed: u64) -> Parts {
     let mut parts = Parts::block([3, 2, 2], 0.05, 0.01, 40.0);
     let mut random = Random::new(seed);
@@ -20,7 +20,7 @@ fn swinging(seed: u64) -> Parts {
     parts
 }
 
-/// It falls in steps to this tolerance, m.
+/// The block falls in steps to this tolerance (m).
 fn in_steps_to(tolerance: f32, parts: &Parts) -> Scene {
     let definition = WorldDefinition {
         gravity: GRAVITY,
@@ -61,7 +61,7 @@ fn a_step_keeps_its_tolerance_of(damping: f32) {
                 let error = largest_difference(&scene.positions(), &reference.positions);
                 let named = format!("tolerance {tolerance}, h {h}, step {step}: {error:e}, {report:?}");
                 assert!(error <= f64::from(tolerance), "{named}");
-                // Beside rounding, of 1e-8 m a substep.
+                // Plus rounding, of 1e-8 m per substep.
                 let rounding = 1e-8 * f64::from(report.substeps).sqrt() + 1e-8;
                 assert!(error <= f64::from(report.error_estimate) + rounding, "{named}");
                 assert!(report.error_estimate <= tolerance, "{named}");
@@ -82,8 +82,8 @@ fn a_finer_tolerance_takes_more_substeps() {
     assert!(substeps[0] < substeps[1] && substeps[1] < substeps[2], "{substeps:?}");
 }
 
-/// Everything that a caller sees of a scene.
-fn seen(scene: &Scene) -> (u64, Vec<DVec3>, Vec<DVec3>, Vec3, f64) {
+/// Returns everything that a caller can observe of a scene.
+fn observable_state(scene: &Scene) -> (u64, Vec<DVec3>, Vec<DVec3>, Vec3, f64) {
     (
         scene.world.state_hash(),
         scene.positions(),
@@ -94,7 +94,7 @@ fn seen(scene: &Scene) -> (u64, Vec<DVec3>, Vec<DVec3>, Vec3, f64) {
 }
 
 #[test]
-fn a_refused_step_changes_nothing_and_what_is_pending_stays() {
+fn a_refused_step_changes_nothing_and_keeps_pending_changes() {
     // Refused because stability needs too many substeps, because of the tolerance, and because substeps are fixed.
     let definitions = [
         WorldDefinition {
@@ -131,7 +131,7 @@ fn a_refused_step_changes_nothing_and_what_is_pending_stays() {
                 scene
             };
             let (mut refused, mut plain) = (prepare(), prepare());
-            let before = seen(&refused);
+            let before = observable_state(&refused);
             for _ in 0..2 {
                 match refused.world.step(1.0) {
                     Err(Error::Unstable { report, .. }) => {
@@ -139,11 +139,11 @@ fn a_refused_step_changes_nothing_and_what_is_pending_stays() {
                     }
                     other => panic!("{other:?}"),
                 }
-                assert_eq!(seen(&refused), before);
+                assert_eq!(observable_state(&refused), before);
             }
             for _ in 0..3 {
                 assert_eq!(refused.step(1e-3), plain.step(1e-3));
-                assert_eq!(seen(&refused), seen(&plain));
+                assert_eq!(observable_state(&refused), observable_state(&plain));
             }
             let target = parts.positions[0] + Vec3::new(0.01, 0.02, 0.03);
             assert_eq!(refused.body().positions()[0], target);
@@ -152,7 +152,7 @@ fn a_refused_step_changes_nothing_and_what_is_pending_stays() {
 }
 
 #[test]
-fn one_body_that_cannot_be_stepped_holds_back_all() {
+fn one_unstable_body_holds_back_the_world() {
     let mut scene = Scene::new(
         &swinging(24),
         WorldDefinition {
@@ -184,7 +184,7 @@ fn one_body_that_cannot_be_stepped_holds_back_all() {
 }
 
 #[test]
-fn a_body_that_overflows_is_put_back_and_the_others_step() {
+fn an_overflowing_body_is_rolled_back_and_the_others_step() {
     let definition = WorldDefinition {
         gravity: GRAVITY,
         ..FREE
@@ -208,7 +208,7 @@ fn a_body_that_overflows_is_put_back_and_the_others_step() {
     assert_eq!((body.positions().to_vec(), body.velocities().to_vec()), before);
     assert_eq!(scene.positions(), alone.positions());
 
-    // The force is spent: the next step moves it as if the last had not been.
+    // The force is spent: the next step moves the body as if the failed step had not been taken.
     let mut fresh = Scene::new(&light, definition);
     fresh.step(0.01);
     for _ in 0..10 {
@@ -223,7 +223,7 @@ fn a_body_that_overflows_is_put_back_and_the_others_step() {
     assert_eq!(scene.positions(), alone.positions());
 }
 
-/// Adds or removes a spring, in the library and in the pairs that should be there; whether one was removed.
+/// Adds or removes a spring in the library and in the expected pairs; the result is true if it was removed.
 fn edit(scene: &mut Scene, pairs: &mut Vec<[u32; 2]>, random: &mut Random) -> Option<([u32; 2], bool)> {
     let count = scene.body().node_count();
     if random.below(2) == 0 && pairs.len() > 60 {
@@ -251,7 +251,7 @@ fn sorted(mut pairs: Vec<[u32; 2]>) -> Vec<[u32; 2]> {
 }
 
 #[test]
-fn springs_come_and_go_as_in_the_equations() {
+fn spring_changes_follow_the_equations() {
     let parts = swinging(27);
     let mut scene = Scene::new(
         &parts,
@@ -268,12 +268,12 @@ fn springs_come_and_go_as_in_the_equations() {
     for event in 0..300 {
         match edit(&mut scene, &mut pairs, &mut random) {
             Some((pair, true)) => {
-                let place = reference
+                let position = reference
                     .springs
                     .iter()
                     .position(|spring| spring.0 == pair)
                     .expect("a spring");
-                reference.springs.remove(place);
+                reference.springs.remove(position);
                 removed += 1;
             }
             Some((pair, false)) => {
@@ -297,7 +297,7 @@ fn springs_come_and_go_as_in_the_equations() {
 }
 
 #[test]
-fn an_edited_body_moves_as_one_made_afresh() {
+fn an_edited_body_moves_as_a_new_one() {
     let parts = swinging(29);
     let mut scene = Scene::new(
         &parts,
@@ -308,7 +308,7 @@ fn an_edited_body_moves_as_one_made_afresh() {
     );
     let mut random = Random::new(30);
     let mut pairs = parts.springs.clone();
-    // Rest lengths and stiffnesses are given anew, so that both bodies have the same to the bit.
+    // Rest lengths and stiffnesses are set again, so that both bodies have bitwise identical values.
     let mut springs: std::collections::BTreeMap<[u32; 2], (f32, f32)> = parts
         .springs
         .iter()
@@ -391,7 +391,7 @@ fn springs_removed_in_motion_keep_momentum() {
                 left.len()
             );
         }
-        // Without springs nothing pulls any more.
+        // Without springs there are no forces any more.
         let last = scene.velocities();
         assert_eq!(scene.step(1e-3).stable_substep, f32::INFINITY);
         assert_eq!(scene.velocities(), last);

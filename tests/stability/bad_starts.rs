@@ -1,5 +1,5 @@
-//! Bodies that begin where no body should be. Springs alone do not unfold them: they stay finite, and what damping takes
-//! is gone.
+//! Bodies with invalid starting shapes. Springs alone do not unfold them: they stay finite, and damping removes their
+//! energy.
 
 use glam::{DVec3, Vec3};
 
@@ -26,7 +26,7 @@ fn collapse(parts: &Parts) -> Vec<Vec3> {
     parts.positions.iter().map(|_| 1e-6 * random.vector()).collect()
 }
 
-/// Undamped, so that all there is stays; then damped, so that nothing moves any more.
+/// Runs undamped, so that all energy stays, then damped until nothing moves.
 fn start_from(setup: &Setup, place: fn(&Parts) -> Vec<Vec3>) -> Outcome {
     let mut parts = block(3);
     let positions = place(&parts);
@@ -64,7 +64,7 @@ pub fn collapsed(setup: &Setup) -> Outcome {
     start_from(setup, collapse)
 }
 
-/// So large that two threads share its nodes.
+/// Large enough for two threads to share its nodes.
 pub fn scattered_large(setup: &Setup) -> Outcome {
     let parts = block(20);
     let positions = scatter(&parts);
@@ -78,7 +78,7 @@ pub fn scattered_large(setup: &Setup) -> Outcome {
     Ok(watched.figures())
 }
 
-/// Springs without length, and nodes in one place: they part along one direction, and momentum stays.
+/// Springs of zero length between coincident nodes: they separate along one direction, and momentum is conserved.
 pub fn coincident(setup: &Setup) -> Outcome {
     let place = Vec3::new(0.3, 0.2, 0.1);
     let mut parts = Parts::nodes(vec![place; 4], 0.1);
@@ -86,7 +86,7 @@ pub fn coincident(setup: &Setup) -> Outcome {
     parts.stiffnesses = vec![50.0; 3];
     parts.rest_lengths = vec![0.0, 0.04, 0.0];
     let mut pair = Watched::new(setup, &parts, Vec3::ZERO)?;
-    // sqrt(2 k / m) is 32 /s: it has parted after a quarter of a period.
+    // sqrt(2 k / m) is 32 /s: the nodes have separated after a quarter of a period.
     for _ in 0..setup.steps(0.05, 5, 5000) {
         pair.step(setup.step)?;
         let state = pair.state();
@@ -109,10 +109,10 @@ pub fn coincident(setup: &Setup) -> Outcome {
         positions[a].distance(positions[b])
     };
     if setup.step < 0.05 && apart(&pair, 1, 2) < 1e-4 {
-        return fault("the nodes have not parted");
+        return fault("the nodes have not separated");
     }
 
-    // All nodes of a block in one place.
+    // All nodes of a block at one point.
     let parts = block(2);
     let mut heap = Watched::new(setup, &parts, Vec3::ZERO)?;
     heap.change(|body| body.set_positions(&[Vec3::ZERO; 27]));
@@ -121,7 +121,7 @@ pub fn coincident(setup: &Setup) -> Outcome {
         return fault("a node left the line");
     }
 
-    // An isotropic oscillator through a spring without length stays on its ellipse.
+    // A spring of zero length is an isotropic oscillator, which stays on its ellipse.
     let mut bobs = Parts::nodes(vec![Vec3::X, Vec3::NEG_X], 1.0);
     bobs.springs = vec![[0, 1]];
     bobs.stiffnesses = vec![50.0];

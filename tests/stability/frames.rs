@@ -1,4 +1,4 @@
-//! Frames that change, and very many of them: the same rest shape.
+//! Varying frames, and very many of them: the same rest shape.
 
 use glam::Vec3;
 
@@ -17,7 +17,7 @@ fn hanging_block() -> Parts {
     parts
 }
 
-/// Of the size of the body, what a rest shape in `f32` may be off: sixteen roundings of its positions.
+/// The possible error of a rest shape in `f32`, relative to the size of the body: sixteen roundings of its positions.
 const SAME_SHAPE: f64 = 1e-6;
 
 /// From a sixteenth of the step to twice the step: at 60 Hz between 1 and 32 ms.
@@ -52,7 +52,7 @@ pub fn a_million(setup: &Setup) -> Outcome {
         watched.settle(setup.step, 0.5 * count as f64 * f64::from(setup.step))?;
         *error = largest_difference(&watched.state().positions, &expected) / parts.size();
     }
-    // In the quick tier it may be shorter than what coming to rest takes.
+    // In the quick tier it may be too short to come to rest.
     if count as f64 * f64::from(setup.step) < 4.0 {
         return Ok(format!("not at rest after {count} steps; {}", watched.figures()));
     }

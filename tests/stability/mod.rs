@@ -1,8 +1,8 @@
 //! The table of stability: every case with every solver, every storage and every step, through the public API.
 //!
-//! `quick.rs`, a module of `tests/library.rs`, takes a part of it, `benches/stability.rs` all of it. Whatever a case does, no number is ever
-//! other than finite, the energy is never above what was put in (`ledger.rs`), one thread and two lead to the same state,
-//! and a step that is refused has changed nothing.
+//! `quick.rs`, a module of `tests/library.rs`, runs a part of it, `benches/stability.rs` all of it. In every case all
+//! numbers stay finite, the energy never exceeds the energy put in (`ledger.rs`), one thread and two give the same
+//! state, and a refused step changes nothing.
 
 mod bad_starts;
 mod frames;
@@ -47,7 +47,7 @@ pub const CASES: [Case; 20] = [
     case("a million steps", frames::a_million),
 ];
 
-/// What cannot be tried yet: the line of the table, and what it waits for. Until then the line is tried with springs alone.
+/// Lines of the table that wait for a feature, and the feature. Until then the line runs with springs alone.
 pub const PENDING: [(&str, &str); 5] = [
     ("scattered at random", "back to rest, none inverted: the volume term"),
     ("flattened to a plane", "back to rest, none inverted: the volume term"),
@@ -59,28 +59,32 @@ pub const PENDING: [(&str, &str); 5] = [
     ),
 ];
 
-/// A fault of the library that is known: no other and no worse; it must still be there, or the entry goes with it.
+/// A known defect of the library. The case must fail as described, no worse; an entry that no longer applies must be
+/// removed.
 pub struct Known {
     pub case: &'static str,
     pub applies: fn(&Setup) -> bool,
-    /// What it amounts to.
+    /// The size of the defect.
     pub figure: &'static str,
-    /// The checks that it may fail, and by how many times their bounds at most.
+    /// The checks that may fail, and the allowed factor over their bounds.
     pub fails: &'static [(&'static str, f64)],
-    /// Whether the last bits decide if it shows, which are not the same on every processor: then it may pass too.
-    pub hangs_on_bits: bool,
+    /// True if rounding decides whether the defect shows. Rounding differs between processors, so the case may also
+    /// pass.
+    pub depends_on_rounding: bool,
 }
 
-/// `x += h v` loses what is below half of the last place of x: at 10 us a body stops short of rest, or starts late.
+/// `x += h v` loses changes below half a unit in the last place of x: at 10 us a body stops short of rest, or starts
+/// late.
 const LOST: &str = "x += h v loses what is below half of the last place of x";
 
-/// The equations of IMPLICIT are solved to a hundredth of what a step changes: near rest that leaves a jitter.
+/// IMPLICIT solves its equations to a hundredth of a step's change: near rest that leaves jitter.
 const JITTER: &str = "solved to a hundredth of a step's change";
 
-/// A step of 1 s on the block takes some ten thousand products: with the default budget it reports that it has not converged.
+/// A step of 1 s on the block takes about ten thousand products: with the default budget it reports that it has not
+/// converged.
 const SHORT: &str = "a thousand products do not suffice";
 
-const fn known(
+const fn known_defect(
     figure: &'static str,
     case: &'static str,
     fails: &'static [(&'static str, f64)],
@@ -91,20 +95,20 @@ const fn known(
         applies,
         figure,
         fails,
-        hangs_on_bits: false,
+        depends_on_rounding: false,
     }
 }
 
-/// Of a fault that one processor shows where another does not.
-const fn jitter(
+/// A defect that shows on some processors only.
+const fn processor_dependent_defect(
     figure: &'static str,
     case: &'static str,
     fails: &'static [(&'static str, f64)],
     applies: fn(&Setup) -> bool,
 ) -> Known {
     Known {
-        hangs_on_bits: true,
-        ..known(figure, case, fails, applies)
+        depends_on_rounding: true,
+        ..known_defect(figure, case, fails, applies)
     }
 }
 
@@ -114,47 +118,47 @@ const SHAPE: &str = "error of the rest shape over the size";
 
 pub const KNOWN: [Known; 13] = [
     // 1.65e-3 of the stretch.
-    known(LOST, "masses 1 : 1e6", &[(STRETCH, 3.0)], |setup| {
+    known_defect(LOST, "masses 1 : 1e6", &[(STRETCH, 3.0)], |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-5)
     }),
     // 1e-3 of the sag.
-    known(LOST, "stiffness 1 : 1e6 in a block", &[(SAG, 30.0)], |setup| {
+    known_defect(LOST, "stiffness 1 : 1e6 in a block", &[(SAG, 30.0)], |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-5)
     }),
     // 1.01e-4 and 1.04e-4 of the sag with two of the storages.
-    jitter(LOST, "stiffness 1 : 1e6 in a block", &[(SAG, 1.1)], |setup| {
+    processor_dependent_defect(LOST, "stiffness 1 : 1e6 in a block", &[(SAG, 1.1)], |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-4)
     }),
     // A strain of 2.2e-4.
-    known(LOST, "a pin stretched and let go", &[("strain left", 5.0)], |setup| {
+    known_defect(LOST, "a pin stretched and let go", &[("strain left", 5.0)], |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-5)
     }),
     // 3e-6 to 4.5e-6 of the size.
-    known(LOST, "steps of changing length", &[(SHAPE, 10.0)], |setup| {
+    known_defect(LOST, "steps of changing length", &[(SHAPE, 10.0)], |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-5)
     }),
     // 2.5e-5 of the size.
-    known(LOST, "a million steps", &[(SHAPE, 50.0)], |setup| {
+    known_defect(LOST, "a million steps", &[(SHAPE, 50.0)], |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-5)
     }),
     // 3e-6 of the size.
-    known(LOST, "a million steps", &[(SHAPE, 10.0)], |setup| {
+    known_defect(LOST, "a million steps", &[(SHAPE, 10.0)], |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-4)
     }),
     // Up to 3.9e-3 of the stretch.
-    jitter(JITTER, "stiffness 1 : 1e6 in a chain", &[(STRETCH, 40.0)], |setup| {
+    processor_dependent_defect(JITTER, "stiffness 1 : 1e6 in a chain", &[(STRETCH, 40.0)], |setup| {
         setup.solver == Solver::Implicit && setup.step <= FRAME
     }),
     // Up to 1.2e-3 of the sag.
-    jitter(JITTER, "stiffness 1 : 1e6 in a block", &[(SAG, 30.0)], |setup| {
+    processor_dependent_defect(JITTER, "stiffness 1 : 1e6 in a block", &[(SAG, 30.0)], |setup| {
         setup.solver == Solver::Implicit && setup.step <= FRAME
     }),
     // 2.4e-2 to 0.28 of the sag.
-    jitter(SHORT, "stiffness 1 : 1e6 in a block", &[(SAG, 5000.0)], |setup| {
+    processor_dependent_defect(SHORT, "stiffness 1 : 1e6 in a block", &[(SAG, 5000.0)], |setup| {
         setup.solver == Solver::Implicit && setup.step > FRAME
     }),
-    // Up to twice what rounding a step's velocities may add to the momentum.
-    jitter(
+    // Up to twice the momentum that rounding a step's velocities may add.
+    processor_dependent_defect(
         JITTER,
         "nodes in one place, springs without length",
         &[("momentum over that of its parts", 4.0)],
@@ -164,15 +168,16 @@ pub const KNOWN: [Known; 13] = [
         case: "springs removed in motion",
         applies: |setup| is_full(setup) && setup.solver != Solver::Verlet && setup.step == 1.0,
         figure: "implicit formulas keep momentum, and lose angular momentum",
-        // 4.35 times what the parts had with NEWTON, 4.24 with IMPLICIT: in a step of a second they turn several times.
+        // 4.35 times the momentum of the parts with NEWTON, 4.24 with IMPLICIT: in a step of a second they rotate
+        // several times.
         fails: &[
             ("momentum lost over that of the parts", 4.0),
             ("angular momentum lost over that of the parts", 5e6),
         ],
-        hangs_on_bits: false,
+        depends_on_rounding: false,
     },
-    // 6.2e-4: the equations are solved to a hundredth of what a step changes.
-    jitter(
+    // 6.2e-4: the equations are solved to a hundredth of a step's change.
+    processor_dependent_defect(
         JITTER,
         "springs removed in motion",
         &[("angular momentum lost over that of the parts", 1e6)],
@@ -190,7 +195,7 @@ fn is_verlet_at(setup: &Setup, step: f32) -> bool {
     setup.solver == Solver::Verlet && setup.step == step
 }
 
-/// What came of a case, against what is expected of it.
+/// The result of a case, and its comparison with the expected result.
 pub struct Verdict {
     pub outcome: Outcome,
     pub known: Option<&'static Known>,
@@ -205,7 +210,7 @@ impl Verdict {
         }
     }
 
-    /// Whether it is as it should be.
+    /// True if the result is as expected.
     pub fn is_expected(&self, setup: &Setup) -> bool {
         match (&self.outcome, self.known) {
             (Err(Stop::Exceeds { what, figure, bound }), Some(known)) => {
@@ -214,7 +219,7 @@ impl Verdict {
             }
             (Err(Stop::Exceeds { .. } | Stop::Fault(_)), _) => false,
             (Err(Stop::Unsupported(_)), _) => setup.solver != Solver::Verlet,
-            (Ok(_) | Err(Stop::Refused(_)), known) => known.is_none_or(|known| known.hangs_on_bits),
+            (Ok(_) | Err(Stop::Refused(_)), known) => known.is_none_or(|known| known.depends_on_rounding),
         }
     }
 }

@@ -1,27 +1,28 @@
-//! The table of stability, a part of it: each case with each solver, or with the first ones where others take long, at one step, which
-//! changes from case to case; in a long test the rest, NEWTON at that one step alone. Each step has one of the storages.
-//! `cargo bench --bench stability` takes all of it.
+//! A part of the table of stability. Each case runs with each solver, or with the first ones if the others are slow, at
+//! one step, which varies from case to case. A long test runs the remainder, with NEWTON at that one step alone. Each
+//! step has one of the storages. `cargo bench --bench stability` runs everything.
 
 use crate::stability::{CASES, PENDING, SOLVERS, STEPS, STORAGES, Setup, Stop, Tier, Verdict};
 use sinew::Solver;
 
-/// Tries a line of the table with so many solvers at one step, or all the rest; what is not as it should be is told together.
+/// Runs a line of the table with this many solvers at one step, or all the remaining ones, and reports all unexpected
+/// results together.
 fn check(name: &str, solvers: usize, is_rest: bool) {
-    let place = CASES
+    let line = CASES
         .iter()
         .position(|case| case.name == name)
         .expect("a line of the table");
-    let case = &CASES[place];
+    let case = &CASES[line];
     let mut wrong = Vec::new();
-    // Five steps on from line to line is one back: STEPS has six.
-    for (number, (solver, first)) in SOLVERS.into_iter().zip([place, place + 2, 5 * place]).enumerate() {
+    // Advancing five steps per line equals going back by one: STEPS has six.
+    for (number, (solver, first)) in SOLVERS.into_iter().zip([line, line + 2, 5 * line]).enumerate() {
         // NEWTON is slow: one of the steps for each line.
         let steps = if solver == Solver::Newton { 1 } else { STEPS.len() };
         for index in (0..steps).filter(|&index| (index > 0 || number >= solvers) == is_rest) {
             let index = (first + index) % STEPS.len();
             let setup = Setup {
                 solver,
-                storage: STORAGES[(place + index) % STORAGES.len()],
+                storage: STORAGES[(line + index) % STORAGES.len()],
                 step: STEPS[index],
                 tier: Tier::Quick,
             };
@@ -56,7 +57,7 @@ macro_rules! lines {
         }
 
         #[test]
-        fn every_line_of_the_table_is_tried() {
+        fn every_line_of_the_table_is_run() {
             let tried = [$($name),*];
             for case in &CASES {
                 assert!(tried.contains(&case.name), "{}", case.name);
@@ -88,9 +89,9 @@ lines! {
     a_million_steps: "a million steps", 2;
 }
 
-/// What is not there yet, for the report: a solver that is offered takes part, and its line goes.
+/// Lists pending features for the report: once a solver is available it takes part, and its line is removed.
 #[test]
-fn what_is_pending_is_told() {
+fn pending_features_are_reported() {
     let setup = |solver| Setup {
         solver,
         storage: STORAGES[0],
@@ -121,11 +122,11 @@ mod long_runs {
     use glam::Vec3;
     use sinew::Solver;
 
-    /// Tries these of all rows, by their numbers.
-    fn check(solver: Solver, is_tried: fn(usize) -> bool) {
+    /// Runs these rows, selected by their numbers.
+    fn check(solver: Solver, is_selected: fn(usize) -> bool) {
         let mut wrong = Vec::new();
         let rows = quick().into_iter().filter(|(row, _)| row.solver == solver);
-        for (_, (row, seconds)) in rows.enumerate().filter(|row| is_tried(row.0)) {
+        for (_, (row, seconds)) in rows.enumerate().filter(|row| is_selected(row.0)) {
             let outcome = row.run(seconds, f64::INFINITY, &mut |_| {});
             if outcome.has_failed() {
                 wrong.push(format!("{row}: {outcome}"));
@@ -161,8 +162,8 @@ mod long_runs {
         check(Solver::Implicit, |row| row % 8 != 0);
     }
 
-    /// Whether a check finds a change of the velocities.
-    fn finds(check: &str, activity: Activity, change: fn(Vec3) -> Vec3) {
+    /// True if a check detects a change of the velocities.
+    fn detects(check: &str, activity: Activity, change: fn(Vec3) -> Vec3) {
         let [before, after] = found(activity, change);
         assert!(before.is_empty(), "{before:?}");
         assert!(after.iter().any(|what| what.starts_with(check)), "{check}: {after:?}");
@@ -170,14 +171,14 @@ mod long_runs {
 
     #[test]
     fn planted_faults_are_found() {
-        finds("energy", Activity::Hanging, |v| 1.01 * v);
-        finds("momentum", Activity::Spinning, |v| v + Vec3::splat(1e-5));
-        finds("angular momentum", Activity::Spinning, |v| 0.997 * v);
+        detects("energy", Activity::Hanging, |v| 1.01 * v);
+        detects("momentum", Activity::Spinning, |v| v + Vec3::splat(1e-5));
+        detects("angular momentum", Activity::Spinning, |v| 0.997 * v);
     }
 
-    /// The bound of the mean energy, by leapfrog of one mode: mass and frequency 1, substeps z.
+    /// Compares the bound of the mean energy with leapfrog of one mode: mass and frequency 1, substeps z.
     #[test]
-    fn mean_energy_stays_below_what_leapfrog_conserves() {
+    fn mean_energy_stays_below_the_conserved_energy_of_leapfrog() {
         for z in [0.1_f64, 0.5, 1.0, 1.6] {
             let c = 2.0 * (z / 2.0).asin() / (z * (1.0 - z * z / 4.0).sqrt());
             let [mut x, mut v] = [0.6_f64, 0.8];

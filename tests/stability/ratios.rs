@@ -1,4 +1,4 @@
-//! Stiffness and mass that differ a million times in one body, and steps far above what is stable.
+//! Stiffness and mass ratios of a million in one body, and steps far above the stable limit.
 
 use glam::Vec3;
 
@@ -9,14 +9,14 @@ use crate::support::bodies::{Parts, Random, largest_difference};
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
-/// Damps all nodes at this rate, 1/s.
+/// Damps all nodes at this rate (1/s).
 pub fn damp(parts: &mut Parts, rate: f32) {
     for (damping, mass) in parts.node_dampings.iter_mut().zip(&parts.masses) {
         *damping = rate * mass;
     }
 }
 
-/// Holds the nodes of the block at x = 0.
+/// Pins the nodes of the block at x = 0.
 pub fn hold_side(parts: &mut Parts) {
     for (position, mass) in parts.positions.iter().zip(&mut parts.masses) {
         if position.x == 0.0 {
@@ -25,7 +25,7 @@ pub fn hold_side(parts: &mut Parts) {
     }
 }
 
-/// The largest error of a chain's stretch, over its largest stretch.
+/// Returns the largest error of a chain's stretch, relative to its largest stretch.
 fn stretch_error(parts: &Parts, watched: &Watched) -> f64 {
     let positions = watched.state().positions;
     let (mut load, mut worst, mut largest) = (0.0, 0.0_f64, 0.0_f64);
@@ -55,7 +55,7 @@ pub fn stiffness_in_a_chain(setup: &Setup) -> Outcome {
     Ok(format!("error {error:.1e}; {}", watched.figures()))
 }
 
-/// One spring in five of a block, against the rest shape in `f64`.
+/// One spring in five of a block, compared with the rest shape in `f64`.
 pub fn stiffness_in_a_block(setup: &Setup) -> Outcome {
     let mut parts = Parts::block([2, 2, 2], 0.05, 0.01, 40.0);
     parts.masses.fill(0.1);
@@ -91,7 +91,7 @@ pub fn masses(setup: &Setup) -> Outcome {
     Ok(format!("error {error:.1e}; {}", watched.figures()))
 }
 
-/// From steps that are stable to those that no number of substeps makes so.
+/// From stable steps to steps that no number of substeps makes stable.
 pub fn above_the_limit(setup: &Setup) -> Outcome {
     let mut refused = Vec::new();
     let mut figures = String::new();

@@ -1,4 +1,4 @@
-//! What a case is tried with, and how it can end.
+//! The parameters of a case, and its possible outcomes.
 
 use sinew::{Solver, Storage};
 
@@ -7,17 +7,17 @@ pub use crate::support::scene::{SOLVERS, STORAGES};
 /// s; a frame of a second is a legal request.
 pub const STEPS: [f32; 6] = [1e-5, 1e-4, 1e-3, 1.0 / 60.0, 0.1, 1.0];
 
-/// How much of a case is tried.
+/// The extent of a run.
 #[allow(dead_code, reason = "each program takes one")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tier {
-    /// In `cargo test`: fewer steps, and of the storages one for each step.
+    /// In `cargo test`: fewer steps, and one storage for each step.
     Quick,
-    /// All of it, in the bench.
+    /// Everything, in the bench.
     Full,
 }
 
-/// What a case is tried with. Whatever it does is done with one thread and with two.
+/// The parameters of a case. Each case runs with one thread and with two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     pub solver: Solver,
@@ -28,12 +28,12 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// So many steps as `duration` seconds take, within bounds.
+    /// Returns the number of steps in `duration` seconds, within bounds.
     pub fn steps(&self, duration: f64, least: usize, most: usize) -> usize {
         ((duration / f64::from(self.step)).ceil() as usize).clamp(least, most)
     }
 
-    /// One of two numbers, by the tier.
+    /// Returns one of two numbers, by tier.
     pub fn pick(&self, quick: usize, full: usize) -> usize {
         match self.tier {
             Tier::Quick => quick,
@@ -42,20 +42,20 @@ impl Setup {
     }
 }
 
-/// Why a case ended before its end.
+/// The reason why a case stopped early.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stop {
-    /// The solver is not there yet.
+    /// The solver is not available yet.
     Unsupported(String),
-    /// A step was refused, with nothing changed and for a reason.
+    /// A step was refused, without changes and with a reason.
     Refused(String),
-    /// A figure is larger than it may be.
+    /// A value exceeds its bound.
     Exceeds { what: String, figure: f64, bound: f64 },
-    /// Something else is not as it should be.
+    /// Another check failed.
     Fault(String),
 }
 
-/// What a passed case measured, or why it ended.
+/// The measurements of a passed case, or the reason for its failure.
 pub type Outcome = Result<String, Stop>;
 
 /// A line of the table.
@@ -69,7 +69,7 @@ pub fn fault<T>(what: impl Into<String>) -> Result<T, Stop> {
     Err(Stop::Fault(what.into()))
 }
 
-/// Whether a figure is at most what it may be; what is not a number is not.
+/// Checks that a value is at most its bound; NaN fails.
 pub fn at_most(what: &str, figure: f64, bound: f64) -> Result<(), Stop> {
     if figure <= bound {
         return Ok(());

@@ -1,23 +1,23 @@
-//! Where a body of springs hangs at rest, in `f64`: Newton's method with a line search on the total energy.
+//! The rest shape of a hanging body of springs, in `f64`: Newton's method with a line search on the total energy.
 
 use glam::{DMat3, DVec3};
 
 use crate::support::reference::Reference;
 
-/// The rest shape near the model's positions; pinned nodes stay.
+/// Returns the rest shape near the model's positions; pinned nodes stay.
 pub fn rest_shape(model: &Reference) -> Vec<DVec3> {
     let mut model = model.clone();
     let free: Vec<usize> = (0..model.masses.len()).filter(|&i| model.masses[i] > 0.0).collect();
     for _ in 0..200 {
         let forces = total_forces(&model);
         let right: Vec<f64> = free.iter().flat_map(|&node| forces[node].to_array()).collect();
-        let way = solve(stiffness_matrix(&model, &free), right);
+        let correction = solve(stiffness_matrix(&model, &free), right);
         let from = model.positions.clone();
         let energy = total_energy(&model);
         let mut share = 1.0;
         loop {
-            for (place, &node) in free.iter().enumerate() {
-                model.positions[node] = from[node] + share * DVec3::from_slice(&way[3 * place..]);
+            for (free_index, &node) in free.iter().enumerate() {
+                model.positions[node] = from[node] + share * DVec3::from_slice(&correction[3 * free_index..]);
             }
             if total_energy(&model) <= energy + 1e-14 * energy.abs() || share < 1e-9 {
                 break;
@@ -42,12 +42,12 @@ fn total_energy(model: &Reference) -> f64 {
     model.elastic() - weights.map(|(p, &mass)| mass * model.gravity.dot(*p)).sum::<f64>()
 }
 
-/// The stiffness of the free nodes, with what pressed springs take away left out: positive semidefinite, and the true
-/// one where none is pressed.
+/// Returns the stiffness of the free nodes without the negative terms of compressed springs: positive semidefinite, and
+/// exact if no spring is compressed.
 fn stiffness_matrix(model: &Reference, free: &[usize]) -> Vec<Vec<f64>> {
-    let mut place = vec![usize::MAX; model.masses.len()];
+    let mut free_index = vec![usize::MAX; model.masses.len()];
     for (index, &node) in free.iter().enumerate() {
-        place[node] = index;
+        free_index[node] = index;
     }
     let mut matrix = vec![vec![0.0; 3 * free.len()]; 3 * free.len()];
     for &([a, b], stiffness, rest_length) in &model.springs {
@@ -56,7 +56,7 @@ fn stiffness_matrix(model: &Reference, free: &[usize]) -> Vec<Vec<f64>> {
         let across = (1.0 - rest_length / length).max(0.0);
         let along = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
         let block = stiffness * (along + across * (DMat3::IDENTITY - along));
-        let ends = [place[a as usize], place[b as usize]];
+        let ends = [free_index[a as usize], free_index[b as usize]];
         for i in ends {
             for j in ends {
                 if i == usize::MAX || j == usize::MAX {
@@ -74,7 +74,7 @@ fn stiffness_matrix(model: &Reference, free: &[usize]) -> Vec<Vec<f64>> {
     matrix
 }
 
-/// By Cholesky's factors; `matrix` is symmetric and made positive definite by a trace of its diagonal.
+/// Solves by Cholesky factors; the symmetric `matrix` is made positive definite by a small multiple of its diagonal.
 fn solve(mut matrix: Vec<Vec<f64>>, mut vector: Vec<f64>) -> Vec<f64> {
     let size = vector.len();
     let least = (0..size).map(|i| matrix[i][i]).fold(f64::INFINITY, f64::min);

@@ -1,4 +1,4 @@
-//! The same body turned, mirrored, put together in another order, or far away: the same motion.
+//! The same body rotated, mirrored, reordered, or far away: the same motion.
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -11,11 +11,11 @@ use crate::support::bodies::{Parts, Random, largest_difference};
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
-/// Of the size of a body, what the same motion may differ by (rigid motion, in the table of accuracy).
+/// The allowed difference of equal motions, relative to the size of a body (rigid motion, in the table of accuracy).
 const SAME: f64 = 1e-6;
 
-/// What rounding makes of that over many substeps: a random walk of both bodies' positions, each step 0.29 of a last place
-/// of a quarter of a metre, four times its standard deviation.
+/// The rounding error over many substeps: a random walk of both bodies' positions. Each step has 0.29 of the last place
+/// of a quarter of a meter; the bound is four standard deviations.
 fn rounding(substeps: f64, size: f64) -> f64 {
     4.0 * 2.0_f64.sqrt() * 0.29 * 2.0_f64.powi(-26) * substeps.sqrt() / size
 }
@@ -62,7 +62,7 @@ fn tetrahedra(mesh: &Mesh) -> BodyDefinition<'_> {
     }
 }
 
-/// The tetrahedra in another order, each with its corners in another.
+/// Reorders the tetrahedra, and the corners of each.
 pub fn reordered(setup: &Setup) -> Outcome {
     let mesh = Mesh::block([0.15; 3], [3; 3]).expect("a block");
     let mut other = mesh.clone();
@@ -81,13 +81,13 @@ pub fn reordered(setup: &Setup) -> Outcome {
     compare(setup, &mesh, &other, |p| p)
 }
 
-/// Mirrored, every tetrahedron is inverted, and springs cannot know.
+/// Mirroring inverts every tetrahedron; springs do not depend on orientation.
 pub fn mirrored(setup: &Setup) -> Outcome {
     let mesh = Mesh::block([0.15; 3], [3; 3]).expect("a block");
     compare(setup, &mesh, &mesh, |p| p * DVec3::new(-1.0, 1.0, 1.0))
 }
 
-/// Two bodies whose motions are images of each other.
+/// Compares two bodies whose motions are images of each other.
 fn compare(setup: &Setup, mesh: &Mesh, other: &Mesh, image: fn(DVec3) -> DVec3) -> Outcome {
     let size = 0.15;
     let mut one = Watched::of(setup, &tetrahedra(mesh), Vec3::ZERO)?;
@@ -122,7 +122,7 @@ pub fn far_from_the_origin(setup: &Setup) -> Outcome {
     let offset = Vec3::new(10_000.0, -10_000.0, 10_000.0);
     let far = parts.moved(Quat::IDENTITY, offset);
     let mut near = Watched::new(setup, &parts, DOWN)?;
-    // What goes out is rounded to a millimetre: no state to keep a ledger of.
+    // Positions are returned with millimeter rounding: too coarse for a ledger.
     let mut far = Watched::new(setup, &far, DOWN)?.without_ledger();
     let rounding = 0.5 * f64::from(offset.x.next_up() - offset.x) * 3.0_f64.sqrt();
     let (mut worst, mut fastest) = (0.0_f64, 0.0_f64);
@@ -133,7 +133,7 @@ pub fn far_from_the_origin(setup: &Setup) -> Outcome {
         let expected: Vec<DVec3> = near.positions.iter().map(|p| *p + offset.as_dvec3()).collect();
         let error = largest_difference(&far.positions, &expected);
         at_most("difference of positions, m", error, rounding + SAME * parts.size())?;
-        // Velocities are not rounded on their way out.
+        // Velocities are not rounded on output.
         worst = worst.max(largest_difference(&far.velocities, &near.velocities));
         fastest = near.velocities.iter().map(|v| v.length()).fold(fastest, f64::max);
     }

@@ -1,4 +1,4 @@
-//! Pins, forces, tools and cuts as nobody should apply them, and somebody will.
+//! Extreme pins, forces, tools and cuts, as careless programs may apply them.
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -15,7 +15,7 @@ pub fn pin_let_go(setup: &Setup) -> Outcome {
     damp(&mut parts, 40.0);
     parts.masses[0] = 0.0;
     let mut watched = Watched::new(setup, &parts, Vec3::ZERO)?;
-    // To ten times its length, and there for a while.
+    // To ten times its length, where it stays for a while.
     watched.pin(5);
     watched.move_pin(5, Vec3::new(1.0, 0.1, 0.0));
     watched.run(setup.step, setup.steps(0.01, 2, 1000))?;
@@ -23,7 +23,7 @@ pub fn pin_let_go(setup: &Setup) -> Outcome {
     if !watched.settle(setup.step, 2.0)? {
         return Ok(watched.figures());
     }
-    // A chain of springs has no shape, but lengths.
+    // A chain of springs has no shape, only lengths.
     let state = watched.state();
     let stretch = state
         .positions
@@ -46,10 +46,10 @@ pub fn pin_jumps(setup: &Setup) -> Outcome {
     watched.move_pin(node, to);
     watched.step(setup.step)?;
     if watched.body().positions()[node] != to {
-        return fault("the pin is not where it was led");
+        return fault("the pin is not at its target");
     }
     watched.run(setup.step, setup.steps(3.0, 5, setup.pick(200, 2000)))?;
-    // Back as fast, and let go.
+    // Back at the same speed, then released.
     watched.move_pin(node, parts.positions[node]);
     watched.step(setup.step)?;
     watched.unpin(node);
@@ -67,26 +67,26 @@ pub fn pushed(setup: &Setup) -> Outcome {
     Ok(watched.figures())
 }
 
-/// A node that no spring holds.
+/// A node without springs.
 struct Flight {
     node: usize,
-    /// Where it was let go, m.
+    /// Where it was released (m).
     position: DVec3,
     velocity: DVec3,
-    /// When, s, and after how many substeps.
+    /// When it was released (s), and after how many substeps.
     time: f64,
     substeps: f64,
 }
 
 impl Flight {
-    /// Where it should be.
+    /// Returns the expected position.
     fn at(&self, time: f64) -> DVec3 {
         self.position + self.velocity * (time - self.time)
     }
 }
 
-/// The sum of the angular momenta of nodes about the origin, and what it is at most, N m s.
-fn turning(state: &State, masses: &[f32]) -> (DVec3, f64) {
+/// Returns the angular momentum of nodes about the origin, and the sum of its magnitudes (N m s).
+fn angular_momentum(state: &State, masses: &[f32]) -> (DVec3, f64) {
     let nodes = state.positions.iter().zip(&state.velocities).zip(masses);
     nodes.fold((DVec3::ZERO, 0.0), |(sum, size), ((p, v), &mass)| {
         let momentum = *v * f64::from(mass);
@@ -94,7 +94,7 @@ fn turning(state: &State, masses: &[f32]) -> (DVec3, f64) {
     })
 }
 
-/// Springs go while the body tumbles, those of one node all: it flies on straight.
+/// Springs are removed while the body tumbles, all springs of one node: the node flies straight on.
 pub fn springs_removed(setup: &Setup) -> Outcome {
     let parts = Parts::block([3, 2, 2], 0.05, 0.01, 100.0);
     let mut random = Random::new(41);
@@ -106,14 +106,14 @@ pub fn springs_removed(setup: &Setup) -> Outcome {
     watched.change(|body| body.set_velocities(&velocities));
     let first = momentum(&watched.state(), &parts.masses).0;
     let mut flights: Vec<Flight> = Vec::new();
-    let first_turning = turning(&watched.state(), &parts.masses).0;
+    let first_turning = angular_momentum(&watched.state(), &parts.masses).0;
     let lonely = 13;
-    let of_lonely = |pair: &[u32; 2]| pair.contains(&lonely);
+    let has_lonely = |pair: &[u32; 2]| pair.contains(&lonely);
     let mut left = parts.springs.clone();
     let (mut lost, mut lost_turning) = (0.0_f64, 0.0_f64);
     let (mut time, mut substeps) = (0.0, 0.0);
     for round in 0..30 {
-        let chosen = match left.iter().position(of_lonely) {
+        let chosen = match left.iter().position(has_lonely) {
             Some(index) => index,
             None => random.below(left.len()),
         };
@@ -123,7 +123,7 @@ pub fn springs_removed(setup: &Setup) -> Outcome {
             watched.remove_spring(left.swap_remove(random.below(left.len())));
         }
         let state = watched.state();
-        // Implicit formulas remember the forces of the step before.
+        // Implicit formulas use the forces of the step before.
         let straight = if setup.solver == Solver::Verlet {
             parts.masses.len()
         } else {
@@ -148,7 +148,8 @@ pub fn springs_removed(setup: &Setup) -> Outcome {
         let mut state = watched.state();
         let (sum, size) = momentum(&state, &parts.masses);
         lost = lost.max(sum.distance(first) / size);
-        // What flies alone is rounded alike in every substep, with all its momentum: that adds up, and is looked at by itself.
+        // A lone node is rounded alike in every substep, with all its momentum: the errors add up, and are checked
+        // separately.
         for flight in &flights {
             let (straight, position) = (flight.at(time), &mut state.positions[flight.node]);
             let reach = position.length().max(flight.position.length());
@@ -156,11 +157,11 @@ pub fn springs_removed(setup: &Setup) -> Outcome {
             at_most("way off a straight flight, m", position.distance(straight), rounded)?;
             *position = straight;
         }
-        let (sum, size) = turning(&state, &parts.masses);
+        let (sum, size) = angular_momentum(&state, &parts.masses);
         lost_turning = lost_turning.max(sum.distance(first_turning) / size);
     }
-    // Each node's velocity and sum of forces are rounded in every substep, a random walk: 2^-23 sqrt(n) is four times
-    // what 2e-7 of a node's momentum, in 36 nodes, leads to.
+    // Each node's velocity and sum of forces are rounded in every substep, a random walk. The bound 2^-23 sqrt(n) is
+    // four times the walk of 2e-7 of a node's momentum in 36 nodes.
     let same = (2.0_f64.powi(-23) * substeps.sqrt()).max(1e-6);
     at_most("momentum lost over that of the parts", lost, same)?;
     at_most("angular momentum lost over that of the parts", lost_turning, same)?;
@@ -169,10 +170,10 @@ pub fn springs_removed(setup: &Setup) -> Outcome {
     expected.sort_unstable();
     pairs.sort_unstable();
     if pairs != expected {
-        return fault("a spring is left that was removed, or lost that was not");
+        return fault("the springs are not the expected ones");
     }
 
-    // What goes on is a body that never had those springs.
+    // The remainder moves like a body that never had those springs.
     let mut other = parts.clone();
     let keep: Vec<bool> = parts.springs.iter().map(|pair| left.contains(pair)).collect();
     let mut kept = keep.iter();
@@ -201,7 +202,7 @@ pub fn springs_removed(setup: &Setup) -> Outcome {
     Ok(format!("momentum {lost:.1e}, angular {lost_turning:.1e}"))
 }
 
-/// The strain of the edges, RMS, and how many tetrahedra are inverted.
+/// Returns the RMS strain of the edges, and the number of inverted tetrahedra.
 fn recovery(mesh: &Mesh, positions: &[DVec3]) -> (f64, usize) {
     let edges = mesh.edges().expect("edges");
     let strain = |&[a, b]: &[u32; 2]| {
@@ -219,10 +220,10 @@ fn recovery(mesh: &Mesh, positions: &[DVec3]) -> (f64, usize) {
 }
 
 pub fn crushed(setup: &Setup) -> Outcome {
-    // From five sixths of its thickness it comes back; pressed harder, springs alone may buckle or fold.
+    // Compressed to five sixths of its thickness it recovers; compressed further, springs alone may buckle or fold.
     let little = crush(setup, 0.05)?;
     let flat = crush(setup, 1e-4)?;
-    if little.rests {
+    if little.came_to_rest {
         at_most("RMS strain left after a little pressing", little.strain, 1e-3)?;
         at_most(
             "tetrahedra inverted after a little pressing",
@@ -237,14 +238,14 @@ pub fn crushed(setup: &Setup) -> Outcome {
 }
 
 struct Crushed {
-    /// Whether it had the time to come to rest.
-    rests: bool,
+    /// True if it had time to come to rest.
+    came_to_rest: bool,
     strain: f64,
     inverted: usize,
     force: f64,
 }
 
-/// A block between two planes that come together to `gap`, stay, and go.
+/// Compresses a block between two planes that close to `gap`, stay, and retreat.
 fn crush(setup: &Setup, gap: f32) -> Result<Crushed, super::setup::Stop> {
     const THICKNESS: f32 = 0.06;
     let mesh = Mesh::block([THICKNESS; 3], [4; 3]).expect("a block");
@@ -297,8 +298,8 @@ fn crush(setup: &Setup, gap: f32) -> Result<Crushed, super::setup::Stop> {
         let thickness = heights().fold(f32::MIN, f32::max) - heights().fold(f32::MAX, f32::min);
         thinnest = thinnest.min(thickness);
         at_most("thickness over the gap", f64::from(thickness / next), 1.0 + 1e-3)?;
-        // Contact and friction only take: what the body has came from the planes, exact where the force is even over
-        // the step, and within the shadow energy of 0.8 of the limit where it is not.
+        // Contact and friction only dissipate: the planes did the work. The bound is exact where the force is constant
+        // over the step, else it includes the shadow energy at 0.8 of the limit.
         let state = watched.state();
         at_most(
             "energy, J",
@@ -307,12 +308,12 @@ fn crush(setup: &Setup, gap: f32) -> Result<Crushed, super::setup::Stop> {
         )?;
     }
     if thinnest <= 0.0 {
-        return fault("pressed to nothing");
+        return fault("compressed to zero thickness");
     }
-    let rests = watched.settle(setup.step, 2.0)?;
+    let came_to_rest = watched.settle(setup.step, 2.0)?;
     let (strain, inverted) = recovery(&mesh, &watched.state().positions);
     Ok(Crushed {
-        rests,
+        came_to_rest,
         strain,
         inverted,
         force: most,

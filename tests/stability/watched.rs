@@ -1,29 +1,29 @@
-//! A world that is watched: stepped with one thread and with two, and looked at after every step.
+//! A checked world: stepped with one thread and with two, and checked after every step.
 //!
-//! What happens between the substeps of a step is seen in a third world, which takes each of them as a step: the same
-//! motion, to the bit where nothing is given in other pieces.
+//! A third world takes each substep as a step, which makes the substeps observable. Its motion is bitwise identical if
+//! no input is divided differently.
 
 use glam::{DVec3, Vec3};
 use sinew::{Body, BodyDefinition, BodyId, Error, Solver, StepReport, Values, World, WorldDefinition};
 
-use super::ledger::{Done, Ledger, State};
+use super::ledger::{ExternalActions, Ledger, State};
 use super::setup::{Setup, Stop, fault};
 use crate::support::bodies::{FREE, Parts};
 use crate::support::reference::Reference;
 
-/// So many steps are taken with two threads as well.
+/// This many steps are taken with two threads as well.
 const STEPS_OF_BOTH: usize = 200;
 
-/// The state is hashed before and after each of the first steps, then once in so many.
+/// The state is hashed before and after each of the first steps, then once in this many.
 const STEPS_HASHED: usize = 20;
 
-/// So many nodes, together with the body, are worth waking a second thread.
+/// This many nodes, together with the body, are enough to use a second thread.
 const DUST: usize = 1024;
 
 struct Scene {
     world: World,
     id: BodyId,
-    /// Nodes that are held, and do nothing but wake threads.
+    /// Pinned nodes whose only purpose is to use several threads.
     dust: Option<BodyId>,
 }
 
@@ -59,14 +59,14 @@ impl Scene {
     }
 }
 
-/// One body, or two that are the same.
+/// One body, or two identical ones.
 pub struct Watched {
     pub setup: Setup,
     scenes: Vec<Scene>,
-    /// Of one substep a step; for VERLET.
+    /// With one substep per step; for VERLET.
     fine: Option<Scene>,
     ledger: Option<Ledger>,
-    done: Done,
+    done: ExternalActions,
     pins: Vec<bool>,
     masses: Vec<f64>,
     steps: usize,
@@ -91,7 +91,7 @@ impl Watched {
             Err(error) => return fault(format!("creation: {error}")),
             Ok(scene) => scene,
         };
-        // The same ids are good for both worlds.
+        // The ids are valid in both worlds.
         let bytes = first.world.save().expect("a snapshot");
         let second = Scene {
             world: World::load(&bytes, 2, None).expect("a world"),
@@ -117,7 +117,7 @@ impl Watched {
             )),
             scenes,
             fine,
-            done: Done::default(),
+            done: ExternalActions::default(),
             pins: masses.iter().map(|&mass| mass == 0.0).collect(),
             masses,
             steps: 0,
@@ -126,7 +126,7 @@ impl Watched {
         Ok(watched)
     }
 
-    /// Does without a ledger: a tool's work is not known from its mean force.
+    /// Disables the ledger: a tool's work cannot be computed from its mean force.
     pub fn without_ledger(mut self) -> Self {
         self.ledger = None;
         self.fine = None;
@@ -145,7 +145,7 @@ impl Watched {
         State::of(self.body(), self.world().gravity())
     }
 
-    /// Does the same to both worlds.
+    /// Applies a change to both worlds.
     pub fn change_worlds<T>(&mut self, change: impl Fn(&mut World) -> sinew::Result<T>) -> T {
         let mut results: Vec<T> = self
             .scenes
@@ -155,7 +155,7 @@ impl Watched {
         results.swap_remove(0)
     }
 
-    /// Changes the body; what it has then is what was put in.
+    /// Changes the body; its new energy counts as put in.
     pub fn change(&mut self, change: impl Fn(&mut Body) -> sinew::Result<()>) {
         for scene in self.scenes.iter_mut().chain(&mut self.fine) {
             change(scene.body_mut()).expect("a change");
@@ -180,7 +180,7 @@ impl Watched {
         self.change(|body| body.remove_spring(a, b));
     }
 
-    /// Leads a pin in the next step.
+    /// Moves a pin in the next step.
     pub fn move_pin(&mut self, node: usize, to: Vec3) {
         self.done.moves.push((node, to));
         for scene in &mut self.scenes {
@@ -188,7 +188,7 @@ impl Watched {
         }
     }
 
-    /// Pushes a node in the next step.
+    /// Applies a force to a node in the next step.
     pub fn push(&mut self, node: usize, force: Vec3) {
         self.done.pushes.push((node, force));
         for scene in &mut self.scenes {
@@ -196,13 +196,13 @@ impl Watched {
         }
     }
 
-    /// Steps by `dt`, and looks at everything that must hold after any step.
+    /// Steps by `dt`, and checks everything that must hold after any step.
     pub fn step(&mut self, dt: f32) -> Result<StepReport, Stop> {
         let before = self.state();
         let mut report = self.advance(dt)?;
         let done = std::mem::take(&mut self.done);
         if !self.follow(&before, &done, dt, report.substeps)? {
-            // A world of fixed substeps keeps to a limit that holds wherever the nodes are, until it has to look again.
+            // A world of fixed substeps uses a limit that holds for all positions, until it must compute a new one.
             self.rewind(&before, &done);
             report = self.advance(dt)?;
             if !self.follow(&before, &done, dt, report.substeps)? {
@@ -221,8 +221,8 @@ impl Watched {
             }
         }
         if let Some(ledger) = &mut self.ledger {
-            let booked = ledger.end_step(self.scenes[0].body(), &before, &after, &done, dt, &report);
-            booked.map_err(|stop| match stop {
+            let result = ledger.end_step(self.scenes[0].body(), &before, &after, &done, dt, &report);
+            result.map_err(|stop| match stop {
                 Stop::Fault(what) => Stop::Fault(format!("step {} of {dt} s: {what}", self.steps)),
                 Stop::Exceeds { what, figure, bound } => Stop::Exceeds {
                     what: format!("step {} of {dt} s: {what}", self.steps),
@@ -240,9 +240,9 @@ impl Watched {
         (0..count).try_for_each(|_| self.step(dt).map(drop))
     }
 
-    /// Steps a body that nothing is done to and that damping brings to rest in `duration` seconds: whether it had so long,
-    /// which in the quick tier it has not where steps are short. Of many steps the first are taken with all care, of those
-    /// that follow one in a hundred.
+    /// Steps an undisturbed body that damping brings to rest within `duration` seconds. Returns true if there was
+    /// enough time; in the quick tier short steps do not suffice. The first steps are checked in full, later ones once
+    /// in a hundred.
     pub fn settle(&mut self, dt: f32, duration: f64) -> Result<bool, Stop> {
         let needed = self.setup.steps(duration, 10, usize::MAX);
         let count = needed.min(self.setup.pick(8_000, usize::MAX));
@@ -263,8 +263,9 @@ impl Watched {
         self.ledger.as_ref().map(Ledger::figures).unwrap_or_default()
     }
 
-    /// Takes the substeps of a step one by one, and shows them to the ledger; whether it was taken so.
-    fn follow(&mut self, before: &State, done: &Done, dt: f32, substeps: u32) -> Result<bool, Stop> {
+    /// Takes the substeps of a step one by one and passes them to the ledger. Returns true if the step was taken this
+    /// way.
+    fn follow(&mut self, before: &State, done: &ExternalActions, dt: f32, substeps: u32) -> Result<bool, Stop> {
         let (Some(fine), Some(ledger)) = (&mut self.fine, &mut self.ledger) else {
             return Ok(true);
         };
@@ -273,8 +274,8 @@ impl Watched {
             let left = (1.0 - f64::from(index) / f64::from(substeps)) as f32;
             let body = fine.body_mut();
             for &(node, to) in &done.moves {
-                let way = to - before.positions[node].as_vec3();
-                body.move_pin(node as u32, to - way * left).expect("a pin");
+                let displacement = to - before.positions[node].as_vec3();
+                body.move_pin(node as u32, to - displacement * left).expect("a pin");
             }
             for &(node, force) in &done.pushes {
                 body.apply_force(node as u32, force).expect("a node");
@@ -297,7 +298,7 @@ impl Watched {
         Ok(true)
     }
 
-    /// Puts the world that takes single substeps where the others are, unless it is there.
+    /// Copies the state to the world that takes single substeps, unless it has that state.
     fn catch_up(&mut self) {
         if let Some(fine) = &mut self.fine {
             let body = self.scenes[0].body();
@@ -307,26 +308,26 @@ impl Watched {
         }
     }
 
-    /// Goes back to a state in all worlds, what was to be done to it pending.
-    fn rewind(&mut self, before: &State, done: &Done) {
+    /// Restores a state in all worlds, with the pending actions.
+    fn rewind(&mut self, before: &State, done: &ExternalActions) {
         let single = |vectors: &[DVec3]| -> Vec<Vec3> { vectors.iter().map(|v| v.as_vec3()).collect() };
         let (positions, velocities) = (single(&before.positions), single(&before.velocities));
         for scene in self.scenes.iter_mut().chain(&mut self.fine) {
             put(scene.body_mut(), &positions, &velocities);
         }
-        // What was refused keeps its forces.
+        // A refused step keeps its forces.
         if let Some(fine) = &mut self.fine {
             for &(node, force) in &done.pushes {
                 fine.body_mut().apply_force(node as u32, -force).expect("a node");
             }
         }
-        let Done { moves, pushes } = done.clone();
+        let ExternalActions { moves, pushes } = done.clone();
         moves.into_iter().for_each(|(node, to)| self.move_pin(node, to));
         pushes.into_iter().for_each(|(node, force)| self.push(node, force));
-        self.done = Done::default();
+        self.done = ExternalActions::default();
     }
 
-    /// Steps both worlds, which must do the same, or refuse with nothing changed.
+    /// Steps both worlds, which must agree, or refuse without changes.
     fn advance(&mut self, dt: f32) -> Result<StepReport, Stop> {
         if self.steps == STEPS_OF_BOTH {
             self.scenes.truncate(1);
@@ -341,7 +342,7 @@ impl Watched {
         let mut before = is_hashed.then(|| hashes(&self.scenes));
         let mut outcomes = step_all(&mut self.scenes, dt);
         if matches!(outcomes[0], Err(Error::Unstable { .. })) && before.is_none() {
-            // It is refused again, from a state that is known.
+            // The step is refused again, from a known state.
             before = Some(hashes(&self.scenes));
             outcomes = step_all(&mut self.scenes, dt);
         }
@@ -354,14 +355,14 @@ impl Watched {
                 .iter()
                 .any(|scene| shown(scene) != shown(&self.scenes[0]))
         {
-            return fault(format!("{name}: one thread and two do not agree"));
+            return fault(format!("{name}: one thread and two threads differ"));
         }
         match outcomes.swap_remove(0) {
             Ok(report) if report.bodies_restored > 0 => fault(format!("{name}: would not have been finite")),
             Ok(report) => Ok(report),
             Err(Error::Unstable { report, allowed }) => {
                 if before != after {
-                    return fault(format!("{name}: refused, and something has changed"));
+                    return fault(format!("{name}: a refused step changed the state"));
                 }
                 if self.setup.solver != Solver::Verlet {
                     return fault(format!("{name}: {:?} refuses", self.setup.solver));
@@ -390,7 +391,7 @@ impl Watched {
     }
 }
 
-/// Puts a body into a state, of which nothing is known any more.
+/// Sets the state of a body without history.
 fn put(body: &mut Body, positions: &[Vec3], velocities: &[Vec3]) {
     body.set_positions(positions).expect("positions");
     body.set_velocities(velocities).expect("velocities");
@@ -404,7 +405,7 @@ fn step_all(scenes: &mut [Scene], dt: f32) -> Vec<sinew::Result<StepReport>> {
     scenes.iter_mut().map(|scene| scene.world.step(dt)).collect()
 }
 
-/// The body in `f64`.
+/// Returns the body in `f64`.
 fn model(definition: &BodyDefinition, body: &Body, gravity: Vec3) -> Reference {
     assert!(matches!(definition.spring_dampings, Values::Uniform(_)));
     let rest = definition.rest_positions.unwrap_or(definition.positions);
@@ -433,7 +434,7 @@ fn model(definition: &BodyDefinition, body: &Body, gravity: Vec3) -> Reference {
     )
 }
 
-/// The sum of the momenta of free nodes, and of their sizes, N s.
+/// Returns the momentum of the free nodes, and the sum of its magnitudes (N s).
 pub fn momentum(state: &State, masses: &[f32]) -> (DVec3, f64) {
     let momenta = state.velocities.iter().zip(masses).map(|(v, &m)| *v * f64::from(m));
     momenta.fold((DVec3::ZERO, 0.0), |(sum, size), p| (sum + p, size + p.length()))

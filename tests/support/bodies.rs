@@ -1,11 +1,11 @@
-//! Bodies of springs for physics tests, owned by the test that changes them, and a world to step one in.
+//! Spring bodies for physics tests, owned by the test that changes them, and a world that steps one body.
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::{Body, BodyDefinition, BodyId, Solver, StepReport, Values, World, WorldDefinition};
 
 use super::reference::Reference;
 
-/// No gravity, one thread, substeps chosen by the library.
+/// Settings without gravity, with one thread and with substeps that the library chooses.
 pub const FREE: WorldDefinition = WorldDefinition {
     gravity: Vec3::ZERO,
     thread_count: 1,
@@ -16,7 +16,7 @@ pub const FREE: WorldDefinition = WorldDefinition {
     kernel: sinew::Kernel::Best,
 };
 
-/// A report to compare with another world's, whose bodies have other ids.
+/// Clears the body ids of a report, to compare it with the report of another world.
 pub fn without_ids(report: StepReport) -> StepReport {
     StepReport {
         substeps_body: None,
@@ -26,11 +26,11 @@ pub fn without_ids(report: StepReport) -> StepReport {
     }
 }
 
-/// What a body of springs is made of.
+/// The nodes and springs of a body.
 #[derive(Clone, Debug, Default)]
 pub struct Parts {
     pub positions: Vec<Vec3>,
-    /// 0: pinned.
+    /// kg; 0 pins the node.
     pub masses: Vec<f32>,
     pub node_dampings: Vec<f32>,
     pub springs: Vec<[u32; 2]>,
@@ -40,7 +40,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Nodes of equal mass without springs.
+    /// Returns nodes of equal mass without springs.
     pub fn nodes(positions: Vec<Vec3>, mass: f32) -> Self {
         let count = positions.len();
         Self {
@@ -51,7 +51,7 @@ impl Parts {
         }
     }
 
-    /// Adds a spring that is at rest where its nodes are now.
+    /// Adds a spring whose rest length is the current distance of its nodes.
     pub fn join(&mut self, a: usize, b: usize, stiffness: f32) {
         let length = self.positions[a].as_dvec3().distance(self.positions[b].as_dvec3());
         self.springs.push([a as u32, b as u32]);
@@ -59,7 +59,7 @@ impl Parts {
         self.rest_lengths.push(length as f32);
     }
 
-    /// Nodes in a row along `direction`, each joined to the next.
+    /// Returns a line of nodes along `direction`, each joined to the next.
     pub fn chain(count: usize, direction: Vec3, mass: f32, stiffness: f32) -> Self {
         let mut parts = Self::nodes((0..count).map(|i| direction * i as f32).collect(), mass);
         for i in 1..count {
@@ -68,8 +68,9 @@ impl Parts {
         parts
     }
 
-    /// A block of cubes with springs along their edges and the diagonals of their faces, shared as in an endless
-    /// lattice: each cube owns a quarter of its edges and half of its diagonals, an eighth of the mass at its corners.
+    /// Returns a block of cubes with springs along their edges and face diagonals. Masses and stiffnesses are shared as
+    /// in an infinite lattice: each cube owns a quarter of each edge, half of each diagonal and an eighth of the mass
+    /// at each corner.
     pub fn block(cells: [usize; 3], spacing: f32, node_mass: f32, stiffness: f32) -> Self {
         let node = |c: [usize; 3]| (c[2] * (cells[1] + 1) + c[1]) * (cells[0] + 1) + c[0];
         let mut positions = Vec::new();
@@ -108,14 +109,14 @@ impl Parts {
         parts
     }
 
-    /// The extent of the body along its longest axis, m.
+    /// Returns the extent of the body along its longest axis (m).
     pub fn size(&self) -> f64 {
         let low = self.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
         let high = self.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
         f64::from((high - low).max_element())
     }
 
-    /// The same body turned about the origin, then moved; rest lengths stay, to the bit.
+    /// Returns the body rotated about the origin, then moved. Its rest lengths are bitwise identical.
     pub fn moved(&self, rotation: Quat, offset: Vec3) -> Self {
         let mut moved = self.clone();
         for position in &mut moved.positions {
@@ -138,7 +139,7 @@ impl Parts {
         }
     }
 
-    /// The same body in `f64`.
+    /// Returns the same body in `f64`.
     pub fn reference(&self, gravity: Vec3) -> Reference {
         assert_eq!(self.spring_damping, 0.0, "the reference has no damping along springs");
         let springs = self.springs.iter().zip(&self.stiffnesses).zip(&self.rest_lengths);
@@ -173,7 +174,7 @@ impl Scene {
         self.world.body_mut(self.id).expect("the body")
     }
 
-    /// With the definition changed by `change`.
+    /// Creates the scene with the body definition that `change` returns.
     pub fn with(
         parts: &Parts,
         definition: WorldDefinition,
@@ -205,7 +206,7 @@ impl Scene {
         self.body().velocities().iter().map(|v| v.as_dvec3()).collect()
     }
 
-    /// Kinetic, elastic and gravitational, J.
+    /// Returns the sum of kinetic, elastic and gravitational energy (J).
     pub fn energy(&self) -> f64 {
         let energy = self.body().energy(self.world.gravity());
         energy.kinetic + energy.elastic + energy.gravitational
@@ -217,16 +218,16 @@ impl Scene {
     }
 }
 
-/// The longest distance between nodes of the same number, m.
+/// Returns the largest distance between nodes with the same index (m).
 pub fn largest_difference(a: &[DVec3], b: &[DVec3]) -> f64 {
     assert_eq!(a.len(), b.len());
-    let farthest = |largest: f64, (a, b): (&DVec3, &DVec3)| largest.max(a.distance(*b));
-    let largest = a.iter().zip(b).fold(0.0, farthest);
+    let larger = |largest: f64, (a, b): (&DVec3, &DVec3)| largest.max(a.distance(*b));
+    let largest = a.iter().zip(b).fold(0.0, larger);
     assert!(a.iter().all(|p| p.is_finite()), "a position is not finite");
     largest
 }
 
-/// Numbers that look random and are the same in every run.
+/// Deterministic pseudo-random numbers (SplitMix64).
 pub struct Random(u64);
 
 impl Random {
@@ -242,17 +243,17 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// From -1 up to 1.
+    /// Returns a number from -1 up to 1.
     pub fn signed(&mut self) -> f32 {
         (self.next() >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 
-    /// Below `count`.
+    /// Returns an index less than `count`.
     pub fn below(&mut self, count: usize) -> usize {
         (self.next() % count as u64) as usize
     }
 
-    /// In the cube from -1 to 1.
+    /// Returns a point of the cube from -1 to 1.
     pub fn vector(&mut self) -> Vec3 {
         Vec3::new(self.signed(), self.signed(), self.signed())
     }

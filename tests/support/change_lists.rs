@@ -1,4 +1,4 @@
-//! What a simulation and a renderer know of a body that is cut: they see it only when it is made, and then change lists.
+//! A copy of a cut body, as a simulation or a renderer keeps it: made once, then updated by change lists only.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,11 +22,11 @@ pub struct Follower {
     pub springs: BTreeMap<[u32; 2], Spring>,
     pub first_springs: BTreeMap<[u32; 2], f64>,
     pub triangles: Vec<[u32; 3]>,
-    /// Something that nodes and points carry: where they are in the rest shape.
+    /// An attribute that nodes and points carry: their position in the rest shape.
     pub carried: Vec<DVec3>,
     pub bound: BTreeMap<u32, ([u32; 4], [f64; 4])>,
     pub cell_sources: Vec<u32>,
-    /// The area or volume of each cell before any cut.
+    /// The area or volume of each cell before the first cut.
     pub first_sizes: Vec<f64>,
     pub deformation: fn(Vec3) -> Vec3,
 }
@@ -36,7 +36,8 @@ pub fn ordered(nodes: [u32; 2]) -> [u32; 2] {
 }
 
 impl Follower {
-    /// Of cells with their sizes: stiffness of springs by size and length, masses by size, both made uneven.
+    /// Creates a body from cells and their sizes. Stiffnesses follow size and length, masses follow size; both vary at
+    /// random.
     pub fn new<const N: usize>(
         rest: Vec<Vec3>,
         cells: &[([u32; N], f64)],
@@ -64,7 +65,7 @@ impl Follower {
             *stiffness *= 0.9 + 0.2 * random.next();
         }
         Self {
-            positions: rest.iter().map(|&place| deformation(place)).collect(),
+            positions: rest.iter().map(|&position| deformation(position)).collect(),
             first_masses: masses.clone(),
             masses,
             sources: (0..rest.len() as u32).collect(),
@@ -74,7 +75,7 @@ impl Follower {
                 .map(|(source, stiffness)| (source, Spring { stiffness, source }))
                 .collect(),
             triangles,
-            carried: rest.iter().map(|place| place.as_dvec3()).collect(),
+            carried: rest.iter().map(|position| position.as_dvec3()).collect(),
             bound: BTreeMap::new(),
             cell_sources: (0..cells.len() as u32).collect(),
             first_sizes: cells.iter().map(|&(_, size)| size).collect(),
@@ -83,7 +84,8 @@ impl Follower {
         }
     }
 
-    /// Takes over a change list, as a solver and a renderer do, after which there are so many nodes and triangles with these corners.
+    /// Applies a change list as a solver and a renderer do. The body then has `node_count` nodes and `triangle_count`
+    /// triangles with these corners.
     pub fn apply(
         &mut self,
         changes: &Changes,
@@ -96,7 +98,7 @@ impl Follower {
             let source = piece.source as usize;
             assert!(piece.part > 0.0);
             if piece.node != piece.source {
-                assert_eq!(piece.node as usize, self.masses.len(), "new nodes are numbered on");
+                assert_eq!(piece.node as usize, self.masses.len(), "new nodes are appended");
                 self.masses.push(0.0);
                 self.positions.push(self.positions[source]);
                 self.rest.push(self.rest[source]);
@@ -131,13 +133,13 @@ impl Follower {
             assert_eq!(self.cell_sources[piece.cell as usize], source);
         }
         for bound in &changes.bound {
-            let parts = || bound.nodes.iter().zip(bound.weights);
-            let place: DVec3 = parts()
+            let weighted_nodes = || bound.nodes.iter().zip(bound.weights);
+            let position: DVec3 = weighted_nodes()
                 .map(|(&node, weight)| weight * self.positions[node as usize].as_dvec3())
                 .sum();
             if bound.point as usize == self.masses.len() {
                 self.masses.push(0.0);
-                self.positions.push(place.as_vec3());
+                self.positions.push(position.as_vec3());
                 self.rest.push(Vec3::NAN);
                 self.sources.push(u32::MAX);
             }
@@ -145,23 +147,23 @@ impl Follower {
             self.bound.insert(bound.point, (bound.nodes, bound.weights));
         }
         assert_eq!(self.masses.len(), node_count as usize);
-        let known = self.carried.len();
+        let old_count = self.carried.len();
         self.carried.resize(self.masses.len(), DVec3::NAN);
         for source in &changes.sources {
-            assert!(source.point as usize >= known && self.carried[source.point as usize].is_nan());
+            assert!(source.point as usize >= old_count && self.carried[source.point as usize].is_nan());
             assert!(source.sources.iter().all(|&from| from < source.point));
-            let place = (0..3)
+            let position = (0..3)
                 .map(|k| source.weights[k] * self.carried[source.sources[k] as usize])
                 .sum();
-            self.carried[source.point as usize] = place;
+            self.carried[source.point as usize] = position;
         }
         for &node in &changes.undrawn {
-            assert!(node as usize >= known && self.carried[node as usize].is_nan());
+            assert!(node as usize >= old_count && self.carried[node as usize].is_nan());
             self.carried[node as usize] = self.rest[node as usize].as_dvec3();
         }
         assert!(
-            self.carried.iter().all(|place| !place.is_nan()),
-            "all that is new is told of"
+            self.carried.iter().all(|position| !position.is_nan()),
+            "the lists contain everything that is new"
         );
         assert_eq!(changes.first_triangle as usize, self.triangles.len());
         self.triangles.resize(triangle_count, [u32::MAX; 3]);
@@ -170,7 +172,7 @@ impl Follower {
         }
     }
 
-    /// Sum of the stiffness of a node's springs by its mass, of the worst node.
+    /// Returns the largest ratio of the stiffness of a node's springs to the mass of the node.
     pub fn worst_ratio(&self) -> f64 {
         let mut sums = vec![0.0; self.masses.len()];
         for (nodes, spring) in &self.springs {
@@ -185,7 +187,7 @@ impl Follower {
             .fold(0.0, f64::max)
     }
 
-    /// How many nodes there are beside points that are bound to others.
+    /// Returns the number of nodes without the points that are bound to others.
     pub fn nodes_that_move(&self) -> usize {
         self.masses.len() - self.bound.len()
     }
@@ -198,7 +200,7 @@ impl Follower {
         union.count() - self.bound.len()
     }
 
-    /// Each node has mass, and copies share that of their source.
+    /// Checks that each node has mass, and that copies share the mass of their source.
     pub fn check_masses(&self) {
         let mut masses = vec![0.0; self.first_masses.len()];
         for (mass, &source) in self.masses.iter().zip(&self.sources) {
@@ -212,10 +214,10 @@ impl Follower {
         }
     }
 
-    /// Springs lie along the cells' edges, and keep their stiffness in all.
+    /// Checks that springs lie along the edges of cells, and that their total stiffness is unchanged.
     pub fn check_springs<const N: usize>(&self, cells: impl Iterator<Item = [u32; N]>, edges: &[[usize; 2]]) {
-        let of_cell = |nodes: [u32; N]| edges.iter().map(move |edge| ordered(edge.map(|k| nodes[k])));
-        let edges: BTreeSet<[u32; 2]> = cells.flat_map(of_cell).collect();
+        let cell_edges = |nodes: [u32; N]| edges.iter().map(move |edge| ordered(edge.map(|k| nodes[k])));
+        let edges: BTreeSet<[u32; 2]> = cells.flat_map(cell_edges).collect();
         assert!(
             edges.iter().eq(self.springs.keys()),
             "springs lie along the edges of cells"
@@ -232,7 +234,7 @@ impl Follower {
     }
 }
 
-/// Which things hang together.
+/// Disjoint sets: finds connected components.
 pub struct Union(Vec<u32>);
 
 impl Union {

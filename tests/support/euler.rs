@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::bodies::{Parts, Random};
 
-/// A block with one spring in five stiffer by `contrast`, clamped at one end.
+/// Returns a block that is clamped at one end. One spring in five is stiffer by the factor `contrast`.
 pub fn uneven_block(contrast: f32) -> Parts {
     let mut parts = Parts::block([4, 3, 3], 0.05, 0.002, 20.0);
     let mut random = Random::new(11);
@@ -21,11 +21,11 @@ pub fn uneven_block(contrast: f32) -> Parts {
     parts
 }
 
-/// The first step of implicit Euler in `f64`: Newton's method with dense elimination, to the last digit.
+/// Computes the first step of implicit Euler in `f64`, by Newton's method with dense elimination, to rounding error.
 pub fn euler_step(parts: &Parts, gravity: DVec3, h: f64) -> Vec<DVec3> {
     let start: Vec<DVec3> = parts.positions.iter().map(|p| p.as_dvec3()).collect();
     let free: Vec<usize> = (0..start.len()).filter(|&node| parts.masses[node] > 0.0).collect();
-    let place: Vec<Option<usize>> = (0..start.len())
+    let row_of: Vec<Option<usize>> = (0..start.len())
         .map(|node| free.iter().position(|&f| f == node))
         .collect();
     let size = 3 * free.len();
@@ -34,28 +34,28 @@ pub fn euler_step(parts: &Parts, gravity: DVec3, h: f64) -> Vec<DVec3> {
         let mut matrix = vec![vec![0.0; size + 1]; size];
         for (index, &node) in free.iter().enumerate() {
             let inertia = f64::from(parts.masses[node]) / (h * h);
-            let lacking = gravity * f64::from(parts.masses[node]) - (now[node] - start[node]) * inertia;
+            let residual = gravity * f64::from(parts.masses[node]) - (now[node] - start[node]) * inertia;
             for axis in 0..3 {
                 matrix[3 * index + axis][3 * index + axis] += inertia;
-                matrix[3 * index + axis][size] += lacking[axis];
+                matrix[3 * index + axis][size] += residual[axis];
             }
         }
         for ((&[a, b], &k), &rest) in parts.springs.iter().zip(&parts.stiffnesses).zip(&parts.rest_lengths) {
             let [a, b] = [a as usize, b as usize];
             let (k, rest) = (f64::from(k), f64::from(rest));
-            let way = now[b] - now[a];
-            let (length, direction) = (way.length(), way.normalize());
+            let offset = now[b] - now[a];
+            let (length, direction) = (offset.length(), offset.normalize());
             let force = direction * (k * (length - rest));
-            let across = k * (1.0 - rest / length);
+            let transverse = k * (1.0 - rest / length);
             for (node, sign) in [(a, 1.0), (b, -1.0)] {
-                let Some(row) = place[node] else { continue };
+                let Some(row) = row_of[node] else { continue };
                 for i in 0..3 {
                     matrix[3 * row + i][size] += sign * force[i];
                     for (other, other_sign) in [(a, 1.0), (b, -1.0)] {
-                        let Some(column) = place[other] else { continue };
+                        let Some(column) = row_of[other] else { continue };
                         for j in 0..3 {
-                            let unit = if i == j { across } else { 0.0 };
-                            let entry = (k - across) * direction[i] * direction[j] + unit;
+                            let unit = if i == j { transverse } else { 0.0 };
+                            let entry = (k - transverse) * direction[i] * direction[j] + unit;
                             matrix[3 * row + i][3 * column + j] += sign * other_sign * entry;
                         }
                     }
@@ -73,7 +73,7 @@ pub fn euler_step(parts: &Parts, gravity: DVec3, h: f64) -> Vec<DVec3> {
     now
 }
 
-/// Solves a system whose right-hand side is the last column.
+/// Solves a linear system whose right-hand side is the last column.
 fn eliminate(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
     let size = rows.len();
     for pivot in 0..size {
@@ -90,8 +90,8 @@ fn eliminate(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
     }
     let mut solution = vec![0.0; size];
     for row in (0..size).rev() {
-        let known: f64 = (row + 1..size).map(|column| rows[row][column] * solution[column]).sum();
-        solution[row] = (rows[row][size] - known) / rows[row][row];
+        let known_terms: f64 = (row + 1..size).map(|column| rows[row][column] * solution[column]).sum();
+        solution[row] = (rows[row][size] - known_terms) / rows[row][row];
     }
     solution
 }

@@ -1,6 +1,6 @@
 //! Blocks that hang from each other.
 
-#![allow(dead_code, reason = "every test takes a part of it")]
+#![allow(dead_code, reason = "each test uses some of these helpers")]
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
@@ -12,7 +12,7 @@ pub const SIZE: f32 = 0.04;
 pub const HEIGHT: f32 = 0.02;
 pub const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
-/// What a block is like.
+/// The parameters of a block.
 #[derive(Clone, Copy)]
 pub struct Block {
     pub at: Vec3,
@@ -26,7 +26,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// Without damping.
+    /// A block without damping.
     pub const FREE: Self = Self {
         drag: 0.0,
         ..Self::CALM
@@ -63,9 +63,11 @@ impl Block {
     }
 }
 
-/// The nodes that are somewhere when a mesh is at rest.
-pub fn nodes_at(mesh: &Mesh, is_one: impl Fn(Vec3) -> bool) -> Vec<u32> {
-    let nodes = (0..).zip(&mesh.positions).filter(|(_, position)| is_one(**position));
+/// Returns the nodes whose rest position satisfies `is_one`.
+pub fn nodes_at(mesh: &Mesh, is_selected: impl Fn(Vec3) -> bool) -> Vec<u32> {
+    let nodes = (0..)
+        .zip(&mesh.positions)
+        .filter(|(_, position)| is_selected(**position));
     nodes.map(|(node, _)| node).collect()
 }
 
@@ -73,7 +75,7 @@ pub fn anchors(nodes: &[u32]) -> Vec<Anchor> {
     nodes.iter().copied().map(Anchor::Node).collect()
 }
 
-/// A block that hangs by some nodes of its top from the bottom of another, whose top is pinned.
+/// A lower block attached to the bottom of an upper block by nodes of its top. The top of the upper block is pinned.
 pub struct Hanging {
     pub world: World,
     pub above: BodyId,
@@ -100,18 +102,18 @@ impl Hanging {
         };
         let meshes = [above.mesh(), below.mesh()];
         let bodies = [above.put(&mut world), below.put(&mut world)];
-        let pinned = nodes_at(&meshes[0], |place| place.y > HEIGHT - 1e-4);
+        let pinned = nodes_at(&meshes[0], |position| position.y > HEIGHT - 1e-4);
         pin_all(&mut world, bodies[0], &pinned);
-        let corner = |place: Vec3| place.x.abs() > half - 1e-4 && place.z.abs() > half - 1e-4;
-        let chosen = |place: Vec3| {
-            place.y.abs() < 1e-4
+        let is_corner = |position: Vec3| position.x.abs() > half - 1e-4 && position.z.abs() > half - 1e-4;
+        let is_attached = |position: Vec3| {
+            position.y.abs() < 1e-4
                 && match count {
-                    1 => place.x.abs() < 1e-4 && place.z.abs() < 1e-4,
-                    4 => corner(place),
+                    1 => position.x.abs() < 1e-4 && position.z.abs() < 1e-4,
+                    4 => is_corner(position),
                     _ => true,
                 }
         };
-        let [first, second] = [0, 1].map(|index| nodes_at(&meshes[index], chosen));
+        let [first, second] = [0, 1].map(|index| nodes_at(&meshes[index], is_attached));
         assert_eq!([first.len(), second.len()], [count; 2]);
         let ids = world
             .attach_to_body(bodies[1], &anchors(&second), bodies[0], &anchors(&first), 0.0)
@@ -128,8 +130,8 @@ impl Hanging {
 
     pub fn drift(&self) -> f32 {
         let [above, below] = [self.above, self.below].map(|id| body(&self.world, id).positions());
-        let apart = |&[a, b]: &[u32; 2]| above[a as usize].distance(below[b as usize]);
-        self.pairs.iter().map(apart).fold(0.0, f32::max)
+        let gap = |&[a, b]: &[u32; 2]| above[a as usize].distance(below[b as usize]);
+        self.pairs.iter().map(gap).fold(0.0, f32::max)
     }
 
     pub fn force(&self) -> DVec3 {

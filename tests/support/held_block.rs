@@ -1,4 +1,4 @@
-//! A block of 7 x 2.5 x 7 cm that is held below, in a world without gravity, to press a tool into.
+//! A block of 7 x 2.5 x 7 cm with a pinned bottom, in a world without gravity, into which tools press.
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
@@ -9,7 +9,7 @@ use super::tissue::pin_all;
 
 pub const CELL: f32 = 0.005;
 const CELLS: [u32; 3] = [14, 5, 14];
-/// Of its upper side, m.
+/// The height of its upper side (m).
 pub const TOP: f32 = 0.5 * CELL * CELLS[1] as f32;
 
 pub const ELEMENTS: Material = Material {
@@ -20,7 +20,7 @@ pub const ELEMENTS: Material = Material {
     thickness: 0.0,
 };
 
-/// The block by a definition that is made of one without matter and the mass of each node, kg.
+/// Creates the block. `with` completes a definition without material, and takes the mass of each node (kg).
 pub fn held_block_with(
     with: impl for<'a> FnOnce(BodyDefinition<'a>, f32) -> BodyDefinition<'a>,
 ) -> (World, BodyId, Mesh) {
@@ -38,11 +38,11 @@ pub fn held_block_with(
         ..BodyDefinition::of(&mesh)
     };
     let body = world.create_body(&with(definition, node_mass)).expect("a body");
-    pin_all(&mut world, body, &nodes_at(&mesh, |place| place.y < -0.99 * TOP));
+    pin_all(&mut world, body, &nodes_at(&mesh, |position| position.y < -0.99 * TOP));
     (world, body, mesh)
 }
 
-/// The block of elements, or of springs of 50 N/m.
+/// Creates the block from finite elements, or from springs of 50 N/m.
 pub fn held_block(elements: bool, solver: Solver) -> (World, BodyId, Mesh) {
     held_block_with(|definition, node_mass| match elements {
         true => BodyDefinition {

@@ -1,7 +1,7 @@
-//! What the tests share: the library as it is delivered, how programs beside cargo are run, bodies and their motion in
-//! `f64`.
+//! Helpers that tests and benchmarks share: builds of the library, running external programs, bodies and their motion
+//! in `f64`.
 
-#![allow(dead_code, reason = "every test takes a part of it")]
+#![allow(dead_code, reason = "each test uses some of these helpers")]
 
 pub mod bodies;
 pub mod change_lists;
@@ -30,24 +30,24 @@ pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Where what the tests and benches have to tell is written.
+/// Returns the folder for the reports of tests and benchmarks.
 pub fn report_folder() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("report")
 }
 
-/// Writes a section of `pending.md`, the list of what is not there yet; those of other tests stay.
+/// Replaces one section of `pending.md`, the list of missing features. Sections of other tests remain.
 pub fn report_pending(title: &str, lines: &[String]) {
     let folder = report_folder();
     let path = folder.join("pending.md");
     let head = format!("# {title}\n");
-    let said = std::fs::read_to_string(&path).unwrap_or_default();
-    let others = said
+    let old_text = std::fs::read_to_string(&path).unwrap_or_default();
+    let others = old_text
         .split_inclusive('\n')
-        .scan(false, |ours, line| {
+        .scan(false, |is_ours, line| {
             if line.starts_with("# ") {
-                *ours = line == head;
+                *is_ours = line == head;
             }
-            Some((!*ours).then_some(line))
+            Some((!*is_ours).then_some(line))
         })
         .flatten();
     let text: String = others.map(str::to_owned).chain([head.clone(), "\n".into()]).collect();
@@ -56,25 +56,25 @@ pub fn report_pending(title: &str, lines: &[String]) {
     std::fs::write(&path, format!("{text}{list}\n")).expect("a report");
 }
 
-/// Says past the test harness's capture, so that it is seen, what was not tested.
+/// Reports a skipped test on stderr. The test harness does not capture it.
 pub fn skip(what: &str) {
-    // In one piece, whatever other tests write.
+    // One write, so that output of other tests cannot split the line.
     let _ = std::io::stderr().write_all(format!("SKIPPED: {what}\n").as_bytes());
 }
 
-/// Whether a program can be run here.
+/// Returns true if a program can be run here.
 pub fn installed(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok()
 }
 
-/// cargo, in the crate's own folder.
+/// Returns a cargo command that runs in the root folder of the crate.
 pub fn cargo() -> Command {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.current_dir(root());
     cargo
 }
 
-/// What a command says that does not succeed.
+/// Returns the output of a command that fails.
 pub fn failure(command: &mut Command) -> Option<String> {
     match command.output() {
         Ok(output) if output.status.success() => None,
@@ -88,7 +88,7 @@ pub fn failure(command: &mut Command) -> Option<String> {
     }
 }
 
-/// A command that must succeed; its output.
+/// Runs a command that must succeed, and returns its output.
 pub fn succeed(command: &mut Command) -> Output {
     match command.output() {
         Ok(output) if output.status.success() => output,
@@ -96,38 +96,38 @@ pub fn succeed(command: &mut Command) -> Output {
     }
 }
 
-/// The folder that cargo builds in.
+/// Returns the folder that cargo builds in.
 fn target() -> &'static Path {
     Path::new(env!("CARGO_TARGET_TMPDIR"))
         .parent()
         .expect("the target folder")
 }
 
-/// The library as programs in C link it.
+/// The library as C programs link it.
 pub struct Library {
-    /// The folder that holds it under all its names.
+    /// The folder that holds the library under all its names.
     pub folder: PathBuf,
-    /// What a program linked to the static library needs beside it.
+    /// The native libraries that a program needs if it links the static library.
     pub native_libraries: Vec<String>,
 }
 
 impl Library {
-    /// What `cargo test` built for the tests, with its assertions.
+    /// Returns the library that `cargo test` built for the tests, with its assertions.
     pub fn get() -> &'static Self {
         static LIBRARY: OnceLock<Library> = OnceLock::new();
-        // Of an example, cargo takes the library that the tests have; by itself it would be built again, as what only tests depend on
-        // may choose other features of what the library depends on.
+        // Building an example reuses the library of the tests. A plain build compiles it again, because
+        // dev-dependencies can select other features of shared dependencies.
         let profile: &[&str] = if cfg!(debug_assertions) { &[] } else { &["--release"] };
         LIBRARY.get_or_init(|| Self::build("tested", target(), &[&["--example", "cloth"], profile].concat()))
     }
 
-    /// The release build, as it is delivered. It takes minutes: for long tests.
+    /// Returns the release build, as it is delivered. It takes minutes and is for long tests.
     pub fn release() -> &'static Self {
         static LIBRARY: OnceLock<Library> = OnceLock::new();
         LIBRARY.get_or_init(|| Self::build("release", target(), &["--release", "--lib"]))
     }
 
-    /// With the feature `allocator`, apart from the others, and hardly optimised: it takes a minute.
+    /// Returns a build with the feature `allocator` in a separate folder, with little optimization. It takes a minute.
     pub fn with_allocator() -> &'static Self {
         static LIBRARY: OnceLock<Library> = OnceLock::new();
         let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("with_allocator");
@@ -148,7 +148,8 @@ impl Library {
         self.folder.join("libsinew.a")
     }
 
-    /// By cargo, which knows best whether there is anything to build: what is in `target/` may be of another build.
+    /// Builds the library with cargo. A file in `target/` can come from another build, so only cargo can decide what to
+    /// rebuild.
     fn build(name: &str, target: &Path, options: &[&str]) -> Self {
         let scratch = Path::new(env!("CARGO_TARGET_TMPDIR"));
         let output = succeed(
@@ -157,8 +158,8 @@ impl Library {
                 .arg(target)
                 .args(options),
         );
-        let told = String::from_utf8_lossy(&output.stdout);
-        // The crate brings no native libraries of its own: they are those of a crate with nothing in it.
+        let messages = String::from_utf8_lossy(&output.stdout);
+        // The crate adds no native libraries. Those of an empty crate are complete.
         let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
         let output = succeed(
             Command::new(rustc)
@@ -168,11 +169,11 @@ impl Library {
                 .arg("-")
                 .stdin(Stdio::null()),
         );
-        let said = String::from_utf8_lossy(&output.stderr);
-        let native_libraries = said
+        let text = String::from_utf8_lossy(&output.stderr);
+        let native_libraries = text
             .lines()
             .find_map(|line| line.split_once("native-static-libs: "))
-            .unwrap_or_else(|| panic!("rustc names the native libraries:\n{said}"))
+            .unwrap_or_else(|| panic!("rustc names the native libraries:\n{text}"))
             .1
             .split_whitespace()
             .map(str::to_owned)
@@ -193,10 +194,10 @@ impl Library {
             ),
             ("libsinew.a", "libsinew.a"),
         ] {
-            let mut files = told.split('"').filter(|word| word.ends_with(&format!("/{built}")));
+            let mut files = messages.split('"').filter(|word| word.ends_with(&format!("/{built}")));
             let file = files
                 .next_back()
-                .unwrap_or_else(|| panic!("cargo names {built}:\n{told}"));
+                .unwrap_or_else(|| panic!("cargo names {built}:\n{messages}"));
             let link = folder.join(name);
             let _ = std::fs::remove_file(&link);
             std::os::unix::fs::symlink(file, &link).expect("a link to the library");

@@ -1,4 +1,4 @@
-//! Motions that are known in closed form, and the exact solutions of the implicit formulas, in `f64`.
+//! Motions with closed-form solutions, and exact solutions of the implicit formulas, in `f64`.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use super::bodies::{Parts, Scene};
 pub const REST: f32 = 0.1;
 pub const STRETCH: f64 = 0.05;
 
-/// Two masses, 1 and 3 kg, joined by a spring that is stretched; the mass that moves between them.
+/// Returns two masses, 1 and 3 kg, joined by a stretched spring, and their reduced mass (kg).
 pub fn two_masses() -> (Parts, f64) {
     let mut parts = Parts::nodes(vec![Vec3::ZERO, Vec3::X * (REST + STRETCH as f32)], 1.0);
     parts.join(0, 1, 100.0);
@@ -23,13 +23,14 @@ pub fn omega() -> f64 {
     (100.0_f64 / 0.75).sqrt()
 }
 
-/// How far the spring is stretched, and how fast that grows.
+/// Returns the elongation of the spring and its rate.
 pub fn stretch(scene: &Scene) -> (f64, f64) {
     let (x, v) = (scene.positions(), scene.velocities());
     (x[1].x - x[0].x - f64::from(REST), v[1].x - v[0].x)
 }
 
-/// A mode of a linear body, `q'' + rate q' + omega² q = push`, stepped by the implicit formulas: order 1 at first.
+/// A mode of a linear body, `q'' + rate q' + omega² q = push`, stepped by the implicit formulas. The first step is of
+/// order 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Mode {
     pub omega_squared: f64,
@@ -41,7 +42,7 @@ pub struct Mode {
 }
 
 impl Mode {
-    /// At the displacement `q`, with the velocity `v`.
+    /// Creates a mode with the displacement `q` and the velocity `v`.
     pub fn new(omega: f64, rate: f64, q: f64, v: f64) -> Self {
         Self {
             omega_squared: omega * omega,
@@ -72,18 +73,18 @@ impl Mode {
     }
 }
 
-/// `angle` plus the whole turns that bring it nearest to `expected`.
+/// Returns `angle` plus the whole turns that bring it nearest to `expected`.
 pub fn unwrapped(angle: f64, expected: f64) -> f64 {
     angle + TAU * ((expected - angle) / TAU).round()
 }
 
-/// Half the distance between neighbouring `f32` about `value`.
+/// Returns half the distance between neighboring `f32` values at `value`.
 pub fn rounding(value: f64) -> f64 {
     let value = (value as f32).abs();
     f64::from(value.next_up() - value) / 2.0
 }
 
-/// A chain along x with fixed ends and `free` nodes between them.
+/// Returns a chain along x with fixed ends and `free` nodes between them.
 pub fn fixed_chain(free: usize, spacing: f32, mass: f32, stiffness: f32) -> Parts {
     let mut parts = Parts::chain(free + 2, Vec3::X * spacing, mass, stiffness);
     parts.masses[0] = 0.0;
@@ -96,7 +97,7 @@ pub fn fixed_chain(free: usize, spacing: f32, mass: f32, stiffness: f32) -> Part
 pub struct Waves {
     pub parts: Parts,
     spacing: f64,
-    /// Per node.
+    /// Radians per node.
     wave_number: f64,
     /// sqrt(k/m), 1/s.
     rate: f64,
@@ -129,7 +130,8 @@ impl Waves {
         scene.body_mut().set_velocities(&velocities).expect("velocities");
     }
 
-    /// The speed after `t` seconds, of what the middle `count` nodes show, and the one it should be, dispersion allowed for.
+    /// Returns the wave speed after `t` seconds, measured at the middle `count` nodes, and the expected speed with
+    /// dispersion.
     pub fn speed(&self, scene: &Scene, t: f64, count: usize) -> (f64, f64) {
         let (mut cosine, mut sine) = (0.0, 0.0);
         let first = (self.parts.positions.len() - count) / 2;
@@ -174,7 +176,7 @@ impl Pendulum {
         }
     }
 
-    /// 2 pi sqrt(L/g) / AGM(1, cos(theta0/2)), and what the spring lengthens it by.
+    /// Returns 2 pi sqrt(L/g) / AGM(1, cos(theta0/2)), corrected for the elongation of the spring.
     pub fn period(&self) -> f64 {
         let mean = arithmetic_geometric_mean(1.0, (self.start / 2.0).cos());
         let gravity = f64::from(self.gravity);
@@ -182,7 +184,7 @@ impl Pendulum {
     }
 }
 
-/// The mean period of an oscillation about zero over three periods, from samples `h` apart.
+/// Returns the mean period of an oscillation about zero over three periods, from samples at intervals of `h`.
 pub fn period_of(h: f64, mut sample: impl FnMut() -> f64) -> f64 {
     let mut crossings = Vec::new();
     let (mut before, mut t) = (sample(), h);

@@ -1,4 +1,4 @@
-//! A body as organs are: uneven tetrahedra, masses by volume, springs along the edges, a part of it held.
+//! Organ-like bodies: uneven tetrahedra, masses by volume, springs along the edges, one side held.
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
@@ -9,8 +9,8 @@ use super::bodies::Parts;
 /// kg/m³
 const DENSITY: f32 = 1060.0;
 
-/// A liver-like body of this length and edge, m, held at its left side; its springs as stiff as tissue of Young's modulus
-/// `young`, Pa, roughly makes them.
+/// Returns a liver-like body of this length and edge length (m), held at its left side. Its spring stiffnesses
+/// approximate tissue of Young's modulus `young` (Pa).
 pub fn organ(length: f32, spacing: f32, young: f32) -> Parts {
     let mesh = Mesh::organ(length, spacing).expect("an organ");
     let mut parts = Parts::nodes(mesh.positions.clone(), 0.0);
@@ -22,7 +22,7 @@ pub fn organ(length: f32, spacing: f32, young: f32) -> Parts {
         }
     }
     for [a, b] in mesh.edges().expect("edges") {
-        // A spring stands for about so much of the tissue about it as its length is across.
+        // A spring represents tissue of a cross-section of about its length squared.
         let length = parts.positions[a as usize].distance(parts.positions[b as usize]);
         parts.join(a as usize, b as usize, 0.4 * young * length);
     }
@@ -35,7 +35,7 @@ pub fn organ(length: f32, spacing: f32, young: f32) -> Parts {
     parts
 }
 
-/// The tetrahedra of a mesh as elements of this Young's modulus, Pa, Poisson's ratio and density, kg/m³.
+/// Defines the tetrahedra of a mesh as elements of this Young's modulus (Pa), Poisson's ratio and density (kg/m³).
 pub fn of_elements(mesh: &Mesh, [young_modulus, poisson_ratio, density]: [f32; 3]) -> BodyDefinition<'_> {
     BodyDefinition {
         material: Some(Material {
@@ -49,7 +49,7 @@ pub fn of_elements(mesh: &Mesh, [young_modulus, poisson_ratio, density]: [f32; 3
     }
 }
 
-/// A square of cloth, held at two corners.
+/// Returns a square cloth, held at two corners.
 pub fn cloth(size: f32, cells: u32, mass: f32, stiffness: f32) -> Parts {
     let mesh = Mesh::cloth([size; 2], [cells; 2]).expect("a cloth");
     let count = mesh.positions.len();
@@ -62,13 +62,13 @@ pub fn cloth(size: f32, cells: u32, mass: f32, stiffness: f32) -> Parts {
     parts
 }
 
-/// How far the free nodes of two states are apart, RMS, m.
+/// Returns the RMS distance between the nodes of two states (m).
 pub fn rms(a: &[glam::DVec3], b: &[glam::DVec3]) -> f64 {
     let squares: f64 = a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum();
     (squares / a.len() as f64).sqrt()
 }
 
-/// Earth's gravity, or a part of it.
+/// Returns `part` times Earth's gravity.
 pub fn gravity(part: f32) -> Vec3 {
     Vec3::new(0.0, -9.81 * part, 0.0)
 }

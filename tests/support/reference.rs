@@ -1,19 +1,19 @@
-//! The motion of masses and springs in `f64`, written from the equations alone: what VERLET would do without rounding.
+//! The motion of masses and springs in `f64`, written directly from the equations: VERLET without rounding.
 
 use glam::DVec3;
 
 /// Two nodes, stiffness, rest length.
 pub type Spring = ([u32; 2], f64, f64);
 
-/// Masses, springs and node damping under leapfrog with kept velocities.
+/// Masses, springs and node damping, integrated by leapfrog with stored velocities.
 #[derive(Clone, Debug)]
 pub struct Reference {
     pub positions: Vec<DVec3>,
     pub velocities: Vec<DVec3>,
     pub springs: Vec<Spring>,
-    /// N, constant.
+    /// Constant forces (N).
     pub applied: Vec<DVec3>,
-    /// kg, 0: held.
+    /// kg; 0 holds the node.
     pub masses: Vec<f64>,
     pub node_dampings: Vec<f64>,
     pub gravity: DVec3,
@@ -39,7 +39,7 @@ impl Reference {
         }
     }
 
-    /// Of springs and from outside, N.
+    /// Returns the sum of spring forces and applied forces (N).
     pub fn forces(&self) -> Vec<DVec3> {
         let mut forces = self.applied.clone();
         for &([a, b], stiffness, rest_length) in &self.springs {
@@ -49,7 +49,7 @@ impl Reference {
             let force = if length > 0.0 {
                 offset * (stiffness * (length - rest_length) / length)
             } else {
-                // Along x, from the node with the lower number to the other.
+                // Along x, from the node with the lower index to the other.
                 DVec3::X
                     * if a < b {
                         -stiffness * rest_length
@@ -63,7 +63,7 @@ impl Reference {
         forces
     }
 
-    /// Of the springs, J.
+    /// Returns the elastic energy of the springs (J).
     pub fn elastic(&self) -> f64 {
         let energy = |&([a, b], stiffness, rest_length): &Spring| {
             let length = self.positions[a as usize].distance(self.positions[b as usize]);
@@ -73,14 +73,18 @@ impl Reference {
     }
 
     pub fn accelerations(&self) -> Vec<DVec3> {
-        let accelerate = |(force, &mass): (DVec3, &f64)| match mass {
+        let acceleration_of = |(force, &mass): (DVec3, &f64)| match mass {
             0.0 => DVec3::ZERO,
             mass => force / mass + self.gravity,
         };
-        self.forces().into_iter().zip(&self.masses).map(accelerate).collect()
+        self.forces()
+            .into_iter()
+            .zip(&self.masses)
+            .map(acceleration_of)
+            .collect()
     }
 
-    /// Half a kick, a drift, half a kick; damping solved exactly over each half.
+    /// Takes a step: half a kick, a drift, half a kick. Damping is solved exactly over each half.
     pub fn step(&mut self, h: f64) {
         self.half_kick(h);
         for (position, velocity) in self.positions.iter_mut().zip(&self.velocities) {

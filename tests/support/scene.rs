@@ -1,4 +1,4 @@
-//! A body in a world of its own.
+//! A world with one body.
 
 use glam::DVec3;
 use sinew::{Body, BodyDefinition, BodyId, RestStateDefinition, Solver, Storage, World, WorldDefinition};

@@ -1,6 +1,6 @@
-//! A closed mesh in `f64`, looked at triangle by triangle.
+//! A closed mesh in `f64`, evaluated triangle by triangle.
 
-#![allow(dead_code, reason = "every test takes a part of it")]
+#![allow(dead_code, reason = "each test uses some of these helpers")]
 
 use std::f64::consts::PI;
 use std::path::Path;
@@ -11,32 +11,33 @@ use sinew::mesh::{Mesh, MeshFormat};
 
 use super::tissue::point_to_triangle;
 
-/// A closed mesh at some place.
+/// A closed mesh at a pose.
 pub struct Solid {
     triangles: Vec<[DVec3; 3]>,
 }
 
 impl Solid {
     pub fn new(mesh: &Mesh, pose: Pose) -> Self {
-        let (position, turned) = (pose.position.as_dvec3(), pose.orientation.as_dquat());
-        let corner = |node: u32| position + turned * mesh.positions[node as usize].as_dvec3();
+        let (position, orientation) = (pose.position.as_dvec3(), pose.orientation.as_dquat());
+        let corner = |node: u32| position + orientation * mesh.positions[node as usize].as_dvec3();
         Self {
             triangles: mesh.triangles.iter().map(|triangle| triangle.map(corner)).collect(),
         }
     }
 
-    /// How often the surface winds about a point: 1 inside, 0 outside. By the triangles' solid angles (van Oosterom, Strackee 1983).
+    /// Returns the winding number of the surface about a point: 1 inside, 0 outside. It sums the solid angles of the
+    /// triangles (van Oosterom, Strackee 1983).
     pub fn winding(&self, point: DVec3) -> f64 {
         let angle = |triangle: &[DVec3; 3]| {
             let [a, b, c] = triangle.map(|corner| corner - point);
             let (la, lb, lc) = (a.length(), b.length(), c.length());
-            let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-            2.0 * a.dot(b.cross(c)).atan2(below)
+            let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+            2.0 * a.dot(b.cross(c)).atan2(denominator)
         };
         self.triangles.iter().map(angle).sum::<f64>() / (4.0 * PI)
     }
 
-    /// How far the surface is from a point, m.
+    /// Returns the distance of a point from the surface (m).
     pub fn distance(&self, point: DVec3) -> f64 {
         let distances = self
             .triangles
@@ -45,14 +46,14 @@ impl Solid {
         distances.fold(f64::INFINITY, f64::min)
     }
 
-    /// The same, negative inside.
+    /// Returns the distance of a point from the surface, negative inside (m).
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         let distance = self.distance(point);
         if self.winding(point) > 0.5 { -distance } else { distance }
     }
 }
 
-/// A real mesh with its size multiplied by `scale`; `None`, said aloud, where it is missing.
+/// Loads a real mesh and scales it by `scale`. If the file is missing, reports that on stderr and returns `None`.
 pub fn real(name: &str, scale: f32) -> Option<Mesh> {
     let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
     let mut paths = above.map(|folder| folder.join("shared/meshes").join(name));
@@ -64,7 +65,7 @@ pub fn real(name: &str, scale: f32) -> Option<Mesh> {
     Some(sinew::mesh::load(path, MeshFormat::Auto, scale).expect("a mesh").mesh)
 }
 
-/// A box between two corners.
+/// Returns a box between two corners.
 pub fn cuboid(low: Vec3, high: Vec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let corner = |i: u32| Vec3::select(BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), high, low);
     let sides = [
@@ -79,7 +80,7 @@ pub fn cuboid(low: Vec3, high: Vec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     ((0..8).map(corner).collect(), triangles.collect())
 }
 
-/// A ball of this radius: an icosahedron whose triangles were quartered so often.
+/// Returns a ball of this radius: an icosahedron whose triangles are quartered `quartered` times.
 pub fn ball(radius: f32, quartered: u32) -> Mesh {
     let golden = 0.5 * (1.0 + 5.0_f32.sqrt());
     let corners = [
@@ -129,7 +130,7 @@ pub fn ball(radius: f32, quartered: u32) -> Mesh {
     }
 }
 
-/// A ball of radius 1: an octahedron whose triangles were quartered so often.
+/// Returns a ball of radius 1: an octahedron whose triangles are quartered `quartered` times.
 pub fn octahedral_ball(quartered: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let corners = vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
     let triangles = vec![
@@ -145,23 +146,23 @@ pub fn octahedral_ball(quartered: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     quarter((corners, triangles), 1.0, quartered)
 }
 
-/// Divides each triangle in four, with new corners on a ball of this radius, so many times.
+/// Divides each triangle in four, `times` times. New corners lie on a ball of this radius.
 fn quarter(
     (mut positions, mut triangles): (Vec<Vec3>, Vec<[u32; 3]>),
     radius: f32,
     times: u32,
 ) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     for _ in 0..times {
-        let mut middles = std::collections::HashMap::new();
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+        let mut midpoints = std::collections::HashMap::new();
+        let mut midpoint = |a: u32, b: u32| {
+            *midpoints.entry((a.min(b), a.max(b))).or_insert_with(|| {
                 let sum = positions[a as usize] + positions[b as usize];
                 positions.push(sum.normalize() * radius);
                 positions.len() as u32 - 1
             })
         };
         let quarters = triangles.iter().flat_map(|&[a, b, c]| {
-            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            let (ab, bc, ca) = (midpoint(a, b), midpoint(b, c), midpoint(c, a));
             [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
         });
         triangles = quarters.collect();

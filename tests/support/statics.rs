@@ -1,5 +1,5 @@
-//! Bodies whose rest shapes are known: chains, the discrete catenary, patches of lattice and triangles under even stress
-//! (Cauchy-Born).
+//! Bodies with known static equilibria: chains, the discrete catenary, and patches of lattice and triangles under
+//! uniform stress (Cauchy-Born).
 
 use glam::{DMat3, DVec3, Vec3};
 
@@ -8,15 +8,15 @@ use super::bodies::{Parts, Scene, largest_difference};
 /// m/s²
 pub const G: f32 = 9.81;
 
-/// Damps all nodes by `rate` times their mass, 1/s.
+/// Damps all nodes by `rate` times their mass (1/s).
 pub fn damp(parts: &mut Parts, rate: f32) {
     for (damping, mass) in parts.node_dampings.iter_mut().zip(&parts.masses) {
         *damping = rate * mass;
     }
 }
 
-/// A chain of `links` springs that hangs from its first node, and how much longer it becomes: each spring carries all that is
-/// below it.
+/// Returns a chain of `links` springs that hangs from its first node, and its total extension. Each spring carries the
+/// weight below it.
 pub fn hanging_chain(links: usize, spacing: f32, mass: f32, stiffness: f32) -> (Parts, f64) {
     let mut parts = Parts::chain(links + 1, Vec3::NEG_Y * spacing, mass, stiffness);
     parts.masses[0] = 0.0;
@@ -25,7 +25,7 @@ pub fn hanging_chain(links: usize, spacing: f32, mass: f32, stiffness: f32) -> (
     (parts, extension)
 }
 
-/// A chain between two pins, where its nodes hang and what the first pin carries.
+/// A chain between two pins, the expected positions of its nodes and the force on its first pin.
 pub struct Catenary {
     pub parts: Parts,
     pub expected: Vec<DVec3>,
@@ -70,17 +70,21 @@ impl Catenary {
         }
     }
 
-    /// How far a body that came to rest is from it, over the chain's length; its pin must carry what it should.
+    /// Returns the largest error of a body at rest, divided by the length of the chain. Checks the force on the first
+    /// pin.
     pub fn error_of(&self, scene: &Scene) -> f64 {
-        let held = scene.body().pin_force(0).expect("a pin").as_dvec3();
+        let pin_force = scene.body().pin_force(0).expect("a pin").as_dvec3();
         let force = self.force;
-        assert!(held.distance(force) < 1e-4 * force.length(), "{held} for {force}");
+        assert!(
+            pin_force.distance(force) < 1e-4 * force.length(),
+            "{pin_force} for {force}"
+        );
         largest_difference(&scene.positions(), &self.expected) / self.length
     }
 }
 
-/// Where the nodes of a hanging chain are that starts at the origin, pulled there by (-horizontal, vertical): with
-/// springs of stiffness k the i-th link carries the tension (H, V - i m g), and is L + T/k long.
+/// Returns the node positions of a hanging chain that starts at the origin and is pulled there by (-horizontal,
+/// vertical). With stiffness k, link i carries the tension (H, V - i m g) and has the length L + T/k.
 fn catenary(horizontal: f64, vertical: f64, links: usize, weight: f64, rest: f64, stiffness: f64) -> Vec<DVec3> {
     let mut positions = vec![DVec3::ZERO];
     for link in 0..links {
@@ -91,8 +95,8 @@ fn catenary(horizontal: f64, vertical: f64, links: usize, weight: f64, rest: f64
     positions
 }
 
-/// The first Piola-Kirchhoff stress of a lattice under the deformation `f`, from the springs that a cell of volume
-/// `volume` owns: `sum k (|F d| - |d|) / |F d| (F d) d^T / volume`.
+/// Returns the first Piola-Kirchhoff stress of a lattice under the deformation `f`, from the springs that a cell of
+/// volume `volume` owns: `sum k (|F d| - |d|) / |F d| (F d) d^T / volume`.
 pub fn stress(f: DMat3, springs: &[(DVec3, f64)], volume: f64) -> DMat3 {
     springs.iter().fold(DMat3::ZERO, |sum, &(d, stiffness)| {
         let stretched = f * d;
@@ -101,7 +105,7 @@ pub fn stress(f: DMat3, springs: &[(DVec3, f64)], volume: f64) -> DMat3 {
     })
 }
 
-/// The diagonal deformation with the stretch `stretch` along `axis` and no stress across it; `free` axes of three.
+/// Returns the diagonal deformation with the stretch `stretch` along `axis` and no stress along the axes `free`.
 pub fn uniaxial(axis: usize, stretch: f64, free: &[usize], springs: &[(DVec3, f64)], volume: f64) -> DMat3 {
     let deformation = |across: f64| {
         let mut diagonal = DVec3::ONE;
@@ -123,7 +127,7 @@ pub fn uniaxial(axis: usize, stretch: f64, free: &[usize], springs: &[(DVec3, f6
     deformation(0.5 * (low + high))
 }
 
-/// The springs that a cell of the cubic lattice owns.
+/// Returns the springs that a cell of the cubic lattice owns.
 pub fn cubic_cell(spacing: f64, stiffness: f64) -> Vec<(DVec3, f64)> {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     [x, y, z, x + y, x - y, y + z, y - z, z + x, z - x]
@@ -131,7 +135,7 @@ pub fn cubic_cell(spacing: f64, stiffness: f64) -> Vec<(DVec3, f64)> {
         .to_vec()
 }
 
-/// A free body, the loads on its nodes, and the deformation that they lead to.
+/// A free body, the loads on its nodes, and the resulting deformation.
 pub struct Patch {
     pub parts: Parts,
     pub loads: Vec<Vec3>,
@@ -139,8 +143,8 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// A block of the cubic lattice, pulled along x alone: under a pressing load that keeps its direction a free body turns
-    /// over.
+    /// Creates a block of the cubic lattice under uniaxial tension along x. Compression by loads of fixed direction
+    /// would turn a free body over.
     pub fn lattice(stretch: f64) -> Self {
         let (spacing, stiffness, cells) = (0.05_f32, 100.0_f32, 4);
         let a = f64::from(spacing);
@@ -148,15 +152,15 @@ impl Patch {
         let deformation = uniaxial(0, stretch, &[1, 2], &springs, a * a * a);
         let traction = stress(deformation, &springs, a * a * a).col(0).x;
         let parts = Parts::block([cells; 3], spacing, 0.01, stiffness);
-        let far = spacing * cells as f32;
-        let edge = |x: f32| if x == 0.0 || x == far { 0.5 } else { 1.0 };
+        let length = spacing * cells as f32;
+        let edge_weight = |x: f32| if x == 0.0 || x == length { 0.5 } else { 1.0 };
         let load = |p: &Vec3| {
             let outward = if p.x == 0.0 {
                 -1.0
             } else {
-                f64::from(u8::from(p.x == far))
+                f64::from(u8::from(p.x == length))
             };
-            (DVec3::X * (outward * traction * a * a * edge(p.y) * edge(p.z))).as_vec3()
+            (DVec3::X * (outward * traction * a * a * edge_weight(p.y) * edge_weight(p.z))).as_vec3()
         };
         Self {
             loads: parts.positions.iter().map(load).collect(),
@@ -165,14 +169,14 @@ impl Patch {
         }
     }
 
-    /// Equilateral triangles, pulled along one axis and free across it.
+    /// Creates equilateral triangles, pulled along one axis and free across it.
     pub fn triangles(axis: usize, across: usize, stretch: f64) -> Self {
         let (cells, side, stiffness) = (6, 0.05, 100.0_f32);
         let (parts, triangles) = triangle_patch(cells, side, stiffness);
         let (directions, area) = triangle_cell(side, f64::from(stiffness));
         let deformation = uniaxial(axis, stretch, &[across], &directions, area);
         let stress = stress(deformation, &directions, area);
-        // What an even stress does to the corners of each triangle: P times half the opposite side's normal.
+        // A uniform stress P loads each corner by P times half the normal of the opposite side.
         let mut loads = vec![DVec3::ZERO; parts.positions.len()];
         for triangle in &triangles {
             for corner in 0..3 {
@@ -188,34 +192,34 @@ impl Patch {
         }
     }
 
-    /// Loads the nodes for the step to come.
+    /// Applies the loads for the next step.
     pub fn load(&self, scene: &mut Scene) {
         let nodes: Vec<u32> = (0..self.parts.positions.len() as u32).collect();
         scene.body_mut().apply_forces(&nodes, &self.loads).expect("forces");
     }
 
-    /// How far a body is from the deformation but for its place, over its size.
+    /// Returns the largest deviation of a body from the deformation, without its translation, divided by its size.
     pub fn error_of(&self, scene: &Scene) -> f64 {
         let rest = self.parts.positions.iter();
         let expected: Vec<DVec3> = rest.map(|p| self.deformation * p.as_dvec3()).collect();
-        let mut reached = scene.positions();
-        let shift = (expected.iter().sum::<DVec3>() - reached.iter().sum::<DVec3>()) / expected.len() as f64;
-        for position in &mut reached {
+        let mut positions = scene.positions();
+        let shift = (expected.iter().sum::<DVec3>() - positions.iter().sum::<DVec3>()) / expected.len() as f64;
+        for position in &mut positions {
             *position += shift;
         }
-        largest_difference(&reached, &expected) / self.parts.size()
+        largest_difference(&positions, &expected) / self.parts.size()
     }
 }
 
-/// A patch of equilateral triangles; each owns half of its springs.
+/// Returns a patch of equilateral triangles. Each triangle owns half of its springs.
 fn triangle_patch(cells: usize, side: f64, stiffness: f32) -> (Parts, Vec<[usize; 3]>) {
     let corner = |x: usize, y: usize| y * (cells + 1) + x;
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
     for y in 0..=cells {
         for x in 0..=cells {
-            let place = DVec3::new(x as f64 + 0.5 * y as f64, 0.75_f64.sqrt() * y as f64, 0.0);
-            positions.push((place * side).as_vec3());
+            let coordinates = DVec3::new(x as f64 + 0.5 * y as f64, 0.75_f64.sqrt() * y as f64, 0.0);
+            positions.push((coordinates * side).as_vec3());
             if x < cells && y < cells {
                 triangles.push([corner(x, y), corner(x + 1, y), corner(x, y + 1)]);
                 triangles.push([corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)]);
@@ -235,7 +239,7 @@ fn triangle_patch(cells: usize, side: f64, stiffness: f32) -> (Parts, Vec<[usize
     (parts, triangles)
 }
 
-/// The three directions that a node of equilateral triangles owns, and the area of two triangles.
+/// Returns the three springs that a node of equilateral triangles owns, and the area of two triangles.
 pub fn triangle_cell(side: f64, stiffness: f64) -> ([(DVec3, f64); 3], f64) {
     let directions = [0.0_f64, 60.0, 120.0].map(|degrees| {
         let (sine, cosine) = degrees.to_radians().sin_cos();

@@ -1,6 +1,6 @@
-//! What the contact tests share: tissue, tools, and measures of their own in f64 that know nothing of the library's.
+//! Helpers of the contact tests: tissue, tools, and measures in `f64` that do not use the library's geometry.
 
-#![allow(dead_code, reason = "every test takes a part of it")]
+#![allow(dead_code, reason = "each test uses some of these helpers")]
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -8,7 +8,7 @@ use sinew::{
     Body, BodyDefinition, BodyId, Pose, Shape, Solver, ToolDefinition, ToolId, Values, World, WorldDefinition,
 };
 
-/// Numbers from a fixed seed.
+/// Pseudo-random numbers from a fixed seed.
 pub struct Random(u64);
 
 impl Random {
@@ -16,7 +16,7 @@ impl Random {
         Self(seed.wrapping_mul(2).wrapping_add(1))
     }
 
-    /// Between 0 and 1.
+    /// Returns a number between 0 and 1.
     pub fn unit(&mut self) -> f32 {
         self.0 = self
             .0
@@ -25,12 +25,12 @@ impl Random {
         (self.0 >> 40) as f32 / (1 << 24) as f32
     }
 
-    /// Between two numbers.
+    /// Returns a number between `low` and `high`.
     pub fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
 
-    /// Each coordinate between -1 and 1.
+    /// Returns a vector with coordinates between -1 and 1.
     pub fn vector(&mut self) -> Vec3 {
         Vec3::new(
             self.between(-1.0, 1.0),
@@ -57,16 +57,16 @@ impl Random {
     }
 }
 
-/// What tissue is made of.
+/// The parameters of spring tissue.
 #[derive(Clone, Copy, Debug)]
 pub struct Tissue {
-    /// Of the whole body, kg.
+    /// The mass of the whole body (kg).
     pub mass: f32,
-    /// Of each spring, N/m.
+    /// The stiffness of each spring (N/m).
     pub stiffness: f32,
-    /// Against the world, 1/s.
+    /// Damping against the world (1/s).
     pub drag: f32,
-    /// Along springs, N s/m.
+    /// Damping along springs (N s/m).
     pub spring_damping: f32,
 }
 
@@ -79,13 +79,13 @@ impl Tissue {
         spring_damping: 0.0,
     };
 
-    /// The same with inner damping alone, which no momentum leaves through.
+    /// Soft, with damping along springs only, which conserves momentum.
     pub const VISCOUS: Self = Self {
         spring_damping: 0.02,
         ..Self::SOFT
     };
 
-    /// Comes to rest soon.
+    /// Viscous, with drag that brings it to rest soon.
     pub const CALM: Self = Self {
         drag: 8.0,
         ..Self::VISCOUS
@@ -114,7 +114,7 @@ impl Tissue {
     }
 }
 
-/// A world with this gravity, all else as it comes.
+/// Creates a world with this gravity and default settings.
 pub fn world(gravity: Vec3) -> World {
     World::new(WorldDefinition {
         gravity,
@@ -123,7 +123,7 @@ pub fn world(gravity: Vec3) -> World {
     .expect("a world")
 }
 
-/// A world with this gravity that takes exactly `substeps`.
+/// Creates a world with this gravity that takes exactly `substeps`.
 pub fn world_of(gravity: Vec3, substeps: u32) -> World {
     World::new(WorldDefinition {
         gravity,
@@ -147,7 +147,7 @@ pub fn sphere(world: &mut World, radius: f32, position: Vec3) -> ToolId {
     tool(world, Shape::Sphere { radius }, 0.0, position, Quat::IDENTITY)
 }
 
-/// A square cloth in the plane y = 0, `size` long.
+/// Returns a square cloth of side `size` in the plane y = 0.
 pub fn square(size: f32, cells: u32) -> Mesh {
     Mesh::cloth([size, size], [cells, cells]).expect("a cloth")
 }
@@ -159,14 +159,14 @@ pub fn moved(mut mesh: Mesh, by: Vec3) -> Mesh {
     mesh
 }
 
-/// The nodes at the rim of a square cloth.
+/// Returns the border nodes of a square cloth.
 pub fn rim(cells: u32) -> Vec<u32> {
     let row = cells + 1;
     (0..row * row)
         .filter(|node| {
             [node % row, node / row]
                 .iter()
-                .any(|&place| place == 0 || place == cells)
+                .any(|&coordinate| coordinate == 0 || coordinate == cells)
         })
         .collect()
 }
@@ -190,7 +190,7 @@ pub fn total_energy(world: &World, id: BodyId) -> f64 {
     energy.kinetic + energy.elastic + energy.gravitational
 }
 
-/// The sum of what holds these pins.
+/// Returns the sum of the forces on these pins.
 pub fn pin_forces(world: &World, id: BodyId, nodes: &[u32]) -> DVec3 {
     nodes
         .iter()
@@ -198,7 +198,7 @@ pub fn pin_forces(world: &World, id: BodyId, nodes: &[u32]) -> DVec3 {
         .sum()
 }
 
-/// The moment about `about` of what holds these pins.
+/// Returns the moment about `about` of the forces on these pins.
 pub fn pin_moments(world: &World, id: BodyId, nodes: &[u32], about: DVec3) -> DVec3 {
     let body = body(world, id);
     nodes
@@ -210,13 +210,13 @@ pub fn pin_moments(world: &World, id: BodyId, nodes: &[u32], about: DVec3) -> DV
         .sum()
 }
 
-/// The momentum of equal nodes.
+/// Returns the momentum of a body whose nodes have equal masses.
 pub fn momentum(body: &Body, node_mass: f32) -> DVec3 {
     let sum: DVec3 = body.velocities().iter().map(|velocity| velocity.as_dvec3()).sum();
     sum * f64::from(node_mass)
 }
 
-/// The angular momentum of equal nodes about a point.
+/// Returns the angular momentum about a point of a body whose nodes have equal masses.
 pub fn angular_momentum(body: &Body, node_mass: f32, about: DVec3) -> DVec3 {
     let sum: DVec3 = body
         .positions()
@@ -239,7 +239,7 @@ pub fn all_finite(body: &Body) -> bool {
         .all(|vector| vector.is_finite())
 }
 
-/// The distance of a point from the segment from `a` to `b`.
+/// Returns the distance of a point from the segment from `a` to `b`.
 pub fn point_to_segment(point: DVec3, a: DVec3, b: DVec3) -> f64 {
     let along = b - a;
     let length = along.length_squared();
@@ -251,7 +251,8 @@ pub fn point_to_segment(point: DVec3, a: DVec3, b: DVec3) -> f64 {
     point.distance(a + along * t)
 }
 
-/// The distance of a point from a triangle: to its plane where the foot lies within, to its nearest edge elsewhere.
+/// Returns the distance of a point from a triangle: to its plane if the foot point lies within, else to the nearest
+/// edge.
 pub fn point_to_triangle(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let edges = point_to_segment(point, a, b)
         .min(point_to_segment(point, b, c))
@@ -268,7 +269,7 @@ pub fn point_to_triangle(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     if within { height.abs() } else { edges }
 }
 
-/// The distance of two segments: by their ends, and by the common perpendicular where it meets both.
+/// Returns the distance of two segments: between their ends, or along the common perpendicular if it meets both.
 pub fn segment_to_segment(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
     let ends = point_to_segment(a, c, d)
         .min(point_to_segment(b, c, d))
@@ -313,7 +314,7 @@ pub fn corners(body: &Body, triangle: [u32; 3]) -> [DVec3; 3] {
     triangle.map(|node| body.positions()[node as usize].as_dvec3())
 }
 
-/// How deep the surface and the nodes of a body lie in a sphere or capsule at a pose, m; negative where they are clear.
+/// Returns how deep the surface and the nodes of a body lie in a tool shape at a pose; negative outside (m).
 pub fn penetration(body: &Body, shape: Shape, pose: Pose) -> f64 {
     let centre = pose.position.as_dvec3();
     let axis = pose.orientation.as_dquat() * DVec3::Y;
@@ -332,7 +333,7 @@ pub fn penetration(body: &Body, shape: Shape, pose: Pose) -> f64 {
             return -lowest;
         }
         Shape::Box { half_extents } => return penetration_of_box(body, half_extents.as_dvec3(), pose),
-        Shape::Mesh { .. } => unreachable!("the tests of meshes look for themselves"),
+        Shape::Mesh { .. } => unreachable!("mesh tools have their own measure of depth"),
     };
     let nodes = body
         .positions()
@@ -349,13 +350,14 @@ pub fn penetration(body: &Body, shape: Shape, pose: Pose) -> f64 {
     f64::from(radius) - nodes.chain(faces).fold(f64::INFINITY, f64::min)
 }
 
-/// How deep points of the surface of a body, eight along each side of a triangle, lie in a box; negative where they are clear.
+/// Returns how deep the surface of a body lies in a box; negative outside (m). It samples triangles with eight points
+/// per side.
 fn penetration_of_box(body: &Body, half_extents: DVec3, pose: Pose) -> f64 {
     const SAMPLES: u32 = 8;
-    let turned = pose.orientation.as_dquat().inverse();
+    let to_local = pose.orientation.as_dquat().inverse();
     let mut deepest = f64::NEG_INFINITY;
     for &triangle in body.surface() {
-        let [a, b, c] = corners(body, triangle).map(|corner| turned * (corner - pose.position.as_dvec3()));
+        let [a, b, c] = corners(body, triangle).map(|corner| to_local * (corner - pose.position.as_dvec3()));
         for i in 0..=SAMPLES {
             for j in 0..=SAMPLES - i {
                 let [u, v] = [i, j].map(|part| f64::from(part) / f64::from(SAMPLES));
@@ -367,15 +369,16 @@ fn penetration_of_box(body: &Body, half_extents: DVec3, pose: Pose) -> f64 {
     deepest
 }
 
-/// How deep a body lies in a tool of a world.
+/// Returns how deep a body lies in a tool of a world (m).
 pub fn penetration_of(world: &World, id: BodyId, shape: Shape, tool: ToolId) -> f64 {
     penetration(body(world, id), shape, world.pose(tool).expect("a tool"))
 }
 
-/// How often the closed surface of a cloth and its first shape, joined at the rim that never moved, winds about a point:
-/// 0 on the side where it has always been, -1 or 1 where the cloth has been carried past its first shape.
+/// Returns how often the surface between a cloth and its initial shape winds about a point. The border of the cloth
+/// must not move.
 ///
-/// By the solid angles of the triangles (van Oosterom and Strackee 1983).
+/// The result is 0 for points that the cloth did not pass, and -1 or 1 for points that it passed. It sums the solid
+/// angles of the triangles (van Oosterom and Strackee 1983).
 pub fn winding(body: &Body, first: &Mesh, point: DVec3) -> f64 {
     let solid_angle = |triangle: [DVec3; 3]| {
         let [a, b, c] = triangle.map(|corner| corner - point);

@@ -1,4 +1,4 @@
-// Serves the page to a headless Chromium in its test mode (web/test.js), prints what that found, and takes a screenshot.
+// Serves the page to a headless Chromium in its test mode (web/test.js), prints the result, and takes a screenshot.
 //
 //   node browse.mjs FOLDER CHROMIUM PROFILE SCREENSHOT.png
 import { spawn } from "node:child_process";
@@ -8,7 +8,7 @@ import { extname, join } from "node:path";
 
 const [folder, chromium, profile, picture] = process.argv.slice(2);
 const KINDS = { ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm" };
-const LIMIT = 180_000; // ms, of a machine that does much else
+const LIMIT = 180_000; // ms, on a busy machine
 
 const server = createServer(async (request, response) => {
   const name = new URL(request.url, "http://page").pathname.replace(/\/$/, "/index.html");
@@ -28,7 +28,7 @@ const browser = spawn(
     .concat([`--user-data-dir=${profile}`, "--window-size=1200,800", "--remote-debugging-pipe"]),
   { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] },
 );
-// The DevTools protocol over pipes: messages of JSON, each ended by a 0.
+// The DevTools protocol over pipes: JSON messages, each terminated by a 0 byte.
 const waiting = new Map();
 let count = 0, pending = "";
 browser.stdio[4].on("data", (data) => {

@@ -1,4 +1,4 @@
-//! Fine surfaces that go with coarse bodies.
+//! Embeddings: fine render surfaces bound to coarse bodies.
 #![allow(clippy::unwrap_used)]
 
 use glam::{Affine3A, DMat3, DVec3, Mat3A, Quat, Vec3, vec3};
@@ -19,7 +19,7 @@ fn world() -> World {
     .unwrap()
 }
 
-/// A soft block of 6 x 4 x 5 cm of springs.
+/// Creates a soft block of 6 x 4 x 5 cm of springs.
 fn block(world: &mut World) -> (BodyId, Mesh) {
     let mesh = Mesh::block([0.06, 0.04, 0.05], [6, 4, 5]).unwrap();
     let body = world
@@ -34,7 +34,7 @@ fn block(world: &mut World) -> (BodyId, Mesh) {
     (body, mesh)
 }
 
-/// Numbers from -1 to 1, the same each time.
+/// Returns a generator of pseudo-random numbers from -1 to 1.
 fn numbers() -> impl FnMut() -> f32 {
     let mut seed = 12_u32;
     move || {
@@ -43,86 +43,86 @@ fn numbers() -> impl FnMut() -> f32 {
     }
 }
 
-/// An affine motion that stretches, shears, turns and shifts.
+/// Returns an affine map with stretch, shear, rotation and translation.
 fn motion() -> Affine3A {
     let shape = Mat3A::from_cols(
         vec3(1.3, 0.2, -0.1).into(),
         vec3(-0.3, 0.8, 0.15).into(),
         vec3(0.05, 0.4, 1.1).into(),
     );
-    let turned = Mat3A::from_quat(Quat::from_axis_angle(vec3(0.6, 0.0, 0.8), 1.1)) * shape;
+    let rotated = Mat3A::from_quat(Quat::from_axis_angle(vec3(0.6, 0.0, 0.8), 1.1)) * shape;
     Affine3A {
-        matrix3: turned,
+        matrix3: rotated,
         translation: vec3(0.2, -0.1, 0.3).into(),
     }
 }
 
 #[test]
-fn an_affine_motion_of_the_body_is_one_of_the_surface() {
+fn an_affine_motion_of_the_body_moves_the_surface_affinely() {
     let mut world = world();
     let (body, mesh) = block(&mut world);
-    // Inside of it and, in part, outside.
-    let mut drawn = ball(0.024, 4);
+    // Inside the block and partly outside.
+    let mut fine_mesh = ball(0.024, 4);
     let mut number = numbers();
-    for place in &mut drawn.positions {
-        *place += 0.001 * vec3(number(), number(), number());
+    for position in &mut fine_mesh.positions {
+        *position += 0.001 * vec3(number(), number(), number());
     }
     let mut embedding = world
         .create_embedding(
             body,
             &EmbeddingDefinition {
-                vertices: &drawn.positions,
-                triangles: &drawn.triangles,
+                vertices: &fine_mesh.positions,
+                triangles: &fine_mesh.triangles,
                 tetrahedra: &mesh.tetrahedra,
             },
         )
         .unwrap();
     assert!(
-        drawn.positions.iter().any(|place| place.y.abs() > 0.0205),
+        fine_mesh.positions.iter().any(|position| position.y.abs() > 0.0205),
         "all are inside"
     );
     let motion = motion();
     let moved: Vec<Vec3> = mesh
         .positions
         .iter()
-        .map(|&place| motion.transform_point3(place))
+        .map(|&position| motion.transform_point3(position))
         .collect();
     world.body_mut(body).unwrap().set_positions(&moved).unwrap();
     embedding.update(&world).unwrap();
-    let exact = |place: Vec3| {
+    let exact = |position: Vec3| {
         let shape = DMat3::from_cols_array(&motion.matrix3.to_cols_array().map(f64::from));
-        shape * place.as_dvec3() + motion.translation.as_dvec3()
+        shape * position.as_dvec3() + motion.translation.as_dvec3()
     };
-    // Beside the size of what moves: 0.4 m from the origin, with rounding of the nodes themselves.
-    for (place, &from) in embedding.positions().iter().zip(&drawn.positions) {
-        let off = place.as_dvec3().distance(exact(from));
-        assert!(off < 1e-6 * 0.4, "{from}: {off} m");
+    // The tolerance is relative to 0.4 m, the distance from the origin, because nodes are rounded.
+    for (position, &from) in embedding.positions().iter().zip(&fine_mesh.positions) {
+        let error = position.as_dvec3().distance(exact(from));
+        assert!(error < 1e-6 * 0.4, "{from}: {error} m");
     }
-    let places: Vec<DVec3> = drawn.positions.iter().map(|&place| exact(place)).collect();
-    assert_normals(&places, &drawn.triangles, embedding.normals(), 1e-4);
+    let positions: Vec<DVec3> = fine_mesh.positions.iter().map(|&position| exact(position)).collect();
+    assert_normals(&positions, &fine_mesh.triangles, embedding.normals(), 1e-4);
 }
 
-/// Normals are those of the vertices' triangles by area, worked out in f64.
-fn assert_normals(places: &[DVec3], triangles: &[[u32; 3]], normals: &[Vec3], most: f64) {
-    let mut exact = vec![DVec3::ZERO; places.len()];
+/// Checks that normals are the area-weighted normals of the vertices' triangles, computed in f64.
+fn assert_normals(positions: &[DVec3], triangles: &[[u32; 3]], normals: &[Vec3], tolerance: f64) {
+    let mut exact = vec![DVec3::ZERO; positions.len()];
     for &triangle in triangles {
-        let [a, b, c] = triangle.map(|vertex| places[vertex as usize]);
+        let [a, b, c] = triangle.map(|vertex| positions[vertex as usize]);
         for vertex in triangle {
             exact[vertex as usize] += (b - a).cross(c - a);
         }
     }
     assert_eq!(exact.len(), normals.len());
     for (normal, exact) in normals.iter().zip(exact) {
-        let off = normal.as_dvec3().distance(exact.normalize());
-        assert!(off < most, "{normal} is {off} off");
+        let error = normal.as_dvec3().distance(exact.normalize());
+        assert!(error < tolerance, "{normal} is {error} off");
     }
 }
 
 #[test]
-fn normals_of_a_ball_look_outward() {
-    // Far from the origin, and small: they neither vanish nor overflow.
+fn normals_of_a_ball_point_outward() {
+    // Normals must neither vanish nor overflow for very small and very large surfaces.
     for radius in [1e-7_f32, 0.01, 1e8] {
-        let drawn = ball(radius, 3);
+        let fine_mesh = ball(radius, 3);
         let mut world = world();
         let host = Mesh::block([2.0 * radius; 3], [2, 2, 2]).unwrap();
         let body = world
@@ -138,24 +138,24 @@ fn normals_of_a_ball_look_outward() {
             .create_embedding(
                 body,
                 &EmbeddingDefinition {
-                    vertices: &drawn.positions,
-                    triangles: &drawn.triangles,
+                    vertices: &fine_mesh.positions,
+                    triangles: &fine_mesh.triangles,
                     tetrahedra: &host.tetrahedra,
                 },
             )
             .unwrap();
-        for (normal, place) in embedding.normals().iter().zip(&drawn.positions) {
-            // Triangles about some corners of an icosahedron are larger on one side.
+        for (normal, position) in embedding.normals().iter().zip(&fine_mesh.positions) {
+            // Triangles around some corners of an icosahedron are larger on one side.
             assert!(
-                normal.distance(place.normalize()) < 0.03,
-                "{radius} m: {normal} at {place}"
+                normal.distance(position.normalize()) < 0.03,
+                "{radius} m: {normal} at {position}"
             );
         }
     }
 }
 
 #[test]
-fn over_a_sheet_vertices_keep_their_height() {
+fn vertices_over_a_sheet_keep_their_height() {
     let mut world = world();
     let mesh = Mesh::cloth([0.1, 0.1], [10, 10]).unwrap();
     let body = world
@@ -174,8 +174,8 @@ fn over_a_sheet_vertices_keep_their_height() {
     let mut number = numbers();
     let vertices: Vec<Vec3> = (0..500)
         .map(|_| {
-            let place = 0.049 * vec3(number(), number(), number());
-            place - up * place.dot(up) + up * 0.004 * number()
+            let position = 0.049 * vec3(number(), number(), number());
+            position - up * position.dot(up) + up * 0.004 * number()
         })
         .collect();
     let mut embedding = world
@@ -191,39 +191,42 @@ fn over_a_sheet_vertices_keep_their_height() {
         embedding.positions(),
         vertices_within(embedding.positions(), &vertices, 1e-7)
     );
-    // It turns as one.
+    // A rigid motion of the sheet.
     let turn = Quat::from_axis_angle(vec3(0.0, 0.6, 0.8), 2.0);
     let shift = vec3(0.1, 0.2, -0.1);
-    let moved: Vec<Vec3> = mesh.positions.iter().map(|&place| turn * place + shift).collect();
+    let moved: Vec<Vec3> = mesh.positions.iter().map(|&position| turn * position + shift).collect();
     world.body_mut(body).unwrap().set_positions(&moved).unwrap();
     embedding.update(&world).unwrap();
-    let expected: Vec<Vec3> = vertices.iter().map(|&place| turn * place + shift).collect();
+    let expected: Vec<Vec3> = vertices.iter().map(|&position| turn * position + shift).collect();
     vertices_within(embedding.positions(), &expected, 3e-7);
-    // It is stretched in its plane: heights stay.
-    let stretched: Vec<Vec3> = mesh.positions.iter().map(|&place| 2.0 * place).collect();
+    // When the sheet is stretched in its plane, heights stay constant.
+    let stretched: Vec<Vec3> = mesh.positions.iter().map(|&position| 2.0 * position).collect();
     world.body_mut(body).unwrap().set_positions(&stretched).unwrap();
     embedding.update(&world).unwrap();
-    let expected: Vec<Vec3> = vertices.iter().map(|&place| 2.0 * place - up * place.dot(up)).collect();
+    let expected: Vec<Vec3> = vertices
+        .iter()
+        .map(|&position| 2.0 * position - up * position.dot(up))
+        .collect();
     vertices_within(embedding.positions(), &expected, 3e-7);
     assert!(embedding.normals().is_empty());
 }
 
-fn vertices_within<'a>(found: &'a [Vec3], expected: &[Vec3], most: f32) -> &'a [Vec3] {
-    assert_eq!(found.len(), expected.len());
-    for (found, expected) in found.iter().zip(expected) {
-        assert!(found.distance(*expected) < most, "{found} instead of {expected}");
+fn vertices_within<'a>(actual: &'a [Vec3], expected: &[Vec3], tolerance: f32) -> &'a [Vec3] {
+    assert_eq!(actual.len(), expected.len());
+    for (actual, expected) in actual.iter().zip(expected) {
+        assert!(actual.distance(*expected) < tolerance, "{actual} instead of {expected}");
     }
-    found
+    actual
 }
 
-/// Tissue made of a ball that is drawn, which stands on the ground.
-fn made(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
-    let drawn = ball(0.03, times);
+/// Creates tissue from a render surface in the shape of a ball.
+fn tissue_ball(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
+    let fine_mesh = ball(0.03, times);
     let (body, embedding) = world
         .create_body_from_surface(
             &BodyDefinition {
-                positions: &drawn.positions,
-                triangles: &drawn.triangles,
+                positions: &fine_mesh.positions,
+                triangles: &fine_mesh.triangles,
                 material: Some(Material {
                     model: Model::Tetrahedra,
                     young_modulus: 2e4,
@@ -237,19 +240,19 @@ fn made(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
             0.008,
         )
         .unwrap();
-    (drawn, body, embedding)
+    (fine_mesh, body, embedding)
 }
 
 #[test]
-fn tissue_of_a_drawn_ball_falls_and_lands() {
+fn tissue_from_a_ball_surface_falls_and_lands() {
     let mut world = world();
-    let (drawn, body, mut embedding) = made(&mut world, 4);
+    let (fine_mesh, body, mut embedding) = tissue_ball(&mut world, 4);
     let mass: f32 = (0..world.body(body).unwrap().node_count() as u32)
         .map(|node| world.body(body).unwrap().node_mass(node).unwrap())
         .sum();
     let volume = 4.0 / 3.0 * std::f32::consts::PI * 0.03_f32.powi(3);
     assert!((mass / (1000.0 * volume) - 1.0).abs() < 0.03, "{mass} kg");
-    vertices_within(embedding.positions(), &drawn.positions, 1e-7);
+    vertices_within(embedding.positions(), &fine_mesh.positions, 1e-7);
     world
         .create_tool(&ToolDefinition {
             pose: Pose {
@@ -266,22 +269,22 @@ fn tissue_of_a_drawn_ball_falls_and_lands() {
         let lowest = embedding
             .positions()
             .iter()
-            .fold(f32::INFINITY, |low, place| low.min(place.y));
-        // The coarse surface stays above; what is drawn goes past it by what a ball's chords leave.
+            .fold(f32::INFINITY, |low, vertex| low.min(vertex.y));
+        // The coarse surface stays above the plane. The render surface exceeds it by the sag of the ball's chords.
         assert!(lowest > -0.042, "step {step}: {lowest}");
         deepest = deepest.min(lowest);
     }
     assert!(deepest < -0.039, "{deepest}");
-    let places: Vec<DVec3> = embedding.positions().iter().map(|place| place.as_dvec3()).collect();
-    assert_normals(&places, &drawn.triangles, embedding.normals(), 1e-4);
+    let positions: Vec<DVec3> = embedding.positions().iter().map(|vertex| vertex.as_dvec3()).collect();
+    assert_normals(&positions, &fine_mesh.triangles, embedding.normals(), 1e-4);
 }
 
 #[test]
-fn who_reads_changes_nothing() {
+fn updates_of_an_embedding_change_nothing() {
     let run = |reads: bool| {
         let mut world = world();
-        let (_, body, mut embedding) = made(&mut world, 2);
-        let places = world.body(body).unwrap().positions().to_vec();
+        let (_, body, mut embedding) = tissue_ball(&mut world, 2);
+        let positions = world.body(body).unwrap().positions().to_vec();
         for _ in 0..20 {
             world.step(0.005).unwrap();
             if reads {
@@ -289,16 +292,16 @@ fn who_reads_changes_nothing() {
                 embedding.normals();
             }
         }
-        assert_ne!(world.body(body).unwrap().positions(), places);
+        assert_ne!(world.body(body).unwrap().positions(), positions);
         world.state_hash()
     };
     assert_eq!(run(false), run(true));
 }
 
 #[test]
-fn what_a_reader_has_is_as_good_as_the_world() {
+fn positions_of_a_reader_update_an_embedding_like_the_world() {
     let mut world = world();
-    let (_, body, mut embedding) = made(&mut world, 2);
+    let (_, body, mut embedding) = tissue_ball(&mut world, 2);
     let mut reader = world.create_reader(body).unwrap();
     world.step(0.01).unwrap();
     embedding.update(&world).unwrap();
@@ -321,13 +324,13 @@ fn what_a_reader_has_is_as_good_as_the_world() {
 }
 
 #[test]
-fn what_cannot_be_bound_is_refused() {
+fn invalid_embeddings_are_refused() {
     let mut world = world();
     let (body, mesh) = block(&mut world);
-    let drawn = ball(0.02, 1);
-    let sound = EmbeddingDefinition {
-        vertices: &drawn.positions,
-        triangles: &drawn.triangles,
+    let fine_mesh = ball(0.02, 1);
+    let valid = EmbeddingDefinition {
+        vertices: &fine_mesh.positions,
+        triangles: &fine_mesh.triangles,
         tetrahedra: &mesh.tetrahedra,
     };
     let hash = world.state_hash();
@@ -337,47 +340,47 @@ fn what_cannot_be_bound_is_refused() {
         assert!(matches!(error, Error::InvalidArgument(_)), "{text}");
         assert!(words.iter().all(|word| text.contains(word)), "{text}");
     };
-    let none = EmbeddingDefinition { vertices: &[], ..sound };
+    let none = EmbeddingDefinition { vertices: &[], ..valid };
     refused(&none, &["vertices"]);
     for wrong in [f32::NAN, f32::INFINITY, 2e9] {
-        let mut vertices = drawn.positions.clone();
+        let mut vertices = fine_mesh.positions.clone();
         vertices[7].y = wrong;
         let definition = EmbeddingDefinition {
             vertices: &vertices,
-            ..sound
+            ..valid
         };
         refused(&definition, &["vertices[7]"]);
     }
     let triangles = [[0, 1, 2], [0, 1, 42]];
     let definition = EmbeddingDefinition {
         triangles: &triangles,
-        ..sound
+        ..valid
     };
     refused(&definition, &["triangles[1]", "42"]);
     let tetrahedra = [[0, 1, 2, 9999]];
     let definition = EmbeddingDefinition {
         tetrahedra: &tetrahedra,
-        ..sound
+        ..valid
     };
     refused(&definition, &["tetrahedra[0]", "9999"]);
     let tetrahedra = [[0, 1, 2, 2]];
     let definition = EmbeddingDefinition {
         tetrahedra: &tetrahedra,
-        ..sound
+        ..valid
     };
     refused(&definition, &["volume"]);
     assert_eq!(world.state_hash(), hash);
     world.destroy_body(body).unwrap();
-    assert!(matches!(world.create_embedding(body, &sound), Err(Error::StaleId(_))));
+    assert!(matches!(world.create_embedding(body, &valid), Err(Error::StaleId(_))));
 }
 
 #[test]
-fn what_is_no_surface_makes_no_body() {
+fn invalid_surfaces_make_no_body() {
     let mut world = world();
-    let drawn = ball(0.03, 2);
-    let sound = BodyDefinition {
-        positions: &drawn.positions,
-        triangles: &drawn.triangles,
+    let fine_mesh = ball(0.03, 2);
+    let valid = BodyDefinition {
+        positions: &fine_mesh.positions,
+        triangles: &fine_mesh.triangles,
         masses: Values::Uniform(1e-3),
         stiffnesses: Values::Uniform(20.0),
         ..BodyDefinition::default()
@@ -393,46 +396,46 @@ fn what_is_no_surface_makes_no_body() {
         assert_eq!(world.state_hash(), hash, "{word}");
     };
     for spacing in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-30, 1e3] {
-        refused(&sound, spacing, "spacing");
+        refused(&valid, spacing, "spacing");
     }
     let open = BodyDefinition {
-        triangles: &drawn.triangles[1..],
-        ..sound
+        triangles: &fine_mesh.triangles[1..],
+        ..valid
     };
     refused(&open, 0.01, "not closed");
-    let turned: Vec<[u32; 3]> = drawn.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    let flipped: Vec<[u32; 3]> = fine_mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
     let inward = BodyDefinition {
-        triangles: &turned,
-        ..sound
+        triangles: &flipped,
+        ..valid
     };
     refused(&inward, 0.01, "inward");
-    let masses = vec![1e-3; drawn.positions.len()];
+    let masses = vec![1e-3; fine_mesh.positions.len()];
     let each = BodyDefinition {
         masses: Values::Each(&masses),
-        ..sound
+        ..valid
     };
     refused(&each, 0.01, "masses");
     let jointed = BodyDefinition {
         springs: Some(&[[0, 1]]),
-        ..sound
+        ..valid
     };
     refused(&jointed, 0.01, "springs");
-    // The definition of the body is refused when the surface has been filled.
+    // The definition of the body is refused after the surface has been filled.
     let wrong = BodyDefinition {
         stiffnesses: Values::Uniform(-1.0),
-        ..sound
+        ..valid
     };
     refused(&wrong, 0.01, "stiffness");
 }
 
-/// Tissue of springs made of a ball, that may be cut, in free fall.
-fn to_be_cut(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
-    let drawn = ball(0.03, times);
+/// Creates cuttable spring tissue from a ball, in free fall.
+fn cuttable_ball(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
+    let fine_mesh = ball(0.03, times);
     let (body, embedding) = world
         .create_body_from_surface(
             &BodyDefinition {
-                positions: &drawn.positions,
-                triangles: &drawn.triangles,
+                positions: &fine_mesh.positions,
+                triangles: &fine_mesh.triangles,
                 masses: Values::Uniform(1e-3),
                 stiffnesses: Values::Uniform(20.0),
                 spare_nodes: 4000,
@@ -441,10 +444,11 @@ fn to_be_cut(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
             0.01,
         )
         .unwrap();
-    (drawn, body, embedding)
+    (fine_mesh, body, embedding)
 }
 
-/// A surface of triangles that are longer than the body's: one that reaches from piece to piece goes, though its corners never had a node in common.
+/// The render triangles are larger than the body's. A triangle that connects two pieces is removed, even if its corners
+/// never shared a node.
 #[test]
 fn no_large_triangle_reaches_across_a_cut() {
     let mut world = World::new(WorldDefinition {
@@ -452,12 +456,12 @@ fn no_large_triangle_reaches_across_a_cut() {
         ..WorldDefinition::default()
     })
     .unwrap();
-    let mut kept = Vec::new();
+    let mut kept_fractions = Vec::new();
     for cells in [1, 3, 8] {
-        let drawn = Mesh::block([0.1; 3], [cells; 3]).unwrap();
+        let fine_mesh = Mesh::block([0.1; 3], [cells; 3]).unwrap();
         let definition = BodyDefinition {
-            positions: &drawn.positions,
-            triangles: &drawn.triangles,
+            positions: &fine_mesh.positions,
+            triangles: &fine_mesh.triangles,
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(20.0),
             spare_nodes: 4000,
@@ -472,18 +476,21 @@ fn no_large_triangle_reaches_across_a_cut() {
         world.cut(body, &across).unwrap();
         assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 2);
         embedding.update(&world).unwrap();
-        let is_beyond = |&vertex: &u32| drawn.positions[vertex as usize].x > 0.0123;
+        let is_beyond = |&vertex: &u32| fine_mesh.positions[vertex as usize].x > 0.0123;
         for triangle in embedding.triangles() {
-            let beyond = triangle.iter().filter(|vertex| is_beyond(vertex)).count();
-            assert!(beyond == 0 || beyond == 3, "{cells} cells: {triangle:?}");
+            let beyond_count = triangle.iter().filter(|vertex| is_beyond(vertex)).count();
+            assert!(beyond_count == 0 || beyond_count == 3, "{cells} cells: {triangle:?}");
         }
-        kept.push(embedding.triangles().len() as f32 / drawn.triangles.len() as f32);
+        kept_fractions.push(embedding.triangles().len() as f32 / fine_mesh.triangles.len() as f32);
     }
-    // The ends stay, of a cube alone no more.
-    assert!(kept[0] >= 4.0 / 12.0 && kept[2] > 0.8, "{kept:?}");
+    // The end faces remain, and almost nothing else of a single cube.
+    assert!(
+        kept_fractions[0] >= 4.0 / 12.0 && kept_fractions[2] > 0.8,
+        "{kept_fractions:?}"
+    );
 }
 
-/// An edge that goes down along x = 0, turned about z by this much, as far as `depth`.
+/// Returns the sweep of an edge down along x = 0 to `depth`, rotated about z by `turn`.
 fn sweep(turn: f32, depth: f32) -> Sweep {
     let at = |y: f32, z: f32| Quat::from_rotation_z(turn) * vec3(0.0003, y, z);
     Sweep {
@@ -493,13 +500,13 @@ fn sweep(turn: f32, depth: f32) -> Sweep {
 }
 
 #[test]
-fn each_vertex_goes_with_its_side_of_a_cut() {
+fn each_vertex_follows_its_side_of_a_cut() {
     let mut world = World::new(WorldDefinition {
         gravity: Vec3::ZERO,
         ..WorldDefinition::default()
     })
     .unwrap();
-    let (drawn, body, mut embedding) = to_be_cut(&mut world, 4);
+    let (fine_mesh, body, mut embedding) = cuttable_ball(&mut world, 4);
     // Into quarters.
     let turns = [0.0, 1.2];
     for turn in turns {
@@ -514,100 +521,103 @@ fn each_vertex_goes_with_its_side_of_a_cut() {
         .map(|triangle| pieces.of_nodes[triangle[0] as usize])
         .collect();
     assert_eq!(drawn_pieces.len(), 4);
-    // What has not been read yet is as before, and that there are more nodes is not known.
-    let places = world.body(body).unwrap().positions().to_vec();
-    assert!(embedding.update_from(&places).is_err());
+    // An embedding that was not updated is unchanged, and refuses positions of the new node count.
+    let positions = world.body(body).unwrap().positions().to_vec();
+    assert!(embedding.update_from(&positions).is_err());
     embedding.update(&world).unwrap();
-    vertices_within(embedding.positions(), &drawn.positions, 1e-6);
+    vertices_within(embedding.positions(), &fine_mesh.positions, 1e-6);
     assert_eq!(embedding.body(), body);
-    // Each piece is put somewhere else: so is each vertex, with the piece that has its quarter.
+    // Each piece moves to a different position, and each vertex must move with the piece of its quarter.
     let shift = |piece: u32| vec3(0.0, 0.0, 0.2 * (1 + piece) as f32);
-    let apart: Vec<Vec3> = places
+    let apart: Vec<Vec3> = positions
         .iter()
         .zip(&pieces.of_nodes)
-        .map(|(&place, &piece)| place + shift(piece))
+        .map(|(&position, &piece)| position + shift(piece))
         .collect();
     world.body_mut(body).unwrap().set_positions(&apart).unwrap();
     embedding.update(&world).unwrap();
     let mut piece_of_quarter = [None; 4];
     let mut counted = 0;
-    for (&place, &from) in embedding.positions().iter().zip(&drawn.positions) {
+    for (&position, &from) in embedding.positions().iter().zip(&fine_mesh.positions) {
         let piece = drawn_pieces
             .iter()
-            .find(|&&piece| (place - from).distance(shift(piece)) < 1e-5);
-        let piece = *piece.unwrap_or_else(|| panic!("{from} is torn apart: {place}"));
-        let beyond = turns.map(|turn| (Quat::from_rotation_z(-turn) * from).x - 0.0003);
-        // What is snapped to the blade's way lies up to a twentieth of an edge beside it.
-        if beyond.iter().all(|beyond| beyond.abs() > 0.001) {
-            let quarter = usize::from(beyond[0] > 0.0) + 2 * usize::from(beyond[1] > 0.0);
+            .find(|&&piece| (position - from).distance(shift(piece)) < 1e-5);
+        let piece = *piece.unwrap_or_else(|| panic!("{from} is torn apart: {position}"));
+        let sides = turns.map(|turn| (Quat::from_rotation_z(-turn) * from).x - 0.0003);
+        // The body snaps cuts to nodes within a twentieth of an edge of the blade's path.
+        if sides.iter().all(|side| side.abs() > 0.001) {
+            let quarter = usize::from(sides[0] > 0.0) + 2 * usize::from(sides[1] > 0.0);
             assert_eq!(*piece_of_quarter[quarter].get_or_insert(piece), piece, "{from}");
             counted += 1;
         }
     }
     assert!(counted > 2000, "{counted}");
-    // No triangle reaches across, and only such are gone.
-    let longest = |triangle: &[u32; 3], places: &[Vec3]| {
-        let [a, b, c] = triangle.map(|vertex| places[vertex as usize]);
+    // No triangle connects two pieces, and only such triangles are removed.
+    let longest = |triangle: &[u32; 3], positions: &[Vec3]| {
+        let [a, b, c] = triangle.map(|vertex| positions[vertex as usize]);
         a.distance(b).max(b.distance(c)).max(c.distance(a))
     };
-    let left = embedding.triangles().to_vec();
+    let remaining = embedding.triangles().to_vec();
     assert!(
-        left.iter()
+        remaining
+            .iter()
             .all(|triangle| longest(triangle, embedding.positions()) < 0.01)
     );
-    let is_left = |triangle: &[u32; 3]| longest(triangle, embedding.positions()) < 0.01;
+    let remains = |triangle: &[u32; 3]| longest(triangle, embedding.positions()) < 0.01;
     assert_eq!(
-        left,
-        drawn.triangles.iter().copied().filter(is_left).collect::<Vec<_>>()
+        remaining,
+        fine_mesh.triangles.iter().copied().filter(remains).collect::<Vec<_>>()
     );
-    assert!(left.len() < drawn.triangles.len() && 20 * left.len() > 17 * drawn.triangles.len());
-    // Who comes after the cut is bound to what is left of it, and goes on where each piece does.
+    assert!(remaining.len() < fine_mesh.triangles.len() && 20 * remaining.len() > 17 * fine_mesh.triangles.len());
+    // An embedding created after the cut is bound to the remaining surface and follows each piece.
     let late = EmbeddingDefinition {
         vertices: embedding.positions(),
-        triangles: &left,
+        triangles: &remaining,
         tetrahedra: &[[0, 1, 2, 3]],
     };
     let mut late = world.create_embedding(body, &late).unwrap();
     vertices_within(late.positions(), embedding.positions(), 1e-6);
     let turn = Quat::from_rotation_x(0.3);
-    let turned: Vec<Vec3> = apart
+    let rotated: Vec<Vec3> = apart
         .iter()
         .zip(&pieces.of_nodes)
-        .map(|(&place, &piece)| turn * place - 2.0 * shift(piece))
+        .map(|(&position, &piece)| turn * position - 2.0 * shift(piece))
         .collect();
-    world.body_mut(body).unwrap().set_positions(&turned).unwrap();
+    world.body_mut(body).unwrap().set_positions(&rotated).unwrap();
     embedding.update(&world).unwrap();
     late.update(&world).unwrap();
     vertices_within(late.positions(), embedding.positions(), 1e-5);
-    // Both follow the next cut.
-    world.body_mut(body).unwrap().set_positions(&places).unwrap();
+    // Both embeddings follow the next cut.
+    world.body_mut(body).unwrap().set_positions(&positions).unwrap();
     world.cut(body, &sweep(0.6, -0.05)).unwrap();
     for embedding in [&mut embedding, &mut late] {
         embedding.update(&world).unwrap();
-        vertices_within(embedding.positions(), &drawn.positions, 2e-5);
+        vertices_within(embedding.positions(), &fine_mesh.positions, 2e-5);
     }
     let pieces = world.body(body).unwrap().pieces().unwrap();
     let apart: Vec<Vec3> = { world.body(body).unwrap().positions().iter().zip(&pieces.of_nodes) }
-        .map(|(&place, &piece)| place + shift(piece))
+        .map(|(&position, &piece)| position + shift(piece))
         .collect();
     world.body_mut(body).unwrap().set_positions(&apart).unwrap();
     for embedding in [&mut embedding, &mut late] {
         embedding.update(&world).unwrap();
-        assert!(embedding.triangles().len() < left.len() && 20 * embedding.triangles().len() > 17 * left.len());
+        assert!(
+            embedding.triangles().len() < remaining.len() && 20 * embedding.triangles().len() > 17 * remaining.len()
+        );
         let longest = { embedding.triangles().iter() }.map(|triangle| longest(triangle, embedding.positions()));
         assert!(longest.fold(0.0, f32::max) < 0.01);
     }
     let is_beside = |from: &Vec3| {
-        let beyond = [0.0, 1.2, 0.6].map(|turn| (Quat::from_rotation_z(-turn) * *from).x - 0.0003);
-        beyond.iter().all(|beyond| beyond.abs() > 0.001)
+        let sides = [0.0, 1.2, 0.6].map(|turn| (Quat::from_rotation_z(-turn) * *from).x - 0.0003);
+        sides.iter().all(|side| side.abs() > 0.001)
     };
     let both = embedding.positions().iter().zip(late.positions());
-    let beside = both.zip(&drawn.positions).filter(|(_, from)| is_beside(from));
+    let beside = both.zip(&fine_mesh.positions).filter(|(_, from)| is_beside(from));
     assert!(beside.clone().count() > 1800);
     assert!({ beside }.all(|((a, b), _)| a.distance(*b) < 1e-4));
 }
 
-/// A sheet in free fall that may be cut.
+/// Creates a cuttable sheet in free fall.
 fn sheet(world: &mut World) -> (Mesh, BodyId) {
     let mesh = Mesh::cloth([0.1, 0.1], [10, 10]).unwrap();
     let body = world.create_body(&BodyDefinition {
@@ -621,17 +631,17 @@ fn sheet(world: &mut World) -> (Mesh, BodyId) {
     (mesh, body.unwrap())
 }
 
-/// A finer sheet over it, some millimetres up and down, with its triangles.
+/// Returns a finer sheet over it with triangles, whose height varies by up to `up` (m).
 fn cover(up: f32) -> Mesh {
     let mut fine = Mesh::cloth([0.098, 0.098], [40, 40]).unwrap();
-    for place in &mut fine.positions {
-        place.y = up * (70.0 * place.x).sin();
+    for position in &mut fine.positions {
+        position.y = up * (70.0 * position.x).sin();
     }
     fine
 }
 
 #[test]
-fn over_a_sheet_each_vertex_goes_with_its_side_of_a_cut() {
+fn each_vertex_over_a_sheet_follows_its_side_of_a_cut() {
     let mut world = World::new(WorldDefinition {
         gravity: Vec3::ZERO,
         ..WorldDefinition::default()
@@ -645,26 +655,26 @@ fn over_a_sheet_each_vertex_goes_with_its_side_of_a_cut() {
         ..EmbeddingDefinition::default()
     };
     let mut early = world.create_embedding(body, &definition).unwrap();
-    // Two cuts across all of it, through the cells' middles and at a slant.
+    // Two cuts across the whole sheet, one through the middles of cells and one oblique.
     let cuts = [0.0_f32, 1.1];
     let blade = |turn: f32| {
-        let turned = |x: f32, y: f32| Quat::from_rotation_y(turn) * vec3(x, y, 0.0043);
+        let rotated = |x: f32, y: f32| Quat::from_rotation_y(turn) * vec3(x, y, 0.0043);
         Sweep {
-            start: [turned(-0.09, -0.01), turned(-0.09, 0.01)],
-            end: [turned(0.09, -0.01), turned(0.09, 0.01)],
+            start: [rotated(-0.09, -0.01), rotated(-0.09, 0.01)],
+            end: [rotated(0.09, -0.01), rotated(0.09, 0.01)],
         }
     };
     world.cut(body, &blade(cuts[0])).unwrap();
-    // One comes when the first cut is made, and has what is left to follow.
+    // One embedding is created after the first cut, and follows the second.
     let mut late = world.create_embedding(body, &definition).unwrap();
     world.cut(body, &blade(cuts[1])).unwrap();
     let pieces = world.body(body).unwrap().pieces().unwrap();
-    let places = world.body(body).unwrap().positions().to_vec();
+    let positions = world.body(body).unwrap().positions().to_vec();
     let shift = |piece: u32| vec3(0.0, 0.2 * (1 + piece) as f32, 0.0);
-    let apart: Vec<Vec3> = { places.iter().zip(&pieces.of_nodes) }
-        .map(|(&place, &piece)| place + shift(piece))
+    let apart: Vec<Vec3> = { positions.iter().zip(&pieces.of_nodes) }
+        .map(|(&position, &piece)| position + shift(piece))
         .collect();
-    let side = |place: Vec3, turn: f32| (Quat::from_rotation_y(-turn) * place).z - 0.0043;
+    let side = |position: Vec3, turn: f32| (Quat::from_rotation_y(-turn) * position).z - 0.0043;
     for embedding in [&mut early, &mut late] {
         embedding.update(&world).unwrap();
         vertices_within(embedding.positions(), &fine.positions, 1e-6);
@@ -672,14 +682,14 @@ fn over_a_sheet_each_vertex_goes_with_its_side_of_a_cut() {
     world.body_mut(body).unwrap().set_positions(&apart).unwrap();
     for embedding in [&mut early, &mut late] {
         embedding.update(&world).unwrap();
-        // What is snapped to the blade's way lies up to a twentieth of an edge beside it.
+        // The body snaps cuts to nodes within a twentieth of an edge of the blade's path.
         let mut piece_of = std::collections::BTreeMap::new();
-        for (&place, &from) in embedding.positions().iter().zip(&fine.positions) {
+        for (&position, &from) in embedding.positions().iter().zip(&fine.positions) {
             let sides = cuts.map(|turn| side(from, turn));
-            let piece = ((place - from).y / 0.2).round();
+            let piece = ((position - from).y / 0.2).round();
             assert!(
-                (place - from).distance(Vec3::Y * 0.2 * piece) < 1e-5,
-                "{from} is torn apart: {place}"
+                (position - from).distance(Vec3::Y * 0.2 * piece) < 1e-5,
+                "{from} is torn apart: {position}"
             );
             if sides.iter().all(|side| side.abs() > 0.001) {
                 let quarter = sides.map(|side| side > 0.0);
@@ -691,56 +701,64 @@ fn over_a_sheet_each_vertex_goes_with_its_side_of_a_cut() {
         pieces.dedup();
         assert_eq!(pieces.len(), 4, "{piece_of:?}");
     }
-    // Tetrahedra that nobody simulates hold vertices as well, but not across the next cut.
-    let mut made_up = vec![[0; 4]; 1000];
-    made_up.push([0, 1, 11, 60]);
-    let made_up = EmbeddingDefinition {
-        tetrahedra: &made_up,
+    // Tetrahedra that are not simulated can also carry vertices, but not across the next cut.
+    let mut not_simulated = vec![[0; 4]; 1000];
+    not_simulated.push([0, 1, 11, 60]);
+    let not_simulated = EmbeddingDefinition {
+        tetrahedra: &not_simulated,
         ..definition
     };
-    let curved: Vec<Vec3> = { places.iter().zip(0..) }
-        .map(|(&place, node)| place + Vec3::Y * 0.01 * ((node % 7) as f32 + place.x))
+    let curved: Vec<Vec3> = { positions.iter().zip(0..) }
+        .map(|(&position, node)| position + Vec3::Y * 0.01 * ((node % 7) as f32 + position.x))
         .collect();
     world.body_mut(body).unwrap().set_positions(&curved).unwrap();
-    let mut stray = world.create_embedding(body, &made_up).unwrap();
+    let mut stray = world.create_embedding(body, &not_simulated).unwrap();
     world.cut(body, &blade(2.0)).unwrap();
     let error = stray.update(&world).unwrap_err();
     assert!(matches!(error, Error::Unsupported(_)), "{error}");
-    // No triangle of the first reaches across, and only such are gone.
-    let is_left = |triangle: &&[u32; 3]| {
+    // No triangle of the first embedding connects two pieces, and only such triangles are removed.
+    let remains = |triangle: &&[u32; 3]| {
         let [a, b, c] = triangle.map(|vertex| early.positions()[vertex as usize]);
         a.distance(b).max(b.distance(c)).max(c.distance(a)) < 0.05
     };
-    let left: Vec<[u32; 3]> = fine.triangles.iter().filter(is_left).copied().collect();
-    assert_eq!(early.triangles(), left);
-    assert!(left.len() < fine.triangles.len() && 10 * left.len() > 9 * fine.triangles.len());
+    let remaining: Vec<[u32; 3]> = fine.triangles.iter().filter(remains).copied().collect();
+    assert_eq!(early.triangles(), remaining);
+    assert!(remaining.len() < fine.triangles.len() && 10 * remaining.len() > 9 * fine.triangles.len());
 }
 
 #[test]
-fn a_cut_that_ends_within_leaves_the_rest_whole() {
+fn a_partial_cut_leaves_the_rest_connected() {
     let mut world = world();
-    let (drawn, body, mut embedding) = to_be_cut(&mut world, 4);
+    let (fine_mesh, body, mut embedding) = cuttable_ball(&mut world, 4);
     world.cut(body, &sweep(0.0, 0.004)).unwrap();
     for _ in 0..30 {
         world.step(0.002).unwrap();
         embedding.update(&world).unwrap();
     }
-    let left = embedding.triangles();
+    let remaining = embedding.triangles();
     let below = |triangle: &[u32; 3]| {
         triangle
             .iter()
-            .all(|&vertex| drawn.positions[vertex as usize].y < -0.008)
+            .all(|&vertex| fine_mesh.positions[vertex as usize].y < -0.008)
     };
-    let whole = drawn.triangles.iter().filter(|triangle| below(triangle));
+    let whole = fine_mesh.triangles.iter().filter(|triangle| below(triangle));
     assert!(whole.clone().count() > 500);
-    assert_eq!(whole.count(), left.iter().filter(|triangle| below(triangle)).count());
-    assert!(left.len() < drawn.triangles.len());
-    assert!(embedding.positions().iter().all(|place| place.is_finite()));
-    // The normal of a vertex is that of the triangles that are left about it.
-    let left = left.to_vec();
-    let places: Vec<DVec3> = embedding.positions().iter().map(|place| place.as_dvec3()).collect();
-    let mut has_some = vec![false; places.len()];
-    left.iter()
+    assert_eq!(
+        whole.count(),
+        remaining.iter().filter(|triangle| below(triangle)).count()
+    );
+    assert!(remaining.len() < fine_mesh.triangles.len());
+    assert!(embedding.positions().iter().all(|position| position.is_finite()));
+    // The normal of a vertex is that of its remaining triangles.
+    let remaining = remaining.to_vec();
+    let positions: Vec<DVec3> = embedding
+        .positions()
+        .iter()
+        .map(|position| position.as_dvec3())
+        .collect();
+    let mut has_some = vec![false; positions.len()];
+    remaining
+        .iter()
         .flatten()
         .for_each(|&vertex| has_some[vertex as usize] = true);
     let normals = embedding.normals();
@@ -750,11 +768,11 @@ fn a_cut_that_ends_within_leaves_the_rest_whole() {
 }
 
 #[test]
-fn over_the_triangles_of_a_solid_cuts_are_not_followed_and_that_is_said() {
+fn embeddings_over_the_triangles_of_a_solid_report_that_they_cannot_follow_cuts() {
     let mut world = world();
-    let (drawn, body, _) = to_be_cut(&mut world, 2);
+    let (fine_mesh, body, _) = cuttable_ball(&mut world, 2);
     let over = EmbeddingDefinition {
-        vertices: &drawn.positions,
+        vertices: &fine_mesh.positions,
         ..EmbeddingDefinition::default()
     };
     let mut embedding = world.create_embedding(body, &over).unwrap();
@@ -766,7 +784,7 @@ fn over_the_triangles_of_a_solid_cuts_are_not_followed_and_that_is_said() {
 }
 
 #[test]
-fn a_world_of_before_a_cut_takes_surfaces_of_then_and_refuses_those_of_later() {
+fn a_world_saved_before_a_cut_accepts_earlier_embeddings_and_refuses_later_ones() {
     let mesh = Mesh::block([0.1; 3], [4; 3]).unwrap();
     let mut world = world();
     let body = world.create_body(&BodyDefinition {
@@ -797,9 +815,9 @@ fn a_world_of_before_a_cut_takes_surfaces_of_then_and_refuses_those_of_later() {
     early.update(&before).unwrap();
     assert_eq!(early.triangles(), fine.triangles);
     vertices_within(early.positions(), &mesh.positions, 1e-6);
-    let places = late.positions().to_vec();
+    let old_positions = late.positions().to_vec();
     let error = late.update(&before).unwrap_err();
     assert!(matches!(error, Error::InvalidArgument(_)), "{error}");
-    assert_eq!(late.positions(), places);
+    assert_eq!(late.positions(), old_positions);
     late.update(&world).unwrap();
 }

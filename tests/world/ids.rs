@@ -1,4 +1,4 @@
-//! Ids of another world are refused, and those of a world that was saved are not.
+//! Ids of another world are refused. Ids of a saved world are valid in the loaded world.
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
@@ -7,7 +7,7 @@ use sinew::{
     Result, Shape, ToolDefinition, ToolId, Values, World, WorldDefinition,
 };
 
-/// One of everything that has an id, the same in each world.
+/// One object of each kind with an id, identical in every world.
 struct Scene {
     world: World,
     body: BodyId,
@@ -44,7 +44,7 @@ impl Scene {
     }
 }
 
-fn is_refused<T>(result: Result<T>, noun: &str) {
+fn assert_refused<T>(result: Result<T>, noun: &str) {
     let message = match result {
         Err(Error::InvalidArgument(message)) => message,
         Err(other) => panic!("{noun}: {other:?}"),
@@ -62,12 +62,12 @@ fn an_id_of_another_world_is_refused_and_nothing_changes() {
     let before = one.world.state_hash();
     assert_eq!(before, other.world.state_hash(), "no state has the tag of its world");
     let world = &mut one.world;
-    is_refused(world.body(other.body), "body");
-    is_refused(world.body_mut(other.body), "body");
-    is_refused(world.destroy_body(other.body), "body");
-    is_refused(world.tissue_contacts(other.body), "body");
-    is_refused(world.attach_node(other.body, 1, one.tool, 0.0), "body");
-    is_refused(
+    assert_refused(world.body(other.body), "body");
+    assert_refused(world.body_mut(other.body), "body");
+    assert_refused(world.destroy_body(other.body), "body");
+    assert_refused(world.tissue_contacts(other.body), "body");
+    assert_refused(world.attach_node(other.body, 1, one.tool, 0.0), "body");
+    assert_refused(
         world.create_embedding(
             other.body,
             &EmbeddingDefinition {
@@ -78,18 +78,18 @@ fn an_id_of_another_world_is_refused_and_nothing_changes() {
         ),
         "body",
     );
-    is_refused(world.pose(other.tool), "tool");
-    is_refused(world.set_pose(other.tool, Vec3::ZERO, None), "tool");
-    is_refused(world.destroy_tool(other.tool), "tool");
-    is_refused(world.contacts(other.tool), "tool");
-    is_refused(world.attach_node(one.body, 1, other.tool, 0.0), "tool");
-    is_refused(world.wrench_about(&[one.tool, other.tool], Vec3::ZERO), "tool");
-    is_refused(world.create_haptic(&HapticDefinition::new(other.tool)), "tool");
-    is_refused(world.set_blade_pose(other.blade, Vec3::ZERO, None), "blade");
-    is_refused(world.blade_report(other.blade), "blade");
-    is_refused(world.destroy_blade(other.blade), "blade");
-    is_refused(world.attachment_force(other.attachment), "attachment");
-    is_refused(world.release(other.attachment), "attachment");
+    assert_refused(world.pose(other.tool), "tool");
+    assert_refused(world.set_pose(other.tool, Vec3::ZERO, None), "tool");
+    assert_refused(world.destroy_tool(other.tool), "tool");
+    assert_refused(world.contacts(other.tool), "tool");
+    assert_refused(world.attach_node(one.body, 1, other.tool, 0.0), "tool");
+    assert_refused(world.wrench_about(&[one.tool, other.tool], Vec3::ZERO), "tool");
+    assert_refused(world.create_haptic(&HapticDefinition::new(other.tool)), "tool");
+    assert_refused(world.set_blade_pose(other.blade, Vec3::ZERO, None), "blade");
+    assert_refused(world.blade_report(other.blade), "blade");
+    assert_refused(world.destroy_blade(other.blade), "blade");
+    assert_refused(world.attachment_force(other.attachment), "attachment");
+    assert_refused(world.release(other.attachment), "attachment");
     assert!(!world.has_body(other.body) && !world.has_tool(other.tool));
     assert!(!world.has_blade(other.blade) && !world.has_attachment(other.attachment));
     assert_eq!(world.state_hash(), before);
@@ -97,7 +97,7 @@ fn an_id_of_another_world_is_refused_and_nothing_changes() {
 }
 
 #[test]
-fn an_id_that_names_nothing_is_stale_in_every_world() {
+fn an_id_without_an_object_is_stale_in_every_world() {
     let Scene { mut world, body, .. } = Scene::new();
     for _ in 0..2 {
         assert!(matches!(world.body(BodyId::default()), Err(Error::StaleId(_))));
@@ -109,7 +109,7 @@ fn an_id_that_names_nothing_is_stale_in_every_world() {
 }
 
 #[test]
-fn a_world_that_was_loaded_takes_the_ids_of_the_one_that_was_saved_and_gives_such() {
+fn a_loaded_world_accepts_and_continues_the_ids_of_the_saved_world() {
     let mut saved = Scene::new();
     let mut loaded = World::load(&saved.world.save().expect("bytes"), 1, None).expect("a world");
     assert!(loaded.has_body(saved.body) && loaded.has_tool(saved.tool));
@@ -117,7 +117,7 @@ fn a_world_that_was_loaded_takes_the_ids_of_the_one_that_was_saved_and_gives_suc
     let ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
     let tools = [&mut saved.world, &mut loaded].map(|world| world.create_tool(&ball).expect("a tool"));
     assert_eq!(tools[0], tools[1]);
-    is_refused(Scene::new().world.pose(tools[1]), "tool");
+    assert_refused(Scene::new().world.pose(tools[1]), "tool");
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn the_ids_of_a_thousand_worlds_differ() {
     for _ in 0..1000 {
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let tool = world.create_tool(&ball).expect("a tool");
-        is_refused(first.world.pose(tool), "tool");
-        is_refused(world.pose(first.tool), "tool");
+        assert_refused(first.world.pose(tool), "tool");
+        assert_refused(world.pose(first.tool), "tool");
     }
 }

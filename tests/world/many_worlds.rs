@@ -1,4 +1,4 @@
-//! Thousands of worlds at once: they have nothing in common, on however many threads or machines they are stepped.
+//! Thousands of worlds at once. They share nothing, on any number of threads or MPI ranks.
 
 use std::process::Command;
 
@@ -9,26 +9,26 @@ use sinew::{BodyDefinition, Shape, Solver, ToolDefinition, ToolId, Values, World
 
 const THREADS: u32 = 8;
 
-/// Steps of each.
+/// The number of steps of each world.
 const STEPS: u32 = 20;
 
-/// A small cloth with a ball on its way to it, all of it by the world's number.
+/// A small cloth with a ball that moves towards it. All parameters depend on the index of the world.
 struct Small {
     world: World,
     ball: ToolId,
 }
 
 impl Small {
-    fn new(number: u32) -> Self {
-        let mesh = Mesh::cloth([0.1, 0.1], [3 + number % 4, 3]).expect("a cloth");
+    fn new(index: u32) -> Self {
+        let mesh = Mesh::cloth([0.1, 0.1], [3 + index % 4, 3]).expect("a cloth");
         let mut world = World::new(WorldDefinition::default()).expect("a world");
         let body = world
             .create_body(&BodyDefinition {
-                masses: Values::Uniform(1e-3 + 1e-6 * number as f32),
+                masses: Values::Uniform(1e-3 + 1e-6 * index as f32),
                 stiffnesses: Values::Uniform(40.0),
                 node_dampings: Values::Uniform(1e-3),
-                solver: [Solver::Verlet, Solver::Implicit][(number % 2) as usize],
-                spare_nodes: 20 * (number % 3 % 2),
+                solver: [Solver::Verlet, Solver::Implicit][(index % 2) as usize],
+                spare_nodes: 20 * (index % 3 % 2),
                 ..BodyDefinition::of(&mesh)
             })
             .expect("a body");
@@ -40,18 +40,18 @@ impl Small {
     }
 
     fn step(&mut self, step: u32) {
-        let place = Vec3::Y * (1e-3 * step as f32 - 0.024);
-        self.world.set_pose(self.ball, place, None).expect("a pose");
+        let position = Vec3::Y * (1e-3 * step as f32 - 0.024);
+        self.world.set_pose(self.ball, position, None).expect("a pose");
         self.world.step(5e-3).expect("a step");
     }
 }
 
-/// All at once, each stepped now by this thread and now by another; and what comes of them.
-fn together(count: u32) -> Vec<u64> {
+/// Steps all worlds at once, each on changing threads. Returns their state hashes.
+fn step_all(count: u32) -> Vec<u64> {
     let mut worlds: Vec<Small> = (0..count).map(Small::new).collect();
     let share = count.div_ceil(THREADS) as usize;
     for step in 0..STEPS {
-        // No thread has the worlds that it had.
+        // Each thread gets other worlds than in the last step.
         worlds.rotate_left(share / 2 + 1);
         std::thread::scope(|scope| {
             for worlds in worlds.chunks_mut(share) {
@@ -64,24 +64,24 @@ fn together(count: u32) -> Vec<u64> {
 }
 
 #[test]
-fn worlds_on_many_threads_are_those_on_one() {
-    worlds_are_those_on_one(300);
+fn worlds_on_many_threads_equal_those_on_one() {
+    assert_worlds_equal_those_on_one(300);
 }
 
-/// As many as can be all different.
+/// The largest number of worlds that are all different.
 #[test]
 #[ignore = "long"]
-fn thousands_of_worlds_on_many_threads_are_those_on_one() {
-    worlds_are_those_on_one(4000);
+fn thousands_of_worlds_on_many_threads_equal_those_on_one() {
+    assert_worlds_equal_those_on_one(4000);
 }
 
-fn worlds_are_those_on_one(count: u32) {
-    let all = together(count);
-    // Alone only some, from the first to the last: each must be what it was among all.
-    for number in (0..count).step_by(37) {
-        let mut alone = Small::new(number);
+fn assert_worlds_equal_those_on_one(count: u32) {
+    let all = step_all(count);
+    // Only some worlds are repeated alone, from the first to the last. Each must equal its result among all.
+    for index in (0..count).step_by(37) {
+        let mut alone = Small::new(index);
         (0..STEPS).for_each(|step| alone.step(step));
-        assert_eq!(all[number as usize], alone.world.state_hash(), "world {number}");
+        assert_eq!(all[index as usize], alone.world.state_hash(), "world {index}");
     }
     let mut different = all.clone();
     different.sort_unstable();
@@ -89,13 +89,13 @@ fn worlds_are_those_on_one(count: u32) {
     assert_eq!(different.len(), all.len(), "worlds that are different end differently");
 }
 
-/// A world may be made on one thread, stepped on another and destroyed on a third, side by side with others.
+/// A world can be created on one thread, stepped on another and destroyed on a third, concurrently with others.
 #[test]
-fn worlds_go_from_thread_to_thread() {
+fn worlds_can_move_between_threads() {
     let (give, take) = std::sync::mpsc::channel();
     let maker = std::thread::spawn(move || {
-        for number in 0..100_u32 {
-            let positions = [Vec3::ZERO, Vec3::X * (1.0 + number as f32)];
+        for index in 0..100_u32 {
+            let positions = [Vec3::ZERO, Vec3::X * (1.0 + index as f32)];
             let mut world = World::new(WorldDefinition::default()).expect("a world");
             let body = world.create_body(&BodyDefinition {
                 positions: &positions,
@@ -125,11 +125,11 @@ fn worlds_go_from_thread_to_thread() {
     assert_eq!(count, 100);
 }
 
-/// What `fit` says of its rounds: the same whoever works out which candidates.
-fn rounds(said: &[u8]) -> Vec<String> {
-    let said = String::from_utf8_lossy(said);
+/// Returns the lines of `fit`'s output about its rounds. They do not depend on which rank computes which candidate.
+fn rounds(output: &[u8]) -> Vec<String> {
+    let output = String::from_utf8_lossy(output);
     let is_round = |line: &&str| line.ends_with('%') || line.starts_with("known");
-    said.lines().filter(is_round).map(str::to_owned).collect()
+    output.lines().filter(is_round).map(str::to_owned).collect()
 }
 
 #[test]
@@ -138,7 +138,7 @@ fn rounds(said: &[u8]) -> Vec<String> {
     not(target_os = "linux"),
     ignore = "SKIPPED: it builds the program with the library of Linux"
 )]
-fn a_search_over_ranks_finds_what_one_alone_does() {
+fn a_search_over_ranks_finds_the_same_as_one_process() {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("fit");
     std::fs::create_dir_all(&folder).expect("the target directory can be written");
     let library = Library::release();
@@ -164,9 +164,9 @@ fn a_search_over_ranks_finds_what_one_alone_does() {
     };
     let mut alone = Command::new(build("cc", "alone", &[]));
     let alone = rounds(&succeed(alone.arg("-o").arg(&folder)).stdout);
-    // Six rounds, and that what is known was found: the program fails where it was not.
+    // Six rounds, and a line that the known values were found. The program fails if they were not.
     assert_eq!(alone.len(), 7, "{alone:?}");
-    // What was never pressed has no answer.
+    // Measurements without any force have no solution.
     for (name, force) in [("nothing", "0\n"), ("no_number", "nan\n")] {
         let file = folder.join(name);
         std::fs::write(&file, force.repeat(250)).expect("a file can be written");
@@ -179,7 +179,7 @@ fn a_search_over_ranks_finds_what_one_alone_does() {
     }
     let program = build("mpicc", "over_ranks", &["-DWITH_MPI"]);
     let mut ranks = Command::new("mpirun");
-    // Open MPI asks for it where there are fewer processors, and in containers.
+    // Open MPI requires these with fewer processors, and in containers.
     for name in [
         "OMPI_ALLOW_RUN_AS_ROOT",
         "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM",

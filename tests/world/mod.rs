@@ -1,4 +1,4 @@
-//! Worlds beside each other, their readers and embeddings, and tissue that sleeps.
+//! Independent worlds, readers, embeddings, and sleeping tissue.
 
 mod embedding;
 mod ids;

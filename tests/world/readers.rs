@@ -1,4 +1,4 @@
-//! Readers: other threads see a body as it was after whole steps, whatever its world does meanwhile.
+//! Readers: other threads get a body's state after whole steps, concurrently with calls on the world.
 
 use std::sync::Barrier;
 use std::thread;
@@ -11,7 +11,7 @@ use sinew::{
     WorldDefinition,
 };
 
-/// A cloth of squares of 1 cm that hangs by a corner, in a world with so many threads.
+/// Creates a cloth of squares of 1 cm that hangs by a corner.
 fn cloth(cells: u32, thread_count: u32) -> (World, BodyId) {
     let side = 0.01 * cells as f32;
     let mesh = Mesh::cloth([side, side], [cells, cells]).expect("a cloth");
@@ -42,15 +42,16 @@ fn hanging(definition: &BodyDefinition, thread_count: u32) -> (World, BodyId) {
     (world, body)
 }
 
-/// What a body is in the world now.
-fn is_shown(frame: &Frame, world: &World, body: BodyId) -> bool {
+/// Returns true if a frame equals the current state of a body.
+fn is_current(frame: &Frame, world: &World, body: BodyId) -> bool {
     let body = world.body(body).expect("a body");
     frame.positions == body.positions()
         && frame.triangles == body.surface()
         && frame.topology_version == body.topology_version()
 }
 
-/// Reads until the body is no more, and lets `check` see every frame at least twice, some after a while; the last step.
+/// Reads until the body is destroyed, and calls `check` at least twice per frame, sometimes after a delay. Returns the
+/// last step.
 fn read_to_the_end(mut reader: BodyReader, start: &Barrier, check: impl Fn(&Frame)) -> u64 {
     let first = reader.read();
     assert!(first.is_new && !first.is_over);
@@ -78,14 +79,14 @@ fn read_to_the_end(mut reader: BodyReader, start: &Barrier, check: impl Fn(&Fram
 }
 
 #[test]
-fn every_frame_is_that_of_a_whole_step() {
+fn every_frame_belongs_to_a_whole_step() {
     for (cells, thread_count, steps) in [(30, 1, 500), (99, 2, 60)] {
         let (mut world, body) = cloth(cells, thread_count);
-        let places = |world: &World| world.body(body).expect("a body").positions().to_vec();
-        let mut trajectory = vec![places(&world)];
+        let positions = |world: &World| world.body(body).expect("a body").positions().to_vec();
+        let mut trajectory = vec![positions(&world)];
         for _ in 0..steps {
             world.step(1e-3).expect("a step");
-            trajectory.push(places(&world));
+            trajectory.push(positions(&world));
         }
         assert!(
             trajectory.windows(2).all(|pair| pair[0] != pair[1]),
@@ -151,18 +152,18 @@ fn a_version_changes_when_positions_do() {
         world.step(1e-3).expect("a step");
         let mut reader = world.create_reader(body).expect("a reader");
         let first = reader.read();
-        assert!(first.is_new && !first.is_over && is_shown(&first, &world, body));
+        assert!(first.is_new && !first.is_over && is_current(&first, &world, body));
         assert_eq!(first.step, 1);
         assert_eq!(first.time, f64::from(1e-3_f32));
         let mut version = first.version;
-        let mut changed = |reader: &mut BodyReader, world: &World, is_expected: bool, what: &str| {
+        let mut changed = |reader: &mut BodyReader, world: &World, is_expected: bool, case: &str| {
             let frame = reader.read();
-            assert_eq!(frame.is_new, is_expected, "{what}");
-            assert_eq!(frame.version > version, is_expected, "{what}");
-            assert!(is_shown(&frame, world, body), "{what}");
+            assert_eq!(frame.is_new, is_expected, "{case}");
+            assert_eq!(frame.version > version, is_expected, "{case}");
+            assert!(is_current(&frame, world, body), "{case}");
             version = frame.version;
-            let (step, again) = (frame.step, reader.read());
-            assert!(!again.is_new && again.version == version && again.step == step);
+            let (step, repeated) = (frame.step, reader.read());
+            assert!(!repeated.is_new && repeated.version == version && repeated.step == step);
             step
         };
         changed(&mut reader, &world, false, "nothing");
@@ -171,8 +172,10 @@ fn a_version_changes_when_positions_do() {
         assert!(world.step(f32::NAN).is_err());
         changed(&mut reader, &world, false, "a step that is refused");
 
-        let moved: Vec<_> = mesh.positions.iter().map(|place| *place + Vec3::Y).collect();
-        let set = |world: &mut World, places: &[Vec3]| world.body_mut(body).and_then(|it| it.set_positions(places));
+        let moved: Vec<_> = mesh.positions.iter().map(|position| *position + Vec3::Y).collect();
+        let set = |world: &mut World, new_positions: &[Vec3]| {
+            world.body_mut(body).and_then(|body| body.set_positions(new_positions))
+        };
         set(&mut world, &moved).expect("places");
         assert_eq!(changed(&mut reader, &world, true, "set_positions"), 2);
         assert!(set(&mut world, &moved[1..]).is_err());
@@ -182,11 +185,11 @@ fn a_version_changes_when_positions_do() {
             .expect("a state of rest");
         changed(&mut reader, &world, true, "rest_state");
 
-        // A body that would leave the range of numbers is put back: it did not move.
+        // A body that would overflow is rolled back, so it did not move.
         let fast = vec![Vec3::splat(1e30); moved.len()];
         world
             .body_mut(body)
-            .and_then(|it| it.set_velocities(&fast))
+            .and_then(|body| body.set_velocities(&fast))
             .expect("velocities");
         let report = world.step(1e-4).expect("a step");
         assert_eq!(report.bodies_restored, 1);
@@ -197,7 +200,7 @@ fn a_version_changes_when_positions_do() {
 }
 
 #[test]
-fn a_step_that_is_unstable_is_not_seen() {
+fn a_refused_step_publishes_no_frame() {
     let mesh = Mesh::cloth([0.1, 0.1], [10, 10]).expect("a cloth");
     let definition = WorldDefinition {
         max_substeps: 1,
@@ -251,14 +254,14 @@ fn a_reader_outlives_its_body_and_its_world() {
 }
 
 #[test]
-fn readers_come_and_go() {
+fn readers_can_be_added_and_dropped() {
     let (mut world, body) = cloth(3, 1);
     let mut readers: Vec<_> = (0..126).map(|_| world.create_reader(body).expect("a reader")).collect();
     match world.create_reader(body) {
         Err(Error::Capacity(why)) => assert!(why.contains("126 readers"), "{why}"),
         other => panic!("{other:?}"),
     }
-    // Each holds a frame of its own.
+    // Each reader holds its own frame.
     for (step, reader) in (0..).zip(&mut readers) {
         assert_eq!(reader.read().step, step);
         world.step(1e-3).expect("a step");
@@ -266,17 +269,17 @@ fn readers_come_and_go() {
     for (step, reader) in readers.iter_mut().enumerate().rev() {
         let frame = reader.read();
         assert_eq!((frame.step, frame.is_new), (126, true), "of {step}");
-        assert!(is_shown(&frame, &world, body));
+        assert!(is_current(&frame, &world, body));
     }
-    // While there are none it moves; who comes then sees where it is.
+    // The body moves while there are no readers. A new reader gets its current state.
     thread::spawn(|| drop(readers)).join().expect("their end");
     world.step(1e-3).expect("a step");
     let mut reader = world.create_reader(body).expect("a reader");
     let frame = reader.read();
-    assert!(frame.is_new && frame.step == 127 && is_shown(&frame, &world, body));
+    assert!(frame.is_new && frame.step == 127 && is_current(&frame, &world, body));
 }
 
-/// A cloth or an organ that may be cut.
+/// Creates a cuttable cloth or organ.
 fn soft(is_solid: bool) -> (World, BodyId) {
     let mesh = match is_solid {
         true => Mesh::organ(0.1, 0.012).expect("an organ"),
@@ -294,40 +297,40 @@ fn soft(is_solid: bool) -> (World, BodyId) {
     )
 }
 
-/// Cuts in from alternate sides, each a step after the other, and whatever is to be seen after each.
-fn cut_and_step(world: &mut World, body: BodyId, mut see: impl FnMut(&World)) {
+/// Cuts from alternate sides and takes steps after each cut. Calls `see` after each cut and each step.
+fn cut_and_step(world: &mut World, body: BodyId, mut visit: impl FnMut(&World)) {
     for cut in 0..12 {
-        let places = world.body(body).expect("a body").positions();
-        let centre = places.iter().sum::<Vec3>() / places.len() as f32;
+        let positions = world.body(body).expect("a body").positions();
+        let centre = positions.iter().sum::<Vec3>() / positions.len() as f32;
         let x = 0.04 * (cut as f32 / 6.0 - 0.9);
         let sign = if cut % 2 == 0 { 1.0 } else { -1.0 };
-        let edge = |z: f32| [vec3(x, -0.3, sign * z), vec3(x, 0.3, sign * z)].map(|place| centre + place);
+        let edge = |z: f32| [vec3(x, -0.3, sign * z), vec3(x, 0.3, sign * z)].map(|position| centre + position);
         let sweep = Sweep {
             start: edge(0.2),
             end: edge(0.01),
         };
         world.cut(body, &sweep).expect("a cut");
-        see(world);
+        visit(world);
         for _ in 0..5 {
             world.step(5e-4).expect("a step");
-            see(world);
+            visit(world);
         }
     }
 }
 
 #[test]
-fn a_body_is_cut_while_it_is_read() {
+fn a_body_can_be_cut_while_it_is_read() {
     for is_solid in [false, true] {
-        // Of each version of its topology, how many nodes and which triangles it has; of each frame, where nodes are.
+        // For each topology version, the node count and the triangles; for each frame, the positions.
         let (mut world, body) = soft(is_solid);
         let mut own = world.create_reader(body).expect("a reader");
         let first = own.read();
-        assert!(is_shown(&first, &world, body));
+        assert!(is_current(&first, &world, body));
         let mut topologies = vec![(first.positions.len(), first.triangles.to_vec())];
         let mut frames = vec![((first.topology_version, first.step), first.positions.to_vec())];
         cut_and_step(&mut world, body, |world| {
             let frame = own.read();
-            assert!(frame.is_new && is_shown(&frame, world, body));
+            assert!(frame.is_new && is_current(&frame, world, body));
             if frame.topology_version as usize == topologies.len() {
                 topologies.push((frame.positions.len(), frame.triangles.to_vec()));
             }
@@ -348,9 +351,10 @@ fn a_body_is_cut_while_it_is_read() {
                         let (count, triangles) = &topologies[frame.topology_version as usize];
                         assert_eq!(frame.positions.len(), *count);
                         assert!(frame.triangles == triangles);
-                        let is_it = |(of, _): &&((u64, u64), Vec<Vec3>)| *of == (frame.topology_version, frame.step);
-                        let (_, places) = frames.iter().find(is_it).expect("a frame that there was");
-                        assert!(frame.positions == places);
+                        let matches_frame =
+                            |(of, _): &&((u64, u64), Vec<Vec3>)| *of == (frame.topology_version, frame.step);
+                        let (_, positions) = frames.iter().find(matches_frame).expect("a frame that there was");
+                        assert!(frame.positions == positions);
                     })
                 })
             });
@@ -365,9 +369,9 @@ fn a_body_is_cut_while_it_is_read() {
 }
 
 #[test]
-fn tears_are_seen_with_their_step() {
+fn tears_are_published_with_their_step() {
     let mesh = Mesh::cloth([0.1, 0.1], [12, 12]).expect("a cloth");
-    let taut: Vec<_> = mesh.positions.iter().map(|place| 1.3 * *place).collect();
+    let taut: Vec<_> = mesh.positions.iter().map(|position| 1.3 * *position).collect();
     let definition = BodyDefinition {
         positions: &taut,
         rest_positions: Some(&mesh.positions),
@@ -387,7 +391,7 @@ fn tears_are_seen_with_their_step() {
         world.step(1e-4).expect("a step");
         let frame = reader.read();
         assert!(
-            frame.is_new && frame.step == step && is_shown(&frame, &world, body),
+            frame.is_new && frame.step == step && is_current(&frame, &world, body),
             "step {step}"
         );
     }

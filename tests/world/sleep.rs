@@ -1,4 +1,4 @@
-//! Tissue at rest is left alone, and nobody can tell but by the time it takes.
+//! Sleeping tissue: results match those of awake tissue, and only the cost differs.
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -10,13 +10,13 @@ use sinew::{
 const SLEEP: Sleep = Sleep { speed: 1e-3, time: 0.1 };
 const AWAKE: Sleep = Sleep { speed: 0.0, time: 0.1 };
 
-/// How far off sleep may put a node, m, as its definition says.
+/// The largest position error that the sleep definition allows (m).
 const FAR: f32 = SLEEP.speed * SLEEP.time;
 
 const DT: f32 = 2e-3;
 const RADIUS: f32 = 0.012;
 
-/// A slab of tissue that lies on the ground, which holds it, and a ball above its middle.
+/// A slab of tissue that is pinned to the ground, and a ball above its middle.
 struct Slab {
     world: World,
     body: BodyId,
@@ -25,11 +25,11 @@ struct Slab {
 }
 
 fn slab(sleep: Sleep, threads: u32, change: impl FnOnce(&mut BodyDefinition)) -> Slab {
-    slab_of(40, sleep, threads, change)
+    slab_with_cells(40, sleep, threads, change)
 }
 
-/// The same of so many cells a side.
-fn slab_of(cells: u32, sleep: Sleep, threads: u32, change: impl FnOnce(&mut BodyDefinition)) -> Slab {
+/// Creates a slab with `cells` cells per side.
+fn slab_with_cells(cells: u32, sleep: Sleep, threads: u32, change: impl FnOnce(&mut BodyDefinition)) -> Slab {
     let (wide, high) = (0.2, 0.015);
     let mesh = Mesh::block([wide, high, wide], [cells, 3, cells]).expect("a block");
     let world = WorldDefinition {
@@ -50,7 +50,10 @@ fn slab_of(cells: u32, sleep: Sleep, threads: u32, change: impl FnOnce(&mut Body
     };
     change(&mut definition);
     let body = world.create_body(&definition).expect("a body");
-    let low = mesh.positions.iter().fold(f32::INFINITY, |low, place| low.min(place.y));
+    let low = mesh
+        .positions
+        .iter()
+        .fold(f32::INFINITY, |low, position| low.min(position.y));
     let pins: Vec<u32> = (0..mesh.positions.len() as u32)
         .filter(|&node| mesh.positions[node as usize].y < low + 1e-4)
         .collect();
@@ -88,28 +91,30 @@ impl Slab {
 
     fn top(&self) -> f32 {
         let positions = self.positions();
-        positions.iter().fold(f32::NEG_INFINITY, |top, place| top.max(place.y))
+        positions
+            .iter()
+            .fold(f32::NEG_INFINITY, |top, position| top.max(position.y))
     }
 
     fn positions(&self) -> &[Vec3] {
         self.world.body(self.body).expect("a body").positions()
     }
 
-    /// Another ball, about a point at this height.
+    /// Creates another ball with its center at this height.
     fn make_ball(&mut self, height: f32) -> ToolId {
         let mut ball = ToolDefinition::new(Shape::Sphere { radius: RADIUS });
         ball.pose = above(height);
         self.world.create_tool(&ball).expect("a tool")
     }
 
-    /// Moves the ball down or up to where its lowest point is at `height`, in so many seconds.
-    fn lead(&mut self, height: f32, seconds: f32) {
+    /// Moves the ball until its lowest point is at `height`, in `seconds`.
+    fn move_ball(&mut self, height: f32, seconds: f32) {
         let start = self.world.pose(self.ball).expect("a tool").position.y;
         let steps = (seconds / DT) as usize;
         for step in 1..=steps {
-            let way = (height + RADIUS - start) * step as f32 / steps as f32;
-            let place = Vec3::new(0.0, start + way, 0.0);
-            self.world.set_pose(self.ball, place, None).expect("a pose");
+            let displacement = (height + RADIUS - start) * step as f32 / steps as f32;
+            let position = Vec3::new(0.0, start + displacement, 0.0);
+            self.world.set_pose(self.ball, position, None).expect("a pose");
             self.world.step(DT).expect("a step");
         }
     }
@@ -118,15 +123,16 @@ impl Slab {
         self.world.wrench(self.ball).expect("a tool").0.as_dvec3()
     }
 
-    fn apart(&self, other: &Self) -> f32 {
+    fn distance(&self, other: &Self) -> f32 {
         let pairs = self.positions().iter().zip(other.positions());
-        pairs.fold(0.0, |apart, (a, b)| apart.max(a.distance(*b)))
+        pairs.fold(0.0, |distance, (a, b)| distance.max(a.distance(*b)))
     }
 }
 
-/// It falls asleep, and a step then changes no bit of it; what is asleep has come to where it would have come to awake.
+/// The slab falls asleep, and a step then leaves it bitwise identical. It sleeps within tolerance of its awake
+/// equilibrium.
 #[test]
-fn what_rests_falls_asleep_where_it_belongs() {
+fn tissue_at_rest_falls_asleep_at_its_equilibrium() {
     let mut slab_asleep = slab(SLEEP, 1, |_| ());
     let mut slab_awake = slab(AWAKE, 1, |_| ());
     assert_eq!(slab_asleep.awake(), 1.0);
@@ -134,8 +140,8 @@ fn what_rests_falls_asleep_where_it_belongs() {
         slab.run(1.5);
     }
     assert_eq!((slab_asleep.awake(), slab_awake.awake()), (0.0, 1.0));
-    let apart = slab_asleep.apart(&slab_awake);
-    assert!(apart <= FAR, "{apart} m apart");
+    let distance = slab_asleep.distance(&slab_awake);
+    assert!(distance <= FAR, "{distance} m apart");
     let before = slab_asleep.positions().to_vec();
     let report = slab_asleep.world.step(DT).expect("a step");
     assert_eq!(report.substeps, 0);
@@ -151,10 +157,10 @@ fn what_rests_falls_asleep_where_it_belongs() {
     );
 }
 
-/// A ball that presses it wakes what moves, and no more; it feels what it would have felt, and tissue goes where it would have gone.
+/// A ball that presses wakes only the part that moves. Forces and positions match those of awake tissue.
 #[test]
 #[ignore = "long"]
-fn a_tool_wakes_what_it_moves() {
+fn a_tool_wakes_only_the_tissue_it_moves() {
     let mut asleep = slab(SLEEP, 1, |_| ());
     let mut awake = slab(AWAKE, 1, |_| ());
     let mut shares = Vec::new();
@@ -165,35 +171,35 @@ fn a_tool_wakes_what_it_moves() {
     assert_eq!(asleep.awake(), 0.0);
     for depth in [0.001, 0.002, 0.003, 0.004] {
         for slab in [&mut asleep, &mut awake] {
-            slab.lead(top - depth, 0.2);
+            slab.move_ball(top - depth, 0.2);
         }
-        let (felt, expected) = (asleep.force(), awake.force());
+        let (force, expected) = (asleep.force(), awake.force());
         assert!(expected.y > 0.005, "{expected} is no force");
         assert!(
-            felt.distance(expected) <= 0.02 * expected.length(),
-            "{felt} N asleep, {expected} N awake at {depth} m"
+            force.distance(expected) <= 0.02 * expected.length(),
+            "{force} N asleep, {expected} N awake at {depth} m"
         );
-        let apart = asleep.apart(&awake);
-        assert!(apart <= 3.0 * FAR, "{apart} m apart at {depth} m");
+        let distance = asleep.distance(&awake);
+        assert!(distance <= 3.0 * FAR, "{distance} m apart at {depth} m");
         shares.push(asleep.awake());
     }
     assert!(
         shares.iter().all(|&share| share > 0.0 && share < 0.7),
         "{shares:?} awake"
     );
-    // The ball rests, and the tissue about it: it feels the same still.
+    // The ball and the tissue around it come to rest. The force stays the same.
     for slab in [&mut asleep, &mut awake] {
         slab.run(1.5);
     }
     assert_eq!(asleep.awake(), 0.0);
-    let (felt, expected) = (asleep.force(), awake.force());
+    let (force, expected) = (asleep.force(), awake.force());
     assert!(
-        felt.distance(expected) <= 0.02 * expected.length(),
-        "{felt} N asleep, {expected} N awake"
+        force.distance(expected) <= 0.02 * expected.length(),
+        "{force} N asleep, {expected} N awake"
     );
-    // It leaves.
+    // The ball leaves.
     for slab in [&mut asleep, &mut awake] {
-        slab.lead(top + 0.02, 0.2);
+        slab.move_ball(top + 0.02, 0.2);
     }
     assert!(asleep.awake() > 0.0);
     assert_eq!(asleep.force(), DVec3::ZERO);
@@ -201,18 +207,18 @@ fn a_tool_wakes_what_it_moves() {
         slab.run(2.0);
     }
     assert_eq!(asleep.awake(), 0.0);
-    let apart = asleep.apart(&awake);
-    assert!(apart <= 3.0 * FAR, "{apart} m apart in the end");
+    let distance = asleep.distance(&awake);
+    assert!(distance <= 3.0 * FAR, "{distance} m apart in the end");
 }
 
-/// Whatever reaches it wakes it.
+/// Every kind of change wakes the body.
 #[test]
-fn what_reaches_it_wakes_it() {
-    let mut slab = slab_of(20, SLEEP, 1, |_| ());
+fn every_change_wakes_sleeping_tissue() {
+    let mut slab = slab_with_cells(20, SLEEP, 1, |_| ());
     let middle = slab.positions().len() as u32 - 1;
     let pin = slab.pins[0];
-    type Reach = (&'static str, fn(&mut Slab, u32, u32));
-    let reaches: [Reach; 12] = [
+    type Change = (&'static str, fn(&mut Slab, u32, u32));
+    let changes: [Change; 12] = [
         ("a force", |slab, node, _| {
             let body = slab.world.body_mut(slab.body).expect("a body");
             body.apply_force(node, Vec3::new(0.0, -0.05, 0.0)).expect("a force");
@@ -224,17 +230,17 @@ fn what_reaches_it_wakes_it() {
                 .pin(node)
                 .expect("a node")
         }),
-        ("a pin let go of", |slab, node, _| {
+        ("a released pin", |slab, node, _| {
             slab.world
                 .body_mut(slab.body)
                 .expect("a body")
                 .unpin(node)
                 .expect("a node");
         }),
-        ("a pin that is led", |slab, _, pin| {
-            let place = slab.positions()[pin as usize];
+        ("a moved pin", |slab, _, pin| {
+            let position = slab.positions()[pin as usize];
             let body = slab.world.body_mut(slab.body).expect("a body");
-            body.move_pin(pin, place + Vec3::X * 1e-3).expect("a pin");
+            body.move_pin(pin, position + Vec3::X * 1e-3).expect("a pin");
         }),
         ("gravity", |slab, _, _| {
             let gravity = slab.world.gravity();
@@ -250,93 +256,94 @@ fn what_reaches_it_wakes_it() {
             let velocities = vec![Vec3::X; body.node_count()];
             body.set_velocities(&velocities).expect("velocities");
         }),
-        ("a tool that is made beside it", |slab, _, _| {
+        ("a tool created beside it", |slab, _, _| {
             slab.ball = slab.make_ball(slab.top() + RADIUS + 1e-3);
         }),
         ("its friction", |slab, _, _| {
             slab.world.set_friction(slab.ball, 0.5).expect("a tool")
         }),
-        ("what it meets", |slab, _, _| {
+        ("its collision filter", |slab, _, _| {
             let filter = CollisionFilter {
                 category: 3,
                 mask: u32::MAX,
             };
             slab.world.set_collision_filter(slab.ball, filter).expect("a tool")
         }),
-        ("a tool that is gone", |slab, _, _| {
+        ("a destroyed tool", |slab, _, _| {
             slab.world.destroy_tool(slab.ball).expect("a tool")
         }),
         ("a call", |slab, _, _| {
             slab.world.body_mut(slab.body).expect("a body").wake()
         }),
     ];
-    for (name, reach) in reaches {
+    for (name, change) in changes {
         slab.run(1.5);
         assert_eq!(slab.awake(), 0.0, "before {name}");
-        reach(&mut slab, middle, pin);
-        assert!(slab.awake() > 0.0, "{name} does not wake it");
+        change(&mut slab, middle, pin);
+        assert!(slab.awake() > 0.0, "{name} does not wake the body");
         slab.run(2.0 * DT);
-        assert!(slab.awake() > 0.0, "after {name} it sleeps at once");
+        assert!(slab.awake() > 0.0, "the body sleeps again right after {name}");
     }
 }
 
-/// Tools far away come and go, and meet this or that, while it sleeps on; what holds it up goes on to feel its weight.
+/// Distant tools are created, changed and destroyed while the body sleeps on. The force on the pressing tool stays the
+/// same.
 #[test]
-fn what_is_far_from_a_tool_sleeps_on() {
-    let mut slab = slab_of(20, SLEEP, 1, |_| ());
-    // In this order: two that are far, and one that presses.
+fn tissue_far_from_a_tool_stays_asleep() {
+    let mut slab = slab_with_cells(20, SLEEP, 1, |_| ());
+    // In this order: two distant tools, and one that presses.
     let first = slab.ball;
     slab.make_ball(50.0);
     let pressing = slab.make_ball(slab.top() + RADIUS - 1e-3);
     slab.run(2.0);
     let force = slab.world.wrench(pressing).expect("a tool").0;
     assert!(slab.awake() == 0.0 && force.y > 1e-3, "{force} N");
-    let sleeps_on = |slab: &mut Slab, what: &str| {
+    let assert_sleeps_on = |slab: &mut Slab, event: &str| {
         slab.world.step(DT).expect("a step");
-        assert_eq!(slab.awake(), 0.0, "{what} wakes it");
-        assert_eq!(slab.world.wrench(pressing).expect("a tool").0, force, "after {what}");
+        assert_eq!(slab.awake(), 0.0, "{event} wakes the body");
+        assert_eq!(slab.world.wrench(pressing).expect("a tool").0, force, "after {event}");
     };
     slab.world.destroy_tool(first).expect("a tool");
-    sleeps_on(&mut slab, "a tool before others that is gone");
-    let again = slab.make_ball(50.0);
-    sleeps_on(&mut slab, "a tool that is made in its place");
+    assert_sleeps_on(&mut slab, "destroying a tool before others");
+    let replaced = slab.make_ball(50.0);
+    assert_sleeps_on(&mut slab, "creating a tool in its slot");
     let last = slab.make_ball(20.0);
-    sleeps_on(&mut slab, "a tool that is made after others");
-    slab.world.set_friction(again, 0.5).expect("a tool");
-    sleeps_on(&mut slab, "friction far away");
+    assert_sleeps_on(&mut slab, "creating a tool after others");
+    slab.world.set_friction(replaced, 0.5).expect("a tool");
+    assert_sleeps_on(&mut slab, "friction of a distant tool");
     let filter = CollisionFilter { category: 0, mask: 0 };
-    slab.world.set_collision_filter(again, filter).expect("a tool");
-    sleeps_on(&mut slab, "what a tool meets far away");
+    slab.world.set_collision_filter(replaced, filter).expect("a tool");
+    assert_sleeps_on(&mut slab, "the filter of a distant tool");
     slab.world.destroy_tool(last).expect("a tool");
-    sleeps_on(&mut slab, "the last tool that is gone");
-    // What no longer meets it lets go of it, and it rises again.
-    let pressed = slab.top();
+    assert_sleeps_on(&mut slab, "destroying the last tool");
+    // A tool that is filtered out releases the tissue, which rises again.
+    let pressed_height = slab.top();
     slab.world.set_collision_filter(pressing, filter).expect("a tool");
     assert!(slab.awake() > 0.0);
     slab.run(1.0);
     let middle = |slab: &Slab| {
-        let above = |place: &&Vec3| place.x.abs() < 1e-3 && place.z.abs() < 1e-3;
+        let above = |position: &&Vec3| position.x.abs() < 1e-3 && position.z.abs() < 1e-3;
         slab.positions()
             .iter()
             .filter(above)
-            .map(|place| place.y)
+            .map(|position| position.y)
             .fold(f32::MIN, f32::max)
     };
     assert!(
-        (middle(&slab) - pressed).abs() < 1e-4,
-        "{} of {pressed} m",
+        (middle(&slab) - pressed_height).abs() < 1e-4,
+        "{} of {pressed_height} m",
         middle(&slab)
     );
 }
 
-/// Solvers, storages and threads.
+/// The state is independent of the number of threads.
 #[test]
-fn any_number_of_threads_leads_to_the_same_state() {
+fn any_number_of_threads_gives_the_same_state() {
     let run = |threads: u32| {
         let mut slab = slab(SLEEP, threads, |_| ());
         slab.run(0.6);
         let top = slab.top();
-        slab.lead(top - 0.003, 0.2);
+        slab.move_ball(top - 0.003, 0.2);
         slab.run(0.1);
         (slab.world.state_hash(), slab.awake())
     };
@@ -348,16 +355,16 @@ fn any_number_of_threads_leads_to_the_same_state() {
 
 #[test]
 fn every_solver_storage_and_model_sleeps() {
-    every_solver_storage_and_model_sleeps_of(|change| change != 0 && change != 3);
+    check_every_solver_storage_and_model_sleeps(|change| change != 0 && change != 3);
 }
 
 #[test]
 #[ignore = "long"]
 fn every_solver_storage_and_model_sleeps_in_the_other_cases() {
-    every_solver_storage_and_model_sleeps_of(|change| change == 0 || change == 3);
+    check_every_solver_storage_and_model_sleeps(|change| change == 0 || change == 3);
 }
 
-fn every_solver_storage_and_model_sleeps_of(is_tried: fn(usize) -> bool) {
+fn check_every_solver_storage_and_model_sleeps(is_selected: fn(usize) -> bool) {
     type Change = fn(&mut BodyDefinition);
     let changes: [(&str, Change); 5] = [
         ("implicit", |definition| definition.solver = Solver::Implicit),
@@ -372,31 +379,31 @@ fn every_solver_storage_and_model_sleeps_of(is_tried: fn(usize) -> bool) {
         }),
         ("volume", |definition| definition.volume_stiffness = 1000.0),
     ];
-    for (_, (name, change)) in (0..).zip(changes).filter(|change| is_tried(change.0)) {
-        let mut asleep = slab_of(20, SLEEP, 1, change);
-        let mut awake = slab_of(20, AWAKE, 1, change);
+    for (_, (name, change)) in (0..).zip(changes).filter(|change| is_selected(change.0)) {
+        let mut asleep = slab_with_cells(20, SLEEP, 1, change);
+        let mut awake = slab_with_cells(20, AWAKE, 1, change);
         for slab in [&mut asleep, &mut awake] {
             slab.run(1.2);
         }
         assert_eq!(asleep.awake(), 0.0, "{name}");
         let top = awake.top();
         for slab in [&mut asleep, &mut awake] {
-            slab.lead(top - 0.002, 0.2);
+            slab.move_ball(top - 0.002, 0.2);
         }
-        let (felt, expected) = (asleep.force(), awake.force());
-        assert!(expected.length() > 0.0, "{name}: nothing is felt");
+        let (force, expected) = (asleep.force(), awake.force());
+        assert!(expected.length() > 0.0, "{name}: no force");
         assert!(
-            felt.distance(expected) <= 0.02 * expected.length(),
-            "{name}: {felt} N asleep, {expected} N awake"
+            force.distance(expected) <= 0.02 * expected.length(),
+            "{name}: {force} N asleep, {expected} N awake"
         );
-        let apart = asleep.apart(&awake);
-        assert!(apart <= 3.0 * FAR, "{name}: {apart} m apart");
+        let distance = asleep.distance(&awake);
+        assert!(distance <= 3.0 * FAR, "{name}: {distance} m apart");
     }
 }
 
-/// Home springs and the pressure inside balance gravity and springs: they are among the forces that are asked for before it sleeps.
+/// Anchor springs and cavity pressure balance gravity and springs. The forces that decide about sleep include them.
 #[test]
-fn what_home_springs_and_pressure_hold_up_sleeps() {
+fn tissue_held_by_anchor_springs_and_pressure_sleeps() {
     type Change = fn(&mut BodyDefinition);
     let changes: [(&str, Change); 2] = [
         ("home springs", |definition| {
@@ -407,7 +414,7 @@ fn what_home_springs_and_pressure_hold_up_sleeps() {
     for (name, change) in changes {
         let [mut asleep, mut awake, plain] =
             [(SLEEP, change), (AWAKE, change), (AWAKE, |_| ())].map(|(sleep, change)| {
-                let mut slab = slab_of(8, sleep, 1, |definition| {
+                let mut slab = slab_with_cells(8, sleep, 1, |definition| {
                     definition.node_dampings = Values::Uniform(0.05);
                     change(definition);
                 });
@@ -415,18 +422,18 @@ fn what_home_springs_and_pressure_hold_up_sleeps() {
                 slab
             });
         assert_eq!(asleep.awake(), 0.0, "{name}");
-        assert!(awake.apart(&plain) > 10.0 * FAR, "{name} does nothing");
+        assert!(awake.distance(&plain) > 10.0 * FAR, "{name} does nothing");
         for slab in [&mut asleep, &mut awake] {
             slab.run(0.5);
         }
-        let apart = asleep.apart(&awake);
-        assert!(apart <= FAR, "{name}: {apart} m apart");
+        let distance = asleep.distance(&awake);
+        assert!(distance <= FAR, "{name}: {distance} m apart");
     }
 }
 
-/// Falling asleep and waking a thousand times changes neither where it rests nor its energy.
+/// Falling asleep and waking a thousand times changes neither the position nor the energy.
 #[test]
-fn a_thousand_sleeps_lead_nowhere() {
+fn a_thousand_sleeps_change_nothing() {
     let cells = 4;
     let mesh = Mesh::block([0.03, 0.03, 0.03], [cells; 3]).expect("a block");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
@@ -457,7 +464,7 @@ fn a_thousand_sleeps_lead_nowhere() {
                 return;
             }
         }
-        panic!("it does not fall asleep");
+        panic!("the body does not fall asleep");
     };
     to_rest(&mut world);
     let start = world.body(body).expect("a body").positions().to_vec();
@@ -480,11 +487,11 @@ fn a_thousand_sleeps_lead_nowhere() {
         to_rest(&mut world);
     }
     let end = world.body(body).expect("a body").positions();
-    let apart = start
+    let distance = start
         .iter()
         .zip(end)
-        .fold(0.0_f32, |apart, (a, b)| apart.max(a.distance(*b)));
-    assert!(apart <= 1e-3 * 0.02, "{apart} m off after a thousand sleeps");
+        .fold(0.0_f32, |distance, (a, b)| distance.max(a.distance(*b)));
+    assert!(distance <= 1e-3 * 0.02, "{distance} m off after a thousand sleeps");
     let scale = 0.03_f64.powi(3) * 1000.0 * 9.81 * f64::from(1e-3_f32 * 0.02);
     assert!(
         (energy(&world) - first).abs() <= scale,
@@ -494,7 +501,7 @@ fn a_thousand_sleeps_lead_nowhere() {
 }
 
 #[test]
-fn a_refused_step_wakes_nobody() {
+fn a_refused_step_wakes_nothing() {
     for damping in [0.0, 1e-3] {
         let change = |definition: &mut BodyDefinition| {
             definition.material = None;
@@ -502,29 +509,29 @@ fn a_refused_step_wakes_nobody() {
             definition.stiffnesses = Values::Uniform(50.0);
             definition.spring_dampings = Values::Uniform(damping);
         };
-        let [mut asked, mut other] = [(); 2].map(|()| {
-            let mut slab = slab_of(20, SLEEP, 1, change);
+        let [mut refusing, mut other] = [(); 2].map(|()| {
+            let mut slab = slab_with_cells(20, SLEEP, 1, change);
             slab.run(1.5);
             slab
         });
-        assert_eq!(asked.awake(), 0.0);
-        let to_touch = Vec3::new(0.0, asked.top() + 0.9 * RADIUS, 0.0);
-        for slab in [&mut asked, &mut other] {
+        assert_eq!(refusing.awake(), 0.0);
+        let to_touch = Vec3::new(0.0, refusing.top() + 0.9 * RADIUS, 0.0);
+        for slab in [&mut refusing, &mut other] {
             slab.world.set_pose(slab.ball, to_touch, None).expect("a pose");
         }
-        let hash = asked.world.state_hash();
+        let hash = refusing.world.state_hash();
         for _ in 0..2 {
-            let refused = asked.world.step(100.0);
+            let refused = refusing.world.step(100.0);
             assert!(matches!(refused, Err(Error::Unstable { .. })), "{refused:?}");
-            assert_eq!(asked.awake(), 0.0);
-            assert_eq!(asked.world.state_hash(), hash);
+            assert_eq!(refusing.awake(), 0.0);
+            assert_eq!(refusing.world.state_hash(), hash);
         }
         for _ in 0..3 {
-            for slab in [&mut asked, &mut other] {
+            for slab in [&mut refusing, &mut other] {
                 slab.world.step(DT).expect("a step");
                 assert!(slab.awake() > 0.0);
             }
-            assert_eq!(asked.world.state_hash(), other.world.state_hash());
+            assert_eq!(refusing.world.state_hash(), other.world.state_hash());
         }
     }
 }

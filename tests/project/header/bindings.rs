@@ -1,22 +1,22 @@
-//! Makes declarations for Python (cffi) and for C# of the one header that has everything.
+//! Generates declarations for Python (cffi) and C# from the single header with all declarations.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// The declarations of a header without comments, preprocessor lines and what is for C++ alone.
+/// Returns the declarations of a header without comments, preprocessor lines and C++ parts.
 fn code(header: &str) -> String {
     let lines = header
         .lines()
         .map(|line| line.split("//").next().unwrap_or_default().trim_end());
     let kept = lines.filter(|line| !line.starts_with('#') && !line.is_empty() && *line != "extern \"C\" {");
-    // The last brace closes what C++ opens.
+    // The last brace closes an extern block of C++.
     let mut kept: Vec<&str> = kept.collect();
     let closing = kept.iter().rposition(|line| *line == "}");
     closing.map(|index| kept.remove(index));
     kept.join("\n")
 }
 
-/// The constants that are no enumerators, as numbers.
+/// Returns the constants that are no enumerators, as numbers.
 fn constants(header: &str) -> Vec<(&str, u64)> {
     let defines = header.lines().filter_map(|line| line.strip_prefix("#define "));
     let words = defines.filter_map(|line| line.split("//").next()?.trim().split_once(' '));
@@ -29,7 +29,7 @@ fn constants(header: &str) -> Vec<(&str, u64)> {
         .collect()
 }
 
-/// What `ffi.cdef` of cffi reads.
+/// Returns the input of cffi's `ffi.cdef`.
 pub fn cffi(header: &str) -> String {
     let mut text = String::from("// Generated from include/sinew; do not edit. For ffi.cdef of cffi.\n");
     for (name, value) in constants(header) {
@@ -39,16 +39,16 @@ pub fn cffi(header: &str) -> String {
     text
 }
 
-/// The statements of C, each in one line.
+/// Returns the C statements, each on one line.
 fn statements(code: &str) -> Vec<String> {
     let (mut all, mut depth, mut start) = (Vec::new(), 0, 0);
-    for (place, letter) in code.char_indices() {
+    for (index, letter) in code.char_indices() {
         match letter {
             '{' => depth += 1,
             '}' => depth -= 1,
             ';' if depth == 0 => {
-                all.push(code[start..place].split_whitespace().collect::<Vec<_>>().join(" "));
-                start = place + 1;
+                all.push(code[start..index].split_whitespace().collect::<Vec<_>>().join(" "));
+                start = index + 1;
             }
             _ => {}
         }
@@ -66,10 +66,10 @@ fn name(of: &str) -> String {
     }
 }
 
-/// A declared type and the name behind it, in C#. `opaque` are types that are addresses there: callbacks, and with one star of their own what
-/// is pointed to alone.
+/// Returns a declared type in C#, and the name after it. `opaque` types are addresses in C#: callbacks, and handle
+/// types, whose one star is part of the type.
 fn typed<'a>(declared: &'a str, opaque: &BTreeMap<String, usize>) -> (String, &'a str) {
-    let end = declared.rfind([' ', '*']).map_or(0, |place| place + 1);
+    let end = declared.rfind([' ', '*']).map_or(0, |index| index + 1);
     let (kind, name) = declared.split_at(end);
     let stars = kind.matches('*').count();
     let words = kind.replace(['*'], " ");
@@ -91,7 +91,7 @@ fn typed<'a>(declared: &'a str, opaque: &BTreeMap<String, usize>) -> (String, &'
     (format!("{base}{}", "*".repeat(stars)), name)
 }
 
-/// A class with every function, constant and struct.
+/// Returns a class with every function, constant and struct.
 pub fn csharp(header: &str) -> String {
     let mut opaque = BTreeMap::new();
     let statements = statements(&code(header));

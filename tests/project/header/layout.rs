@@ -1,15 +1,16 @@
-//! Arranges what cbindgen declares into the headers of `include/`: by subject, each type before its first function.
+//! Arranges the declarations of cbindgen into the headers of `include/`: by subject, each type before its first
+//! function.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-/// Longest line of a header.
+/// Maximum line length of a header.
 pub const WIDTH: usize = 100;
 
 const LAYOUT: &str = include_str!("layout.txt");
 const OVERVIEW: &str = include_str!("overview.txt");
 
-/// Constants that C has as an enumeration: its name, the prefix of its constants and its comment.
+/// Constants that are an enumeration in C: its name, the prefix of its constants and its comment.
 const ENUMS: [(&str, &str, &str); 16] = [
     (
         "sinew_status_code",
@@ -83,7 +84,7 @@ pub struct Header {
     pub text: String,
 }
 
-/// What follows a comment: a line of C and, of a struct or an enumeration, its members.
+/// The code after a comment: a line of C and, for a struct or an enumeration, its members.
 #[derive(Default)]
 struct Item {
     comment: Vec<String>,
@@ -91,7 +92,7 @@ struct Item {
     members: Vec<(Vec<String>, String)>,
 }
 
-/// The paragraphs of a comment in C: those before the sections of Rust.
+/// Returns the paragraphs of a C comment: those before the Rust sections.
 fn paragraphs(lines: &[&str]) -> Vec<String> {
     let lines = lines
         .iter()
@@ -114,7 +115,7 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|letter: char| !(letter.is_ascii_alphanumeric() || letter == '_'))
 }
 
-/// The name that a line of C declares.
+/// Returns the name that a line of C declares.
 fn name_of(code: &str) -> &str {
     if let Some(rest) = code.strip_prefix("#define ") {
         return rest.split(' ').next().unwrap_or_default();
@@ -126,7 +127,7 @@ fn name_of(code: &str) -> &str {
     words(head).filter(|word| !word.is_empty()).last().unwrap_or_default()
 }
 
-/// The declarations of cbindgen by name; constants of an enumeration are its members.
+/// Returns the declarations of cbindgen by name; constants of an enumeration are its members.
 fn items(declared: &str) -> BTreeMap<String, Item> {
     let mut items = BTreeMap::<String, Item>::new();
     let mut comment = Vec::new();
@@ -146,8 +147,8 @@ fn items(declared: &str) -> BTreeMap<String, Item> {
                 owner.members.push((comment, code));
             }
             None => {
-                let of = ENUMS.iter().find(|(_, prefix, _)| name.starts_with(prefix));
-                if let (true, Some((owner, _, about))) = (code.starts_with('#'), of) {
+                let enumeration = ENUMS.iter().find(|(_, prefix, _)| name.starts_with(prefix));
+                if let (true, Some((owner, _, about))) = (code.starts_with('#'), enumeration) {
                     let owner = items.entry((*owner).to_owned()).or_insert_with(|| Item {
                         comment: vec![(*about).to_owned()],
                         code: format!("typedef enum {owner}"),
@@ -177,7 +178,7 @@ fn items(declared: &str) -> BTreeMap<String, Item> {
     items
 }
 
-/// Pieces as lines of at most [`WIDTH`], the first after `first` and the others after `next`.
+/// Wraps pieces to lines of at most [`WIDTH`], the first after `first` and the others after `next`.
 fn wrap<'a>(pieces: impl Iterator<Item = &'a str>, first: &str, next: &str) -> String {
     let mut lines = vec![first.to_owned()];
     let mut is_empty = true;
@@ -202,9 +203,9 @@ fn comment(paragraphs: &[String], indent: &str) -> String {
         .collect()
 }
 
-/// Code with its comment: behind it, in this column, where there is room, else above.
-fn commented(code: &str, of: &[String], indent: &str, column: usize) -> String {
-    if let [text] = of {
+/// Returns code with its comment: after it, in this column, if there is room, else above.
+fn commented(code: &str, paragraphs: &[String], indent: &str, column: usize) -> String {
+    if let [text] = paragraphs {
         let code = format!("{indent}{code}  ");
         for line in [format!("{code:column$}///< {text}\n"), format!("{code}///< {text}\n")] {
             if line.len() <= WIDTH + 1 {
@@ -212,7 +213,7 @@ fn commented(code: &str, of: &[String], indent: &str, column: usize) -> String {
             }
         }
     }
-    format!("{}{indent}{code}\n", comment(&[of.join(" ")], indent))
+    format!("{}{indent}{code}\n", comment(&[paragraphs.join(" ")], indent))
 }
 
 impl Item {
@@ -245,15 +246,15 @@ impl Item {
         let longest = codes.iter().map(String::len).filter(|length| *length <= 34).max();
         let column = longest.unwrap_or(0) + 4;
         writeln!(text, "{} {{", self.code).expect("a string");
-        for (code, (of, _)) in codes.iter().zip(&self.members) {
-            text += &commented(code, of, "  ", column);
+        for (code, (paragraphs, _)) in codes.iter().zip(&self.members) {
+            text += &commented(code, paragraphs, "  ", column);
         }
         writeln!(text, "}} {name};").expect("a string");
         text
     }
 }
 
-/// One header of the layout while it is filled.
+/// One header of the layout during arrangement.
 #[derive(Default)]
 struct Part {
     name: String,
@@ -265,12 +266,12 @@ struct Part {
 
 struct Arranger {
     items: BTreeMap<String, Item>,
-    /// The header of each item that is placed.
+    /// The header of each placed item.
     placed: BTreeMap<String, String>,
 }
 
 impl Arranger {
-    /// What must stand before an item: types that it is made of, and constants that its comments name.
+    /// Returns the items that must precede an item: its member types, and constants that its comments name.
     fn needed(&self, name: &str) -> Vec<String> {
         let item = &self.items[name];
         let members = item.members.iter();
@@ -280,11 +281,11 @@ impl Arranger {
             .filter(|word| self.items.contains_key(*word));
         let comments = members.flat_map(|(comment, _)| comment).chain(&item.comment);
         let constants = comments.flat_map(|text| words(text)).filter_map(|word| {
-            let of = ENUMS
+            let enumeration = ENUMS
                 .iter()
                 .find(|(owner, prefix, _)| *owner == word || word.starts_with(prefix));
             let constant = self.items.get(word).filter(|item| item.is_constant()).map(|_| word);
-            of.map(|(owner, ..)| *owner).or(constant)
+            enumeration.map(|(owner, ..)| *owner).or(constant)
         });
         types
             .chain(constants)
@@ -312,10 +313,10 @@ impl Arranger {
     }
 }
 
-/// Text as line comments; lines that begin with spaces are entries of a list.
+/// Formats text as line comments; lines that begin with spaces are list entries.
 fn prose(text: &str) -> String {
     let lines = text.lines().map(|line| match line.strip_prefix("  ") {
-        // A table stays as it is.
+        // A table is unchanged.
         Some(entry) if entry.contains("  ") => format!("//   {entry}\n"),
         Some(entry) => wrap(entry.split_whitespace(), "//   ", "//     "),
         None => wrap(line.split_whitespace(), "// ", "// "),
@@ -333,7 +334,7 @@ fn parts(items: BTreeMap<String, Item>) -> Vec<Part> {
         placed: BTreeMap::new(),
     };
     let mut parts = Vec::<Part>::new();
-    // Behind the explanation of the file itself.
+    // After the explanation of the file format.
     let lines = LAYOUT.lines().skip_while(|line| !line.starts_with("header "));
     for line in lines.filter(|line| !line.is_empty()) {
         if let Some(rest) = line.strip_prefix("header ") {
@@ -367,20 +368,20 @@ const MADE: &str = "// Generated by cbindgen from src/capi; do not edit.\n";
 const SYSTEM: &str = "#include <stddef.h>\n#include <stdint.h>\n";
 const OPEN: &str = "\n#ifdef __cplusplus\nextern \"C\" {\n#endif\n";
 const CLOSE: &str = "\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n";
-/// What base.h defines for the other headers, which are shorter with it.
+/// Macros of base.h that shorten the other headers.
 const LINKAGE: &str = "\n#ifdef __cplusplus\n#define SINEW_BEGIN extern \"C\" {\n#define SINEW_END }\n#else\n\
     #define SINEW_BEGIN\n#define SINEW_END\n#endif\n";
 
-/// What a header begins with behind its introduction.
-fn opened(guard: &str) -> String {
+/// Returns the text of a header after its introduction.
+fn header_start(guard: &str) -> String {
     format!("\n#ifndef {guard} // generated by cbindgen from src/capi: do not edit\n#define {guard}\n\n")
 }
 
-/// All headers that are made of what cbindgen declares.
+/// Returns all headers generated from the declarations of cbindgen.
 pub fn arrange(declared: &str) -> Vec<Header> {
     let parts = parts(items(declared));
     let mut headers = Vec::new();
-    let mut overview = prose(OVERVIEW) + &opened("SINEW_H");
+    let mut overview = prose(OVERVIEW) + &header_start("SINEW_H");
     let mut all = "// sinew: all headers of include/sinew/ in one, for LuaJIT, cffi and other tools.\n".to_owned();
     all += &format!("{MADE}\n#ifndef SINEW_H\n#define SINEW_H\n");
     for part in &parts {
@@ -390,7 +391,7 @@ pub fn arrange(declared: &str) -> Vec<Header> {
     for part in &parts {
         overview += &format!("#include \"sinew/{}.h\"\n", part.name);
         let guard = guard(&part.name);
-        let mut text = prose(&part.introduction) + &opened(&guard);
+        let mut text = prose(&part.introduction) + &header_start(&guard);
         if part.includes.is_empty() {
             text += &format!("{SYSTEM}{LINKAGE}");
         }

@@ -1,27 +1,31 @@
 //! The balance of energy and momentum of a body.
 //!
-//! **Energy.** `E` is the kinetic, elastic and gravitational energy of the body together, with the nodal masses: what mass scaling adds is no
-//! energy of the body, and only takes some of it for a while. It begins with `E0`, and its static equilibrium has
-//! `E_rest`. The work `W` is a sum over the steps: the mean force of a moved pin times the pin's displacement, an applied force times the
-//! displacement of its node, and the force of a tool times the tool's displacement. The energy put in is `E0 - E_rest + W`: this much can
-//! become motion. Only work raises `E`, and damping lowers it, so `E <= E0 + W`. The excess `E - E0 - W`, a mean over one simulated second, may
-//! be a thousandth of the energy put in. Checks begin when the body is released.
+//! **Energy.** `E` is the kinetic, elastic and gravitational energy of the body together, with the nodal masses: what
+//! mass scaling adds is no energy of the body, and only takes some of it for a while. It begins with `E0`, and its
+//! static equilibrium has `E_rest`. The work `W` is a sum over the steps: the mean force of a moved pin times the pin's
+//! displacement, an applied force times the displacement of its node, and the force of a tool times the tool's
+//! displacement. The energy put in is `E0 - E_rest + W`: this much can become motion. Only work raises `E`, and damping
+//! lowers it, so `E <= E0 + W`. The excess `E - E0 - W`, a mean over one simulated second, may be a thousandth of the
+//! energy put in. Checks begin when the body is released.
 //!
-//! The mean allows for the one thing that leapfrog does to `E` without a fault. VERLET follows exactly the motion of another energy. A mode of
-//! frequency `omega` in substeps `h`, with `z = h omega`, kinetic energy `K` and elastic energy `U`, conserves
+//! The mean allows for the one thing that leapfrog does to `E` without a fault. VERLET follows exactly the motion of
+//! another energy. A mode of frequency `omega` in substeps `h`, with `z = h omega`, kinetic energy `K` and elastic
+//! energy `U`, conserves
 //!
 //! `S = c (K + (1 - z²/4) U)`, `c = 2 asin(z/2) / (z sqrt(1 - z²/4))`.
 //!
-//! So `K + U` oscillates between `S / c` and `S / (c (1 - z²/4))`. `K` and `(1 - z²/4) U` have the same mean, and the mean of `K + U` is
-//! `S (1 - z²/8) / (c (1 - z²/4))`, about `(1 - z²/24) S`. It is below `S` for every `z` up to 1.67, and substeps of 0.8 of the limit have
-//! `z <= 1.6`. When nonlinear forces move energy from slow modes to fast ones, the sum of `S` stays and the mean of `E` falls a little. The body
-//! begins with energy in slow modes alone, where `S` is `E`. So the mean of `E` stays below `E0 + W` with VERLET too. A second is long
-//! for modes whose `z` is not small: their periods are a few substeps.
+//! So `K + U` oscillates between `S / c` and `S / (c (1 - z²/4))`. `K` and `(1 - z²/4) U` have the same mean, and the
+//! mean of `K + U` is `S (1 - z²/8) / (c (1 - z²/4))`, about `(1 - z²/24) S`. It is below `S` for every `z` up to 1.67,
+//! and substeps of 0.8 of the limit have `z <= 1.6`. When nonlinear forces move energy from slow modes to fast ones,
+//! the sum of `S` stays and the mean of `E` falls a little. The body begins with energy in slow modes alone, where `S`
+//! is `E`. So the mean of `E` stays below `E0 + W` with VERLET too. A second is long for modes whose `z` is not small:
+//! their periods are a few substeps.
 //!
-//! **Momentum.** No external force acts on a free body. Its momentum may change by 1e-5 of the sum of the magnitudes of the nodal momenta, and by
-//! 1e-10 of it in a substep more: rounding was seen to add 6e-11, of which ten minutes have up to a million. Its angular momentum about the
-//! centre of mass may change by 2e-3. Mass scaling adds inertia that the nodal masses do not contain. Their momentum may change by twice
-//! the momentum that the added mass has at the speed of the fastest node.
+//! **Momentum.** No external force acts on a free body. Its momentum may change by 1e-5 of the sum of the magnitudes of
+//! the nodal momenta, and by 1e-10 of it in a substep more: rounding was seen to add 6e-11, of which ten minutes have
+//! up to a million. Its angular momentum about the center of mass may change by 2e-3. Mass scaling adds inertia that
+//! the nodal masses do not contain. Their momentum may change by twice the momentum that the added mass has at the
+//! speed of the fastest node.
 
 use glam::DVec3;
 use sinew::{Body, Error};
@@ -59,7 +63,7 @@ impl Account {
         Ok((account, Figures::of(allowed - rest)))
     }
 
-    /// Adds the work of a step, J.
+    /// Adds the work of a step (J).
     pub fn add_work(&mut self, work: f64, figures: &mut Figures) {
         self.allowed += work;
         figures.put_in += work;
@@ -70,19 +74,19 @@ impl Account {
         self.sum += scene.energy() - self.allowed;
         self.count += 1;
         if self.count == per_second {
-            figures.see_energy(self.sum / self.count as f64 / figures.put_in);
+            figures.record_energy(self.sum / self.count as f64 / figures.put_in);
             (self.sum, self.count) = (0.0, 0);
         }
         if let Some(first) = &self.momenta {
             let now = Momenta::of(scene.body(), masses);
             let added = 2.0 * scene.body().solver_report().added_mass * now.fastest;
-            figures.see_momentum(((now.sum - first.sum).length() - added).max(0.0) / first.size);
-            figures.see_angular_momentum((now.angular - first.angular).length() / first.angular.length());
+            figures.record_momentum(((now.sum - first.sum).length() - added).max(0.0) / first.size);
+            figures.record_angular_momentum((now.angular - first.angular).length() / first.angular.length());
         }
     }
 }
 
-/// Momentum, and angular momentum about the centre of mass.
+/// Momentum, and angular momentum about the center of mass.
 struct Momenta {
     sum: DVec3,
     /// The sum of the magnitudes of the nodal momenta.

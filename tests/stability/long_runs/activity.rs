@@ -51,7 +51,7 @@ impl Activity {
     }
 }
 
-/// Sets velocities of a rotation about the centre of mass.
+/// Sets velocities of a rotation about the center of mass.
 fn spin(scene: &mut Scene, subject: &Subject) {
     let positions = scene.body().positions();
     let weighed = positions.iter().zip(&subject.masses);

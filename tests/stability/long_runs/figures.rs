@@ -5,7 +5,8 @@ use std::fmt;
 /// Excess energy over the energy put in.
 const ENERGY: f64 = 1e-3;
 
-/// Change of momentum over the sum of the magnitudes of the nodal momenta, and how much more rounding adds in a substep at most.
+/// Change of momentum over the sum of the magnitudes of the nodal momenta, and how much more rounding adds in a substep
+/// at most.
 const MOMENTUM: f64 = 1e-5;
 const ROUNDING: f64 = 1e-10;
 
@@ -37,7 +38,8 @@ pub struct Figures {
     angular_momentum: Option<f64>,
     /// Kinetic energy left at the end over the energy put in, if damping should have taken it.
     pub kinetic: Option<f64>,
-    /// Relative error of the frequency of the first mode, against the formula of the solver and against the true frequency.
+    /// Relative error of the frequency of the first mode, against the formula of the solver and against the true
+    /// frequency.
     pub frequency: Option<[f64; 2]>,
     pub substeps: u32,
     /// Processor time of all steps, s.
@@ -68,29 +70,29 @@ impl Figures {
     }
 
     /// The figures of a run that could not start.
-    pub fn of_fault(fault: String) -> Self {
+    pub fn from_fault(fault: String) -> Self {
         Self {
             faults: vec![fault],
             ..Self::default()
         }
     }
 
-    pub fn see_energy(&mut self, excess: f64) {
+    pub fn record_energy(&mut self, excess: f64) {
         raise(&mut self.energy, excess);
         if !(excess <= ENERGY) && self.exceeded_at.is_none() {
             self.exceeded_at = Some(self.time);
         }
     }
 
-    pub fn see_momentum(&mut self, lost: f64) {
+    pub fn record_momentum(&mut self, lost: f64) {
         raise(&mut self.momentum, lost);
     }
 
-    pub fn see_angular_momentum(&mut self, lost: f64) {
+    pub fn record_angular_momentum(&mut self, lost: f64) {
         raise(&mut self.angular_momentum, lost);
     }
 
-    /// Whether the run need not continue.
+    /// True if the run need not continue.
     pub fn is_hopeless(&self) -> bool {
         !self.faults.is_empty() || self.energy.is_some_and(|energy| !(energy <= 1.0))
     }

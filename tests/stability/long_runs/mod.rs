@@ -1,8 +1,9 @@
 //! Long runs from good states: bodies hang, spin and are pressed for ten simulated minutes.
 //!
-//! `quick.rs` beside this folder runs some rows for a few seconds, `benches/stability.rs` runs all of them. A row names a body (`subject.rs`), an
-//! activity (`activity.rs`, `press.rs`), a solver and a step. A row fails if energy grows or momentum is lost (`account.rs`), if the
-//! frequency of the first mode is wrong (`pluck.rs`), if a step is refused, or if a body is restored.
+//! `quick.rs` beside this folder runs some rows for a few seconds, `benches/stability.rs` runs all of them. A row names
+//! a body (`subject.rs`), an activity (`activity.rs`, `press.rs`), a solver and a step. A row fails if energy grows or
+//! momentum is lost (`account.rs`), if the frequency of the first mode is wrong (`pluck.rs`), if a step is refused, or
+//! if a body is restored.
 
 mod account;
 mod activity;

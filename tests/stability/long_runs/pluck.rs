@@ -1,13 +1,14 @@
 //! The frequency of the first mode.
 //!
-//! A body hangs in equilibrium. Sideways forces proportional to the masses deflect it by a small fraction of its length, and then release it.
-//! The deflected shape is nearly that of the first mode. So the sum over the nodes of mass times displacement times this shape is nearly
-//! a pure oscillation, and the times of its zeros give the frequency.
+//! A body hangs in equilibrium. Sideways forces proportional to the masses deflect it by a small fraction of its
+//! length, and then release it. The deflected shape is nearly that of the first mode. So the sum over the nodes of mass
+//! times displacement times this shape is nearly a pure oscillation, and the times of its zeros give the frequency.
 //!
-//! The true frequency comes from NEWTON, which solves its equations in `f64`, with short steps. The discretisation error of its formula is
-//! known and is removed: for a mode of frequency `omega`, BDF2 has `(3/2 - i omega h) z² - 2 z + 1/2 = 0`, and its phase advances by `arg z`
-//! in a step. An IMPLICIT or NEWTON row is compared with `arg z / h`, the frequency of its own formula at its step: the difference is
-//! the error of the solver. A VERLET row is compared with the true frequency: `2/h asin(h omega / 2)` differs from it by `(h omega)²/24`, less
+//! The true frequency comes from NEWTON, which solves its equations in `f64`, with short steps. The discretization
+//! error of its formula is known and is removed: for a mode of frequency `omega`, BDF2 has
+//! `(3/2 - i omega h) z² - 2 z + 1/2 = 0`, and its phase advances by `arg z` in a step. An IMPLICIT or NEWTON row is
+//! compared with `arg z / h`, the frequency of its own formula at its step: the difference is the error of the solver.
+//! A VERLET row is compared with the true frequency: `2/h asin(h omega / 2)` differs from it by `(h omega)²/24`, less
 //! than 1e-4 in substeps that are stable for the highest mode.
 
 use std::f64::consts::TAU;
@@ -107,7 +108,7 @@ fn deflect(subject: &Subject, rest: &[Vec3]) -> Result<Vec<Vec3>, Error> {
     // Small deflections are proportional to the forces: the first deflection gives the right force.
     let mut share = 1e-3;
     for _ in 0..2 {
-        rest_under(&mut scene, subject, share)?;
+        rest_under_sideways_load(&mut scene, subject, share)?;
         let deflected = scene.body().positions();
         let farthest = deflected
             .iter()
@@ -120,7 +121,7 @@ fn deflect(subject: &Subject, rest: &[Vec3]) -> Result<Vec<Vec3>, Error> {
 }
 
 /// Moves the body to equilibrium under a fraction of its weight applied sideways.
-fn rest_under(scene: &mut Scene, subject: &Subject, share: f64) -> Result<(), Error> {
+fn rest_under_sideways_load(scene: &mut Scene, subject: &Subject, share: f64) -> Result<(), Error> {
     let forces = subject
         .masses
         .iter()

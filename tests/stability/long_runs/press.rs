@@ -77,7 +77,7 @@ impl Press {
         Some(press)
     }
 
-    /// Whether the body has been released.
+    /// True if the body has been released.
     pub fn is_over(&self) -> bool {
         self.is_over
     }

@@ -28,7 +28,7 @@ pub fn quick() -> Vec<(Row, f64)> {
     };
     vec![
         verlet(liver(Elements(0.3)), Hanging, FRAME, 5.0),
-        // After 54 s a few elements ask for more substeps than are allowed.
+        // After 54 s a few elements need more substeps than are allowed.
         verlet(liver(Elements(0.3)), Hanging, 1.0 / 30.0, 56.0),
         verlet(elements, Hanging, FRAME, 3.0),
         verlet(matter(Organ, Young, Maxwell), Hanging, FRAME, 3.0),
@@ -47,7 +47,7 @@ pub fn quick() -> Vec<(Row, f64)> {
         verlet(lattice, Poked, FRAME, 5.0),
         verlet(balloon, Led, FRAME, 5.0),
         verlet(springs, Spinning, FRAME, 5.0),
-        // Mass is added in the first step, at velocities that are there already.
+        // Mass is added in the first step, when the velocities are already set.
         verlet(matter(Organ, Young, Fibres), Spinning, FRAME, 5.0),
         verlet(matter(Gallbladder, Elements(0.3), Nothing), Spinning, FRAME, 5.0),
         verlet(elements, Plucked, FRAME, 0.0),
@@ -58,7 +58,7 @@ pub fn quick() -> Vec<(Row, f64)> {
         damped(implicit(lattice, Hanging, FRAME, 110.0)),
         implicit(small, Pushed, FRAME, 3.0),
         implicit(small, Spinning, FRAME, 5.0),
-        // What rounding was taken to add was a thousandth after 160 s.
+        // An earlier allowance for rounding reached a thousandth after 160 s.
         implicit(matter(SmallOrgan, Young, Nothing), Spinning, 1.0 / 30.0, 170.0),
         implicit(balloon, Spinning, 1.0 / 120.0, 5.0),
         implicit(matter(Gallbladder, Young, Nothing), Plucked, 1e-3, 0.0),

@@ -13,14 +13,14 @@ use super::subject::Subject;
 pub type Known<T> = Mutex<Option<HashMap<String, T>>>;
 
 /// The result of `find`, computed once for each name.
-pub fn once<T: Clone>(known: &Known<T>, name: &str, find: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
-    let mut known = known.lock().expect("nobody has panicked");
-    let known = known.get_or_insert_default();
-    if let Some(found) = known.get(name) {
+pub fn once<T: Clone>(results: &Known<T>, name: &str, find: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+    let mut results = results.lock().expect("nobody has panicked");
+    let results = results.get_or_insert_default();
+    if let Some(found) = results.get(name) {
         return Ok(found.clone());
     }
     let found = find()?;
-    known.insert(name.into(), found.clone());
+    results.insert(name.into(), found.clone());
     Ok(found)
 }
 

@@ -19,7 +19,7 @@ pub struct Length {
 /// Damping times time after which a damped body is at rest: `exp(-30)` of its energy is left.
 const DECAYED: f32 = 30.0;
 
-/// Runs a row; `watch` sees the figures after each check.
+/// Runs a row; `watch` gets the figures after each check.
 pub fn run(row: &Row, length: &Length, watch: &mut dyn FnMut(&Figures)) -> Outcome {
     let Some(subject) = Subject::new(row.matter, row.damping) else {
         return Outcome::Skipped;
@@ -28,7 +28,7 @@ pub fn run(row: &Row, length: &Length, watch: &mut dyn FnMut(&Figures)) -> Outco
         Activity::Plucked => pluck::ring(row, &subject),
         _ => simulate(row, &subject, length, watch),
     };
-    Outcome::Ran(result.unwrap_or_else(|error| Figures::of_fault(format!("no start: {error}"))))
+    Outcome::Ran(result.unwrap_or_else(|error| Figures::from_fault(format!("no start: {error}"))))
 }
 
 fn simulate(

@@ -100,7 +100,7 @@ pub enum Extra {
     Maxwell,
     /// A dashpot parallel to the elastic law.
     Voigt,
-    /// Fibres along the body.
+    /// Fibers along the body.
     Fibres,
     /// Springs stiffen exponentially.
     Exponential,

@@ -21,7 +21,8 @@ pub struct Row {
 }
 
 impl Row {
-    /// Runs the row for a simulated time, limited by processor time, both in s; `watch` sees the figures after each check.
+    /// Runs the row for a simulated time, limited by processor time (both in s); `watch` gets the figures after each
+    /// check.
     pub fn run(&self, simulated: f64, processor: f64, watch: &mut dyn FnMut(&Figures)) -> Outcome {
         run(self, &Length { simulated, processor }, watch)
     }
