@@ -1,7 +1,7 @@
-//! What a cut costs, and what a body pays for it that may be cut: sheets of 10K and of 1M nodes, cut across as many triangles, and blocks of 40K and
-//! of 1.1M tetrahedra, cut across as many, with caches cold.
+//! The cost of a cut, and the cost of cuttable bodies. Sheets of 10K and 1M nodes are cut across equally many
+//! triangles, blocks of 40K and 1.1M tetrahedra across equally many elements, with cold caches.
 //!
-//! `cargo bench --bench cutting` writes `target/report/cutting.md`. Times are the processor's, the median of all cuts.
+//! `cargo bench --bench cutting` writes `target/report/cutting.md`. Times are wall times, the median of all cuts.
 #![allow(clippy::print_stderr)]
 
 use std::fmt::Write;
@@ -14,19 +14,19 @@ use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, BodyId, Material, Model, Solver, Storage, Tearing, Values, World, WorldDefinition};
 
-/// Cells along a side of the small sheet and of the large one.
+/// Cells along a side of the small and the large sheet.
 const SIDES: [usize; 2] = [99, 999];
 
-/// The same of the blocks.
+/// Cells along a side of the small and the large block.
 const BLOCKS: [u32; 2] = [20, 60];
 
 const CUTS: usize = 40;
 
-/// The longest that the same cut may take on the large sheet, as a multiple of its time on the small one.
-const MOST: f64 = 3.0;
+/// The largest allowed ratio of the same cut's times on the large and the small sheet.
+const MAX_RATIO: f64 = 3.0;
 
-/// More than any cache.
-const FLUSHED: usize = 128 << 20;
+/// Larger than any cache.
+const FLUSH_BYTES: usize = 128 << 20;
 
 const CELL: f32 = 0.01;
 
@@ -48,15 +48,15 @@ fn main() -> ExitCode {
             let (triangles, times) = cuts(&mut world, body, side);
             let (median, most) = (times[times.len() / 2], times[times.len() * 9 / 10]);
             let ratio = median / small;
-            let shown = if small.is_nan() {
+            let ratio_text = if small.is_nan() {
                 String::new()
             } else {
                 format!("{ratio:.2}")
             };
             small = if small.is_nan() { median } else { small };
-            missed += usize::from(ratio > MOST);
+            missed += usize::from(ratio > MAX_RATIO);
             let line = format!(
-                "| {storage:?} | {} | {triangles} | {:.3} | {:.3} | {shown} |",
+                "| {storage:?} | {} | {triangles} | {:.3} | {:.3} | {ratio_text} |",
                 (side + 1) * (side + 1),
                 1e3 * median,
                 1e3 * most
@@ -77,18 +77,18 @@ fn main() -> ExitCode {
         let mut small = f64::NAN;
         for side in BLOCKS {
             let (mut world, body) = block(side, has_elements, solver);
-            let (faces, times) = cuts_of_block(&mut world, body, side);
+            let (faces, times) = block_cuts(&mut world, body, side);
             let (median, most) = (times[times.len() / 2], times[times.len() * 9 / 10]);
             let ratio = median / small;
-            let shown = if small.is_nan() {
+            let ratio_text = if small.is_nan() {
                 String::new()
             } else {
                 format!("{ratio:.2}")
             };
             small = if small.is_nan() { median } else { small };
-            missed += usize::from(ratio > MOST);
+            missed += usize::from(ratio > MAX_RATIO);
             let line = format!(
-                "| {} | {solver:?} | {} | {faces} | {:.3} | {:.3} | {shown} |",
+                "| {} | {solver:?} | {} | {faces} | {:.3} | {:.3} | {ratio_text} |",
                 if has_elements { "elements" } else { "springs" },
                 5 * side * side * side,
                 1e3 * median,
@@ -99,11 +99,11 @@ fn main() -> ExitCode {
         }
     }
     report.push_str(
-        "\nA step of VERLET of a sheet of 10K nodes that may be cut, and has not been, over that of one that may not: ",
+        "\nTime of a VERLET step of an uncut cuttable sheet of 10K nodes over that of a sheet that is not cuttable: ",
     );
-    let [cut, tears] = paid();
+    let [cut, tears] = cuttable_cost();
     let _ = writeln!(report, "{cut:.3}");
-    report.push_str("\nOne that may tear, and does not, over one that may only be cut: ");
+    report.push_str("\nTime of a tearable sheet without tears over that of a cuttable sheet: ");
     let _ = writeln!(report, "{tears:.3}");
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("report");
     let path = folder.join("cutting.md");
@@ -111,7 +111,7 @@ fn main() -> ExitCode {
         eprintln!("{}: {error}", path.display());
         return ExitCode::FAILURE;
     }
-    eprintln!("{}: {missed} not as they should be", path.display());
+    eprintln!("{}: {missed} targets missed", path.display());
     if missed == 0 {
         ExitCode::SUCCESS
     } else {
@@ -158,22 +158,22 @@ fn torn_sheet(side: usize, storage: Storage, spare_nodes: u32, tearing: Tearing)
     (world, body)
 }
 
-/// Cuts of the same length all over a sheet: how many triangles they met in the mean, and how long they took, in order, s.
+/// Makes cuts of equal length all over a sheet. Returns the mean number of new triangles, and the sorted times [s].
 fn cuts(world: &mut World, body: BodyId, side: usize) -> (usize, Vec<f64>) {
-    let mut flushed = vec![1_u8; FLUSHED];
+    let mut flushed = vec![1_u8; FLUSH_BYTES];
     let mut times = Vec::new();
     let mut triangles = 0;
     for cut in 0..CUTS {
-        // In rows and columns, so that no two meet, and turned by more each.
-        let place = vec2((cut % 8) as f32 + 0.5, (cut / 8) as f32 + 0.5) / vec2(8.0, 5.0);
-        let middle = CELL * side as f32 * place;
-        let way = 5.3 * CELL * Vec2::from_angle(0.7 * cut as f32);
+        // In rows and columns, so that no two cuts intersect, each with another direction.
+        let position = vec2((cut % 8) as f32 + 0.5, (cut / 8) as f32 + 0.5) / vec2(8.0, 5.0);
+        let middle = CELL * side as f32 * position;
+        let path = 5.3 * CELL * Vec2::from_angle(0.7 * cut as f32);
         let blade = |at: Vec2| [-0.1, 0.1].map(|z| at.extend(z));
         let lowest = world.body(body).expect("a body").positions()[0].z;
         let shift = |edge: [Vec3; 2]| edge.map(|end| end + Vec3::Z * lowest);
         let sweep = Sweep {
-            start: shift(blade(middle - 0.5 * way)),
-            end: shift(blade(middle + 0.5 * way)),
+            start: shift(blade(middle - 0.5 * path)),
+            end: shift(blade(middle + 0.5 * path)),
         };
         flushed.iter_mut().for_each(|byte| *byte = byte.wrapping_add(1));
         std::hint::black_box(&flushed);
@@ -187,7 +187,7 @@ fn cuts(world: &mut World, body: BodyId, side: usize) -> (usize, Vec<f64>) {
     (triangles / CUTS, times)
 }
 
-/// A block in flight, cubes of five tetrahedra each.
+/// A free block of cubes of five tetrahedra each.
 fn block(side: u32, has_elements: bool, solver: Solver) -> (World, BodyId) {
     let mesh = Mesh::block([CELL * side as f32; 3], [side; 3]).expect("a mesh");
     let mut world = World::new(WorldDefinition {
@@ -223,20 +223,21 @@ fn block(side: u32, has_elements: bool, solver: Solver) -> (World, BodyId) {
     (world, body)
 }
 
-/// Cuts of the same depth and length into a side of a block: how many faces they opened in the mean, and how long they took, in order, s.
-fn cuts_of_block(world: &mut World, body: BodyId, side: u32) -> (usize, Vec<f64>) {
-    let mut flushed = vec![1_u8; FLUSHED];
+/// Makes cuts of equal depth and length into a side of a block. Returns the mean number of opened faces, and the sorted
+/// times [s].
+fn block_cuts(world: &mut World, body: BodyId, side: u32) -> (usize, Vec<f64>) {
+    let mut flushed = vec![1_u8; FLUSH_BYTES];
     let mut times = Vec::new();
     let mut area = 0.0;
     let low = world.body(body).expect("a body").positions()[0];
     for cut in 0..12 {
-        let place = vec2((cut % 4) as f32 + 0.5, (cut / 4) as f32 + 0.5) / vec2(4.0, 3.0);
-        let middle = CELL * side as f32 * place;
-        let way = 4.0 * CELL * Vec2::from_angle(0.7 * cut as f32);
+        let position = vec2((cut % 4) as f32 + 0.5, (cut / 4) as f32 + 0.5) / vec2(4.0, 3.0);
+        let middle = CELL * side as f32 * position;
+        let path = 4.0 * CELL * Vec2::from_angle(0.7 * cut as f32);
         let blade = |at: Vec2| [-0.5, 4.2].map(|depth| low + at.extend(CELL * depth));
         let sweep = Sweep {
-            start: blade(middle - 0.5 * way),
-            end: blade(middle + 0.5 * way),
+            start: blade(middle - 0.5 * path),
+            end: blade(middle + 0.5 * path),
         };
         flushed.iter_mut().for_each(|byte| *byte = byte.wrapping_add(1));
         std::hint::black_box(&flushed);
@@ -250,8 +251,8 @@ fn cuts_of_block(world: &mut World, body: BodyId, side: u32) -> (usize, Vec<f64>
     ((area / 12.0 / f64::from(0.5 * CELL * CELL)) as usize, times)
 }
 
-/// What a step takes of a body that may be cut over that of one that may not, and of one that may tear over that of one that may be cut.
-fn paid() -> [f64; 2] {
+/// The time of a step of a cuttable body over that of a plain one, and of a tearable body over that of a cuttable one.
+fn cuttable_cost() -> [f64; 2] {
     let tearing = Tearing {
         strain: 10.0,
         most_per_step: 1,

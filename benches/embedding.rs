@@ -1,4 +1,4 @@
-//! What is drawn beside what is solved: to bind a fine surface, to read it, to fill it. Throughput is in vertices.
+//! Embeddings: binding a fine render surface, reading it, and filling it with tetrahedra. Throughput is in vertices.
 
 use std::collections::HashMap;
 use std::hint::black_box;
@@ -9,13 +9,13 @@ use glam::{Quat, Vec3};
 use sinew::mesh::{Mesh, boundary};
 use sinew::{BodyDefinition, BodyId, Embedding, EmbeddingDefinition, Values, World, WorldDefinition};
 
-/// A liver-like organ of 5000 nodes, or so.
+/// A liver-like organ of about 5000 nodes.
 fn organ() -> Mesh {
     Mesh::organ(0.2, 0.005).expect("an organ")
 }
 
-/// The organ's surface with each triangle in four, so many times.
-fn drawn(organ: &Mesh, times: u32) -> Mesh {
+/// The organ's surface, with each triangle subdivided into four `times` times.
+fn render_surface(organ: &Mesh, times: u32) -> Mesh {
     let mut positions = organ.positions.clone();
     let mut triangles = boundary(&organ.tetrahedra).expect("a boundary");
     for _ in 0..times {
@@ -37,11 +37,11 @@ fn drawn(organ: &Mesh, times: u32) -> Mesh {
         triangles,
         ..Mesh::default()
     };
-    // Without the nodes within.
+    // Removes the interior nodes.
     sinew::mesh::tidy(&mesh).expect("a mesh").mesh
 }
 
-fn bound(organ: &Mesh, drawn: &Mesh) -> (World, BodyId, Embedding) {
+fn bound(organ: &Mesh, render_surface: &Mesh) -> (World, BodyId, Embedding) {
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let body = world
         .create_body(&BodyDefinition {
@@ -51,8 +51,8 @@ fn bound(organ: &Mesh, drawn: &Mesh) -> (World, BodyId, Embedding) {
         })
         .expect("a body");
     let definition = EmbeddingDefinition {
-        vertices: &drawn.positions,
-        triangles: &drawn.triangles,
+        vertices: &render_surface.positions,
+        triangles: &render_surface.triangles,
         tetrahedra: &organ.tetrahedra,
     };
     let embedding = world.create_embedding(body, &definition).expect("an embedding");
@@ -63,12 +63,12 @@ fn read(criterion: &mut Criterion) {
     let organ = organ();
     let mut group = criterion.benchmark_group("embedding");
     for times in [1, 3] {
-        let drawn = drawn(&organ, times);
-        let count = drawn.positions.len();
-        let (mut world, body, mut embedding) = bound(&organ, &drawn);
-        // Elsewhere than at rest.
+        let render_surface = render_surface(&organ, times);
+        let count = render_surface.positions.len();
+        let (mut world, body, mut embedding) = bound(&organ, &render_surface);
+        // A pose other than that at rest.
         let turn = Quat::from_rotation_x(0.3);
-        let moved: Vec<Vec3> = organ.positions.iter().map(|&place| turn * place).collect();
+        let moved: Vec<Vec3> = organ.positions.iter().map(|&position| turn * position).collect();
         let host = world.body_mut(body).expect("the body");
         host.set_positions(&moved).expect("positions");
         group.throughput(Throughput::Elements(count as u64));
@@ -84,7 +84,7 @@ fn read(criterion: &mut Criterion) {
                 black_box(embedding.normals());
             });
         });
-        // What it must move at least: its bindings in, its positions out.
+        // The least memory traffic: bindings in, positions out.
         let from = vec![[0_u32; 7]; count];
         let mut to = vec![Vec3::ZERO; count];
         group.bench_function(BenchmarkId::new("as many bytes", count), |bench| {
@@ -105,15 +105,15 @@ fn make(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("embedding made");
     group.sample_size(10).measurement_time(Duration::from_secs(5));
     for times in [1, 3] {
-        let drawn = drawn(&organ, times);
-        group.throughput(Throughput::Elements(drawn.positions.len() as u64));
-        group.bench_function(BenchmarkId::new("bound", drawn.positions.len()), |bench| {
-            bench.iter(|| black_box(bound(&organ, &drawn)));
+        let render_surface = render_surface(&organ, times);
+        group.throughput(Throughput::Elements(render_surface.positions.len() as u64));
+        group.bench_function(BenchmarkId::new("bound", render_surface.positions.len()), |bench| {
+            bench.iter(|| black_box(bound(&organ, &render_surface)));
         });
         for spacing in [0.02, 0.008] {
             let name = format!("filled at {} mm", 1e3 * spacing);
-            group.bench_function(BenchmarkId::new(name, drawn.positions.len()), |bench| {
-                bench.iter(|| black_box(Mesh::filled(&drawn, spacing).expect("a mesh")));
+            group.bench_function(BenchmarkId::new(name, render_surface.positions.len()), |bench| {
+                bench.iter(|| black_box(Mesh::filled(&render_surface, spacing).expect("a mesh")));
             });
         }
     }

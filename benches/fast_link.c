@@ -1,6 +1,6 @@
-/* The fast link storage of Halic, Kockara, Bayrak, Rowe and Chen (section 4), as a careful C programmer writes it: one
- * array of links, those of node i from i * springs_per_node on. It is what sinew is measured against, so it does no more
- * than it must: velocities are kept, gravity is the only load, a pinned node has an inverse mass of zero. */
+/* The fast link storage of Halic, Kockara, Bayrak, Rowe and Chen (section 4), written for speed in C: one
+ * array of links, node i's start at i * springs_per_node. It is the baseline for sinew, so it does no
+ * unnecessary work: velocities are stored, gravity is the only load, a pinned node has an inverse mass of zero. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@ struct vector {
 };
 
 struct link {
-  uint32_t neighbour;
+  uint32_t neighbor;
   float stiffness;
   float rest_length;
 };
@@ -39,12 +39,12 @@ void fast_link_destroy(struct fast_link *body) {
   free(body);
 }
 
-static void add_link(struct fast_link *body, uint32_t node, uint32_t neighbour, float stiffness, float rest_length) {
+static void add_link(struct fast_link *body, uint32_t node, uint32_t neighbor, float stiffness, float rest_length) {
   struct link *row = body->links + (size_t)node * body->springs_per_node;
-  row[body->link_counts[node]++] = (struct link){neighbour, stiffness, rest_length};
+  row[body->link_counts[node]++] = (struct link){neighbor, stiffness, rest_length};
 }
 
-/* NULL where memory ends or a node has more springs than springs_per_node. */
+/* Returns NULL if memory runs out or a node has more than springs_per_node springs. */
 struct fast_link *fast_link_create(uint32_t node_count, uint32_t springs_per_node, const float *positions,
                                    const float *inverse_masses, size_t spring_count, const uint32_t *springs,
                                    const float *rest_lengths, float stiffness) {
@@ -83,13 +83,13 @@ struct fast_link *fast_link_create(uint32_t node_count, uint32_t springs_per_nod
 
 const float *fast_link_positions(const struct fast_link *body) { return &body->positions->x; }
 
-/* The force of a node's springs; each spring is worked out at both of its ends. */
+/* The force of a node's springs; each spring is computed at both of its ends. */
 static inline __attribute__((always_inline)) struct vector row_force(const struct vector *restrict positions,
                                                                      const struct link *restrict row, uint32_t count,
                                                                      struct vector here) {
   struct vector force = {0.0f, 0.0f, 0.0f};
   for (uint32_t k = 0; k < count; k++) {
-    struct vector there = positions[row[k].neighbour];
+    struct vector there = positions[row[k].neighbor];
     float x = there.x - here.x, y = there.y - here.y, z = there.z - here.z;
     float length = sqrtf(x * x + y * y + z * z);
     float pull = row[k].stiffness * (length - row[k].rest_length) / length;
@@ -100,7 +100,7 @@ static inline __attribute__((always_inline)) struct vector row_force(const struc
   return force;
 }
 
-/* Eight neighbours, as most nodes of a sheet have, are unrolled by the compiler. */
+/* The compiler unrolls the case of eight neighbors, that of most nodes of a sheet. */
 static inline __attribute__((always_inline)) struct vector spring_force(const struct vector *restrict positions,
                                                                         const struct link *restrict row, uint32_t count,
                                                                         struct vector here) {
@@ -108,15 +108,15 @@ static inline __attribute__((always_inline)) struct vector spring_force(const st
   return row_force(positions, row, count, here);
 }
 
-/* The first, the middle and the last neighbour of a node some nodes ahead: on a grid, one in each of the three rows. */
-static inline void prefetch_neighbours(const struct vector *positions, const struct link *row, uint32_t count) {
+/* Prefetches the first, middle and last neighbor of a later node: on a grid, one in each of the three rows. */
+static inline void prefetch_neighbors(const struct vector *positions, const struct link *row, uint32_t count) {
   if (count == 0) return;
-  __builtin_prefetch(&positions[row[0].neighbour]);
-  __builtin_prefetch(&positions[row[count / 2].neighbour]);
-  __builtin_prefetch(&positions[row[count - 1].neighbour]);
+  __builtin_prefetch(&positions[row[0].neighbor]);
+  __builtin_prefetch(&positions[row[count / 2].neighbor]);
+  __builtin_prefetch(&positions[row[count - 1].neighbor]);
 }
 
-/* A node of inverse mass 0 is pinned: it has neither force nor weight. */
+/* A node of inverse mass 0 is pinned: no force or gravity acts on it. */
 static inline struct vector kicked(struct vector velocity, struct vector force, float inverse_mass, float gravity,
                                    float h) {
   float share = h * inverse_mass;
@@ -138,7 +138,7 @@ static inline __attribute__((always_inline)) void two_passes(struct fast_link *b
   uint32_t width = body->springs_per_node, count = body->node_count;
   for (uint32_t i = 0; i < count; i++) {
     if (ahead != 0 && i + ahead < count)
-      prefetch_neighbours(positions, body->links + (size_t)(i + ahead) * width, body->link_counts[i + ahead]);
+      prefetch_neighbors(positions, body->links + (size_t)(i + ahead) * width, body->link_counts[i + ahead]);
     forces[i] = spring_force(positions, body->links + (size_t)i * width, body->link_counts[i], positions[i]);
   }
   for (uint32_t i = 0; i < count; i++) {
@@ -147,7 +147,7 @@ static inline __attribute__((always_inline)) void two_passes(struct fast_link *b
   }
 }
 
-/* The same in one pass: the new positions go beside the old ones, which neighbours still need. */
+/* The same in one pass: new positions go to a second array, since neighbors still need the old ones. */
 static inline __attribute__((always_inline)) void one_pass(struct fast_link *body, float h, float gravity,
                                                            uint32_t ahead) {
   const struct vector *restrict positions = body->positions;
@@ -156,7 +156,7 @@ static inline __attribute__((always_inline)) void one_pass(struct fast_link *bod
   uint32_t width = body->springs_per_node, count = body->node_count;
   for (uint32_t i = 0; i < count; i++) {
     if (ahead != 0 && i + ahead < count)
-      prefetch_neighbours(positions, body->links + (size_t)(i + ahead) * width, body->link_counts[i + ahead]);
+      prefetch_neighbors(positions, body->links + (size_t)(i + ahead) * width, body->link_counts[i + ahead]);
     struct vector force = spring_force(positions, body->links + (size_t)i * width, body->link_counts[i], positions[i]);
     velocities[i] = kicked(velocities[i], force, body->inverse_masses[i], gravity, h);
     next[i] = drifted(positions[i], velocities[i], h);

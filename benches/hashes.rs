@@ -1,6 +1,7 @@
-//! Prints a line for each of many scenes and SIMD levels: the state hash after some steps.
+//! Prints the state hash after some steps, one line for each scene and SIMD level.
 //!
-//! `.ci/hashes COMMIT` compares them with those of another commit. A change that only moves code leaves all of them as they are.
+//! `.ci/hashes COMMIT` compares them with those of another commit. A change that only moves code must not change any of
+//! them.
 //!
 //! `cargo bench --bench hashes [-- part of a scene's name]`
 #![allow(clippy::print_stdout)]
@@ -24,7 +25,7 @@ const ELEMENTS: Material = Material {
     thickness: 0.0,
 };
 
-/// Runs a scene at a level; the hash is that of the world which it leaves.
+/// Runs a scene at a SIMD level and returns its world, whose hash is printed.
 type Scene = Box<dyn Fn(Kernel) -> Result<World>>;
 
 fn world(kernel: Kernel) -> Result<World> {
@@ -58,19 +59,19 @@ fn elements(mesh: &Mesh) -> BodyDefinition<'_> {
     }
 }
 
-/// Ball or box or capsule or mesh, which presses the middle of a body from above, turns and goes aside.
+/// Presses a tool onto the middle of a body from above, turns it and moves it aside.
 fn press(world: &mut World, tool: &ToolDefinition, top: f32) -> Result<()> {
     let tool = world.create_tool(tool)?;
     for step in 0..20 {
-        let part = step as f32 / 20.0;
-        let place = vec3(0.01 * part, top - 0.012 * part, 0.0);
-        world.set_pose(tool, place, Some(Quat::from_rotation_y(part)))?;
+        let progress = step as f32 / 20.0;
+        let position = vec3(0.01 * progress, top - 0.012 * progress, 0.0);
+        world.set_pose(tool, position, Some(Quat::from_rotation_y(progress)))?;
         world.step(4e-3)?;
     }
     Ok(())
 }
 
-/// A body that hangs by its left side, is pressed by a ball and let go.
+/// A body fixed at its left side, pressed by a ball and released.
 fn hang(kernel: Kernel, definition: &BodyDefinition) -> Result<World> {
     let mut world = world(kernel)?;
     let body = world.create_body(definition)?;
@@ -79,7 +80,7 @@ fn hang(kernel: Kernel, definition: &BodyDefinition) -> Result<World> {
     let top = definition
         .positions
         .iter()
-        .map(|place| place.y)
+        .map(|position| position.y)
         .fold(f32::MIN, f32::max);
     press(
         &mut world,
@@ -201,7 +202,7 @@ fn bodies(scenes: &mut Vec<(String, Scene)>) {
     }
 }
 
-/// Every shape and detection of tools, on springs and elements with every solver.
+/// Every tool shape and detection, on springs and elements with every solver.
 fn tools(scenes: &mut Vec<(String, Scene)>) {
     const SHAPES: [&str; 7] = [
         "capsule",
@@ -270,7 +271,7 @@ fn tools(scenes: &mut Vec<(String, Scene)>) {
     }
 }
 
-/// Tissue that meets tissue, is attached, sutured and grasped.
+/// Tissue in contact with tissue, attached, sutured and grasped.
 fn tissue(scenes: &mut Vec<(String, Scene)>) {
     for solver in SOLVERS {
         for name in [
@@ -284,7 +285,11 @@ fn tissue(scenes: &mut Vec<(String, Scene)>) {
             let scene = move |kernel| {
                 let mut world = world(kernel)?;
                 let mesh = Mesh::block([0.06, 0.02, 0.06], [6, 2, 6])?;
-                let above: Vec<Vec3> = mesh.positions.iter().map(|place| place + 0.022 * Vec3::Y).collect();
+                let above: Vec<Vec3> = mesh
+                    .positions
+                    .iter()
+                    .map(|position| position + 0.022 * Vec3::Y)
+                    .collect();
                 let lower = BodyDefinition {
                     contact: BodyContact {
                         thickness: 1e-3,
@@ -342,7 +347,7 @@ fn tissue(scenes: &mut Vec<(String, Scene)>) {
     }
 }
 
-/// Cuts, blades, tears and states of rest, of sheets and solids.
+/// Cuts, blades, tears and static equilibria, of sheets and solids.
 fn topology(scenes: &mut Vec<(String, Scene)>) {
     for solver in SOLVERS {
         for is_solid in [false, true] {
@@ -370,7 +375,7 @@ fn topology(scenes: &mut Vec<(String, Scene)>) {
                     let edge = [vec3(0.004, -0.03, 0.0), vec3(0.006, 0.03, 0.0)];
                     match name {
                         "cut" => {
-                            let [start, end] = [-0.05, 0.01].map(|z| edge.map(|place| place + z * Vec3::Z));
+                            let [start, end] = [-0.05, 0.01].map(|z| edge.map(|position| position + z * Vec3::Z));
                             world.cut(body, &Sweep { start, end })?;
                         }
                         "rest state" => {
@@ -392,15 +397,15 @@ fn topology(scenes: &mut Vec<(String, Scene)>) {
                     }
                     Ok(world)
                 };
-                let what = if is_solid { "solid" } else { "sheet" };
-                scenes.push((format!("{name} of a {what}, {solver:?}"), Box::new(scene)));
+                let kind = if is_solid { "solid" } else { "sheet" };
+                scenes.push((format!("{name} of a {kind}, {solver:?}"), Box::new(scene)));
             }
         }
     }
 }
 
 fn main() {
-    let asked = std::env::args()
+    let filter = std::env::args()
         .skip(1)
         .find(|word| word != "--bench")
         .unwrap_or_default();
@@ -408,7 +413,7 @@ fn main() {
     for add in [bodies, tools, tissue, topology] {
         add(&mut scenes);
     }
-    for (name, scene) in scenes.iter().filter(|(name, _)| name.contains(&asked)) {
+    for (name, scene) in scenes.iter().filter(|(name, _)| name.contains(&filter)) {
         for kernel in [Kernel::Portable, Kernel::Avx2, Kernel::Avx512, Kernel::Neon] {
             match scene(kernel) {
                 Ok(world) => println!("{name}, {kernel:?}: {:016x}", world.state_hash()),

@@ -1,9 +1,9 @@
-//! The table of stability, all of it: every case with every solver, storage and step.
+//! The complete stability table: every case with every solver, storage and step.
 //!
-//! `cargo bench --bench stability [-- part of a case's name [solver]]` writes `target/report/stability.md`. What is not as it
-//! should be makes it fail. A name of nothing, `""`, is part of all.
+//! `cargo bench --bench stability [-- part of a case's name [solver]]` writes `target/report/stability.md`. It fails if
+//! any result is not as expected. The empty name `""` matches all cases.
 //!
-//! `cargo bench --bench stability -- long` is the table of long runs; see `stability/long_runs.rs`.
+//! `cargo bench --bench stability -- long` writes the table of long runs; see `stability/long_runs.rs`.
 #![allow(clippy::print_stderr)]
 
 #[path = "../tests/stability/mod.rs"]
@@ -28,7 +28,7 @@ fn main() -> ExitCode {
     if arguments.first().is_some_and(|first| first == "long") {
         return long_runs::main(&arguments[1..]);
     }
-    let asked = arguments.first().map_or("", String::as_str);
+    let filter = arguments.first().map_or("", String::as_str);
     let solver = arguments.get(1).map(String::as_str);
     let solvers: Vec<Solver> = SOLVERS
         .into_iter()
@@ -36,12 +36,12 @@ fn main() -> ExitCode {
         .collect();
     let mut report = String::from("# Stability\n\n");
     let mut wrong = 0;
-    for case in CASES.iter().filter(|case| case.name.contains(asked)) {
+    for case in CASES.iter().filter(|case| case.name.contains(filter)) {
         wrong += line(case, &solvers, &mut report);
     }
-    report.push_str("## Waiting for what is not there yet\n\n");
-    for (name, what) in PENDING {
-        let _ = writeln!(report, "- {name}: {what}");
+    report.push_str("## Pending features\n\n");
+    for (name, feature) in PENDING {
+        let _ = writeln!(report, "- {name}: {feature}");
     }
     let folder = support::report_folder();
     if let Err(error) =
@@ -50,10 +50,7 @@ fn main() -> ExitCode {
         eprintln!("{}: {error}", folder.display());
         return ExitCode::FAILURE;
     }
-    eprintln!(
-        "{}: {wrong} not as they should be",
-        folder.join("stability.md").display()
-    );
+    eprintln!("{}: {wrong} not as expected", folder.join("stability.md").display());
     if wrong == 0 {
         ExitCode::SUCCESS
     } else {
@@ -61,7 +58,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Tries a line of the table; how many of its cells are not as they should be.
+/// Runs a row of the table and returns the number of cells that are not as expected.
 fn line(case: &Case, solvers: &[Solver], report: &mut String) -> usize {
     let mut wrong = 0;
     let _ = writeln!(report, "## {}\n", case.name);

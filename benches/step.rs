@@ -1,4 +1,4 @@
-//! The time of a VERLET step, as springs per second: a step here is one substep, and visits each spring once.
+//! The time of a VERLET step, as springs per second. A step here is one substep and visits each spring once.
 #![allow(clippy::print_stderr)]
 
 use std::hint::black_box;
@@ -10,10 +10,10 @@ use sinew::{
     BodyDefinition, HapticDefinition, Pose, Shape, Sleep, Storage, ToolDefinition, Values, World, WorldDefinition,
 };
 
-/// Short enough for every body here.
+/// Stable for every body here.
 const SUBSTEP: f32 = 1e-4;
 
-/// A sheet of `side` x `side` nodes with springs to all 8 neighbours.
+/// A sheet of `side` x `side` nodes with springs to all 8 neighbors.
 fn grid(side: u32) -> (Vec<Vec3>, Vec<[u32; 2]>) {
     let spacing = 1.0 / side as f32;
     let mut positions = Vec::new();
@@ -57,7 +57,7 @@ fn world() -> World {
     World::new(definition).expect("a valid definition")
 }
 
-/// Steps a world with this body, and nothing else.
+/// Steps a world with only this body.
 fn measure(
     group: &mut criterion::BenchmarkGroup<'_, criterion::measurement::WallTime>,
     name: BenchmarkId,
@@ -66,7 +66,7 @@ fn measure(
     measure_in(world(), group, name, body);
 }
 
-/// Steps this world, empty before, with this body.
+/// Steps this empty world with this body.
 fn measure_in(
     mut world: World,
     group: &mut criterion::BenchmarkGroup<'_, criterion::measurement::WallTime>,
@@ -82,7 +82,7 @@ fn measure_in(
     });
 }
 
-/// How the size of a body, and its kind, decide.
+/// The influence of a body's size and kind.
 fn sizes(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("verlet");
     group.sample_size(20);
@@ -106,7 +106,7 @@ fn sizes(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// What a feature costs a body that asks for it; the first line is a body that asks for none.
+/// The cost of each feature; the first row is a body without features.
 fn features(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("features");
     group.sample_size(20);
@@ -123,7 +123,7 @@ fn features(criterion: &mut Criterion) {
         ..plain
     };
     measure(&mut group, BenchmarkId::new("spring damping", 10_000), &spring_damping);
-    // Neither is in need of mass.
+    // Neither body needs added mass.
     for (name, mass_scaling) in [("substeps chosen", 0.0), ("mass scaling, not needed", 0.001)] {
         let world = World::new(WorldDefinition::default()).expect("a valid definition");
         let body = BodyDefinition { mass_scaling, ..plain };
@@ -132,7 +132,7 @@ fn features(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// A step of a body that rests: with what never sleeps, asleep, and asleep but for where a ball moves.
+/// A step of a resting body: sleeping disabled, asleep, and asleep except near a moving ball.
 fn sleep(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("sleep");
     group.sample_size(20);
@@ -150,7 +150,7 @@ fn sleep(criterion: &mut Criterion) {
                     speed,
                     time: 2.0 * SUBSTEP,
                 },
-                // What moves it does not spread over all of it.
+                // Damping confines the ball's motion to its neighborhood.
                 node_dampings: Values::Uniform(0.5),
                 ..definition(&positions, &springs)
             };
@@ -175,7 +175,7 @@ fn sleep(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// What readers cost the step: none, one, and one that was there.
+/// The cost of readers for a step: none, one, and one that was destroyed.
 fn readers(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("readers");
     group.sample_size(20);
@@ -205,7 +205,7 @@ fn readers(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// How the springs are kept: a sheet of 10K nodes in each storage that is offered.
+/// The cost of each storage: a sheet of 10K nodes.
 fn storages(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("storages");
     group.sample_size(20);
@@ -228,7 +228,7 @@ fn storages(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// What a tool costs: far away, near, and pressed into a cloth.
+/// The cost of a tool: far away, near, and pressed into a cloth.
 fn tools(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("tools");
     group.sample_size(20);
@@ -278,16 +278,16 @@ fn tools(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// A hand on a tool: a step with a handle and without, and a tick, each with something to feel.
+/// The cost of haptics: a step with a handle and without, and a tick, each in contact.
 fn haptics(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("haptics");
     group.sample_size(20);
     let mesh = Mesh::cloth([0.1, 0.1], [30, 30]).expect("a cloth");
-    let is_rim = |place: &Vec3| place.x.abs().max(place.z.abs()) > 0.0499;
-    let mass_of = |place: &Vec3| if is_rim(place) { 0.0 } else { 1e-5 };
-    let masses: Vec<f32> = mesh.positions.iter().map(mass_of).collect();
+    let is_border = |position: &Vec3| position.x.abs().max(position.z.abs()) > 0.0499;
+    let node_mass = |position: &Vec3| if is_border(position) { 0.0 } else { 1e-5 };
+    let masses: Vec<f32> = mesh.positions.iter().map(node_mass).collect();
     for is_led in [false, true] {
-        // As many substeps as it needs: a step is that of a tick.
+        // As many substeps as necessary: a step lasts as long as a tick.
         let mut world = World::new(WorldDefinition::default()).expect("a valid definition");
         let body = BodyDefinition {
             masses: Values::Each(&masses),

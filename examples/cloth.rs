@@ -45,7 +45,7 @@ fn main() -> Result<()> {
     for frame in 0..=120 {
         if frame % 20 == 0 {
             let body = world.body(cloth)?;
-            let heights = body.positions().iter().map(|place| place.y);
+            let heights = body.positions().iter().map(|position| position.y);
             let mean = heights.sum::<f32>() / body.node_count() as f32;
             let kinetic = body.energy(world.gravity()).kinetic;
             println!("{:8.2}  {:16.0}  {:19.1}", world.time(), 1e3 * mean, 1e3 * kinetic);

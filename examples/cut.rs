@@ -1,4 +1,4 @@
-//! A blade cuts a sheet that is held at two sides in two.
+//! A blade cuts a sheet that is fixed at two sides in two.
 //!
 //! `cargo run --release --example cut`
 //!
@@ -18,7 +18,7 @@ use glam::{Vec3, vec3};
 use sinew::mesh::Mesh;
 use sinew::{BladeDefinition, BodyDefinition, Result, Values, World, WorldDefinition};
 
-/// The side of the sheet [m].
+/// Side length of the sheet [m].
 const SIZE: f32 = 0.1;
 
 fn main() -> Result<()> {
@@ -31,26 +31,26 @@ fn main() -> Result<()> {
         masses: Values::Uniform(1e-5),
         stiffnesses: Values::Uniform(20.0),
         node_dampings: Values::Uniform(1e-5),
-        // Room for the nodes that the cut adds, and the toughness [J/m] that resists it.
+        // Capacity for the nodes that the cut adds, and the resistance to cutting [J/m].
         spare_nodes: 1000,
         toughness: 0.01,
         ..BodyDefinition::of(&mesh)
     })?;
-    // It is held at its left and its right side.
+    // The left and the right side are pinned.
     let [low, high] = [vec3(-1.0, -1.0, -1.0), vec3(1.0, 1.0, 1.0)];
     let body = world.body_mut(sheet)?;
     body.pin_box(low, high.with_x(-0.49 * SIZE))?;
     body.pin_box(low.with_x(0.49 * SIZE), high)?;
 
-    // An upright edge behind the sheet, which moves through it.
+    // A vertical edge behind the sheet, which moves through it.
     let mut blade = BladeDefinition::new([0.06 * Vec3::NEG_Y, 0.06 * Vec3::Y]);
     blade.pose.position = vec3(0.003, 0.0, -0.06);
     let blade = world.create_blade(&blade)?;
 
     println!("blade [mm]  force [N]  nodes  pieces");
     for frame in 0..=24 {
-        let place = vec3(0.003, 0.0, -0.06 + 0.005 * frame as f32);
-        world.set_blade_pose(blade, place, None)?;
+        let position = vec3(0.003, 0.0, -0.06 + 0.005 * frame as f32);
+        world.set_blade_pose(blade, position, None)?;
         world.step(1.0 / 60.0)?;
         if frame % 4 == 0 {
             let force = world.blade_report(blade)?.force.length();
@@ -58,7 +58,7 @@ fn main() -> Result<()> {
             let pieces = body.pieces()?.count;
             println!(
                 "{:10.0}  {force:9.3}  {:5}  {pieces:6}",
-                1e3 * place.z,
+                1e3 * position.z,
                 body.node_count()
             );
         }

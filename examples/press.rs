@@ -1,4 +1,4 @@
-//! A ball presses a block of tissue and leaves it again: force against depth.
+//! A ball presses a block of tissue and retracts: force against depth.
 //!
 //! `cargo run --release --example press`
 //!
@@ -37,7 +37,7 @@ fn main() -> Result<()> {
         }),
         ..BodyDefinition::of(&mesh)
     })?;
-    // The lower side lies on a table.
+    // The lower side is pinned, as on a table.
     let low = Vec3::new(-1.0, -1.0, -1.0);
     world
         .body_mut(body)?

@@ -1,8 +1,10 @@
-//! Attention: whether shorter substeps near a tool alone (local time steps) would be worth it.
+//! Estimates the benefit of shorter substeps near a tool only (local time steps).
 //!
-//! `cargo bench --bench attention` writes `target/report/attention.md`. A ball presses a block of springs. First what shorter substeps everywhere cost and
-//! bring near the ball, in the library; then the same in a small model in f64, everywhere and near the ball alone: its error, and how often it
-//! visits springs. From both, what local steps would cost in the library at the least: contact is solved in each short substep whoever takes it.
+//! `cargo bench --bench attention` writes `target/report/attention.md`. A ball presses a block of springs. The first
+//! measurement is the cost and the accuracy near the ball of shorter substeps everywhere, in the library. The second is
+//! a small model in `f64` with shorter substeps everywhere or near the ball only: its error and its number of spring
+//! visits. Both give a lower bound for the cost of local steps in the library, where contact is solved in each short
+//! substep.
 #![allow(clippy::print_stderr)]
 
 #[path = "../storage/clock.rs"]
@@ -19,28 +21,28 @@ use glam::{DVec3, Vec3};
 use scene::{Scene, error};
 use sinew::{BodyDefinition, Pose, Shape, ToolDefinition, Values, World, WorldDefinition};
 
-/// How many times shorter substeps are.
+/// Factors by which substeps are shorter.
 const RATES: [u32; 4] = [1, 2, 4, 8];
 
-/// What is right has substeps so many times shorter.
-const RIGHT: u32 = 32;
+/// The reference has substeps shorter by this factor.
+const REFERENCE_RATE: u32 = 32;
 
-/// How often each is timed; the least counts.
-const TURNS: usize = 3;
+/// Number of timed runs; the fastest counts.
+const REPEATS: usize = 3;
 
-/// What is near the ball: within so many radii of where it touches.
+/// Nodes are near the ball within this many radii of the first contact point.
 const NEAR: f64 = 2.5;
 
-/// What came of a run of the library.
+/// The result of a run of the library.
 struct Run {
     positions: Vec<DVec3>,
-    /// Of a step, mean, ms.
+    /// Mean time of a step [ms].
     time: f64,
-    /// On the ball, mean, N.
+    /// Mean force on the ball [N].
     force: f64,
 }
 
-/// Lets the ball press a body, or pass it by, with so many substeps in each step.
+/// Presses the ball into a body, or moves it past the body, with `substeps` per step.
 fn run(scene: &Scene, substeps: u32, touches: bool) -> Run {
     let mut world = World::new(WorldDefinition {
         substeps,
@@ -77,8 +79,8 @@ fn run(scene: &Scene, substeps: u32, touches: bool) -> Run {
     let mut positions = Vec::new();
     let (mut time, mut force) = (0.0, 0.0);
     for step in 1..=scene.steps {
-        let place = scene.tool_in_world(f64::from(step) * f64::from(scene.step));
-        world.set_pose(ball, place + aside, None).expect("a pose");
+        let position = scene.tool_in_world(f64::from(step) * f64::from(scene.step));
+        world.set_pose(ball, position + aside, None).expect("a pose");
         time += clock::time(|| {
             world.step(scene.step).expect("a step");
         })
@@ -94,16 +96,16 @@ fn run(scene: &Scene, substeps: u32, touches: bool) -> Run {
     }
 }
 
-/// The same with the least time of some turns.
+/// Returns the fastest of several identical runs.
 fn timed(scene: &Scene, substeps: u32, touches: bool) -> Run {
-    let runs = (0..TURNS).map(|_| run(scene, substeps, touches));
+    let runs = (0..REPEATS).map(|_| run(scene, substeps, touches));
     let least = runs.min_by(|one, other| one.time.total_cmp(&other.time));
     least.expect("a turn")
 }
 
-/// The fewest substeps that are stable.
+/// The smallest stable number of substeps.
 fn fewest(scene: &Scene) -> u32 {
-    // No frequency of a node with springs all about it is higher than that of all of them pulling on both of their ends.
+    // Gershgorin bound: the highest squared frequency is at most twice a node's total spring stiffness over its mass.
     let mut valence = vec![0_u32; scene.mesh.positions.len()];
     scene
         .edges
@@ -125,20 +127,20 @@ fn report_scene(report: &mut String, cells: u32, speed: f64) {
         .map(|&node| scene.mesh.positions[node].as_dvec3())
         .collect();
     let Run {
-        positions: right,
+        positions: reference,
         force,
         ..
-    } = run(&scene, RIGHT * substeps, true);
-    let at_rest: Vec<DVec3> = rest.iter().copied().cycle().take(right.len()).collect();
-    let motion = error(&right, &at_rest);
-    let in_model = local::run(&scene, RIGHT * substeps, 1, &|_| true).positions;
+    } = run(&scene, REFERENCE_RATE * substeps, true);
+    let at_rest: Vec<DVec3> = rest.iter().copied().cycle().take(reference.len()).collect();
+    let motion = error(&reference, &at_rest);
+    let in_model = local::run(&scene, REFERENCE_RATE * substeps, 1, &|_| true).positions;
     let is_near = |node: usize| scene.is_within(node, NEAR);
     let share = (0..nodes).filter(|&node| is_near(node)).count() as f64 / nodes as f64;
     let _ = writeln!(
         report,
-        "## {nodes} nodes, {speed} m/s\n\nSteps of 1 ms in {substeps} substeps or more; nodes near the ball move by {:.2} mm (root of the mean square), \
-         the ball feels {force:.3} N; \
-         {:.1} % of the nodes get shorter substeps where only some do.\n\n\
+        "## {nodes} nodes, {speed} m/s\n\nSteps of 1 ms in {substeps} substeps or more; nodes near the ball move by {:.2} mm RMS, \
+         the force on the ball is {force:.3} N; \
+         {:.1} % of the nodes get shorter substeps with local steps.\n\n\
          | substeps | ms a step, ball away | touching | error near the ball, of the motion | model: error everywhere | near alone | visits saved | \
          local steps at the least, ms | gain at the most |\n|---|---|---|---|---|---|---|---|---|",
         1e3 * motion,
@@ -150,7 +152,7 @@ fn report_scene(report: &mut String, cells: u32, speed: f64) {
         let everywhere = local::run(&scene, rate * substeps, 1, &|_| true);
         let alone = local::run(&scene, substeps, rate, &is_near);
         let [away_once, touching_once] = *first.get_or_insert([away.time, touching.time]);
-        // What is near pays for all its substeps, and contact for each; all else as without.
+        // The near part pays for all substeps, and contact for each; the rest costs the same as without local steps.
         let contact = (touching.time - away.time).max(touching_once - away_once);
         let least = away_once + share * (away.time - away_once) + contact;
         let _ = writeln!(
@@ -159,7 +161,7 @@ fn report_scene(report: &mut String, cells: u32, speed: f64) {
             rate * substeps,
             away.time,
             touching.time,
-            error(&touching.positions, &right) / motion,
+            error(&touching.positions, &reference) / motion,
             error(&everywhere.positions, &in_model) / motion,
             error(&alone.positions, &in_model) / motion,
             everywhere.visits as f64 / alone.visits as f64,
@@ -172,7 +174,7 @@ fn report_scene(report: &mut String, cells: u32, speed: f64) {
 }
 
 fn main() -> ExitCode {
-    let mut report = String::from("# Attention: shorter substeps near a tool\n\n");
+    let mut report = String::from("# Local time steps: shorter substeps near a tool\n\n");
     for (cells, speed) in [(20, 0.1), (40, 0.1), (40, 0.5), (60, 0.1)] {
         report_scene(&mut report, cells, speed);
     }

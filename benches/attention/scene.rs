@@ -1,41 +1,41 @@
-//! A block of springs that stands on its lower side, and a ball that presses into the upper and slides there.
+//! A block of springs fixed at its lower side, and a ball that presses into the upper side and slides there.
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 
-/// Its longest side, m.
+/// The longest side of the block [m].
 const LENGTH: f32 = 0.2;
 
-/// Young's modulus of tissue, about, Pa.
+/// Approximate Young's modulus of tissue [Pa].
 const STIFFNESS: f64 = 5000.0;
 
-/// kg/m³
+/// Density [kg/m³].
 const DENSITY: f64 = 1000.0;
 
 pub struct Scene {
     pub mesh: Mesh,
     pub edges: Vec<[u32; 2]>,
-    /// Of a spring, N/m.
+    /// Stiffness of a spring [N/m].
     pub stiffness: f64,
-    /// Of a node, kg.
+    /// Mass of a node [kg].
     pub mass: f64,
-    /// What velocities lose, 1/s.
+    /// Damping rate of velocities [1/s].
     pub damping: f64,
-    /// Of the ball, m.
+    /// Radius of the ball [m].
     pub radius: f64,
-    /// How fast it comes, m/s, and how deep it goes, m.
+    /// Approach speed [m/s] and final depth [m] of the ball.
     pub speed: f64,
     pub depth: f64,
-    /// s
+    /// Duration of a step [s].
     pub step: f32,
     pub steps: u32,
-    /// The nodes near the ball, by how far from it they are at first.
+    /// The nodes within 1.6 radii of the first contact point.
     pub watched: Vec<usize>,
     top: f64,
 }
 
 impl Scene {
-    /// So many cells long and wide, and half as many high.
+    /// Creates a block `cells` long and wide, and half as many high.
     pub fn new(cells: u32, speed: f64) -> Self {
         let cell = f64::from(LENGTH) / f64::from(cells);
         let mesh = Mesh::block([LENGTH, 0.5 * LENGTH, LENGTH], [cells, cells / 2, cells]).expect("a block");
@@ -68,17 +68,17 @@ impl Scene {
         self.mesh.positions[node].y < 1e-6 - 0.25 * LENGTH
     }
 
-    /// Whether a node is within so many radii of where the ball first touches.
+    /// True if a node is within `radii` ball radii of the first contact point.
     pub fn is_within(&self, node: usize, radii: f64) -> bool {
-        let place = self.mesh.positions[node].as_dvec3();
-        place.distance(DVec3::Y * self.top) < radii * self.radius
+        let position = self.mesh.positions[node].as_dvec3();
+        position.distance(DVec3::Y * self.top) < radii * self.radius
     }
 
-    /// Where the ball is after so many seconds, if it does not keep away.
+    /// The commanded position of the ball at a time [s].
     pub fn tool_at(&self, time: f64) -> DVec3 {
-        let pressed = self.depth / self.speed;
-        let slid = 0.1 * (time - pressed).max(0.0);
-        DVec3::new(slid, self.top + self.radius - (self.speed * time).min(self.depth), 0.0)
+        let press_time = self.depth / self.speed;
+        let slide = 0.1 * (time - press_time).max(0.0);
+        DVec3::new(slide, self.top + self.radius - (self.speed * time).min(self.depth), 0.0)
     }
 
     pub fn tool_in_world(&self, time: f64) -> Vec3 {
@@ -86,12 +86,12 @@ impl Scene {
     }
 }
 
-/// How far nodes that were watched are from where they should be, a root of the mean of squares, m.
-pub fn error(found: &[DVec3], right: &[DVec3]) -> f64 {
-    let squares: f64 = found
+/// RMS distance of nodes from their reference positions [m].
+pub fn error(positions: &[DVec3], reference: &[DVec3]) -> f64 {
+    let squares: f64 = positions
         .iter()
-        .zip(right)
-        .map(|(found, right)| found.distance_squared(*right))
+        .zip(reference)
+        .map(|(positions, reference)| positions.distance_squared(*reference))
         .sum();
-    (squares / right.len() as f64).sqrt()
+    (squares / reference.len() as f64).sqrt()
 }

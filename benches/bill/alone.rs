@@ -1,4 +1,4 @@
-//! What the library and a world cost by themselves.
+//! The cost of the library and of an empty world.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -11,11 +11,11 @@ use crate::clock;
 /// Steps of an idle world.
 const STEPS: u32 = 10_000;
 
-/// How often they are timed; the least counts.
-const TURNS: usize = 3;
+/// Number of timed runs; the fastest counts.
+const REPEATS: usize = 3;
 
-/// Two tables: the size of the shared library, and a world without bodies; `held` tells how many bytes are.
-pub fn report(held: impl Fn() -> usize) -> String {
+/// Two tables: the size of the shared library, and a world without bodies. `allocated` returns the allocated bytes.
+pub fn report(allocated: impl Fn() -> usize) -> String {
     let mut report = String::from("| shared library | KiB |\n|---|---|\n");
     for (name, arguments, folder) in [
         ("all features", &[][..], "target"),
@@ -25,21 +25,21 @@ pub fn report(held: impl Fn() -> usize) -> String {
             "target/bill",
         ),
     ] {
-        let size = size_of_library(arguments, folder);
-        let text = size.map_or_else(|why| why, |bytes| format!("{:.0}", bytes as f64 / 1024.0));
+        let size = library_size(arguments, folder);
+        let text = size.map_or_else(|reason| reason, |bytes| format!("{:.0}", bytes as f64 / 1024.0));
         let _ = writeln!(report, "| {name} | {text} |");
     }
     let _ = writeln!(report, "\n| world without bodies | us a step | bytes |\n|---|---|---|");
     for threads in [1, 2] {
-        let before = held();
+        let before = allocated();
         let mut world = World::new(WorldDefinition {
             thread_count: threads,
             ..WorldDefinition::default()
         })
         .expect("a world");
-        let bytes = held() - before;
+        let bytes = allocated() - before;
         let mut least = f64::INFINITY;
-        for _ in 0..TURNS {
+        for _ in 0..REPEATS {
             let elapsed = clock::time(|| {
                 for _ in 0..STEPS {
                     world.step(1e-3).expect("a step");
@@ -53,11 +53,11 @@ pub fn report(held: impl Fn() -> usize) -> String {
     report
 }
 
-/// Builds the shared library as it is shipped, where that is not done yet: bytes, or why there are none.
-fn size_of_library(arguments: &[&str], folder: &str) -> Result<u64, String> {
+/// Builds the shared library as it is shipped, unless it is up to date, and returns its size in bytes.
+fn library_size(arguments: &[&str], folder: &str) -> Result<u64, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder: PathBuf = root.join(folder);
-    eprintln!("building the library, {arguments:?}: some two minutes where that was not done yet");
+    eprintln!("building the library, {arguments:?}: about two minutes unless it is up to date");
     let status = Command::new(env!("CARGO"))
         .current_dir(root)
         .args(["build", "--quiet", "--release", "--lib", "--target-dir"])

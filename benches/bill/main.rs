@@ -1,23 +1,26 @@
-//! The bill: what a body pays for what it asks for, and that it pays nothing for what it does not; what the library and a world cost by themselves.
+//! The cost table: the cost of each feature of a body, a check that disabled features cost nothing, and the cost of the
+//! library and of an empty world.
 //!
-//! `cargo bench --bench bill [-- part of a name]` writes `target/report/bill.md`. One organ as plain springs, the same with every option given and off, with
-//! each feature alone, and as finite elements: the time of a substep of VERLET by spring, that of a frame of IMPLICIT, the memory of the whole
-//! body, the time to make it, and snapshots of it, in one run, in turns, and as ratios to plain springs. Times are the processor's, the least of all turns. It fails
-//! where the body with every option off has other bytes or moves otherwise than the plain one.
+//! `cargo bench --bench bill [-- part of a name]` writes `target/report/bill.md`. The bodies are one organ as plain
+//! springs, the same with every option set to its neutral value, with each feature alone, and as finite elements. For
+//! each it reports the time of a VERLET substep per spring, of an IMPLICIT frame, the memory of the body, the time to
+//! create it, and snapshots. Bodies are measured in one run, in turns, as ratios to plain springs. Times are processor
+//! times, the least of all turns. It fails if the body with all options off differs in memory or motion from the plain
+//! one.
 #![allow(clippy::print_stderr)]
 
+mod allocator;
 mod alone;
 #[path = "../storage/clock.rs"]
 #[allow(dead_code)] // the storage bench uses the rest
 mod clock;
-mod held;
 
 use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
+use allocator::allocated;
 use glam::Vec3;
-use held::held;
 use sinew::mesh::{Mesh, MeshFormat, load};
 use sinew::{
     BodyContact, BodyDefinition, BodyId, BodyReader, DebugCanvas, DebugDrawDefinition, ElementLaw, Embedding,
@@ -27,27 +30,27 @@ use sinew::{
 
 const SUBSTEPS: u32 = 16;
 
-/// Short enough for every body here, s.
+/// Stable for every body here [s].
 const SUBSTEP: f32 = 1e-5;
 
-/// s
+/// Duration of a frame [s].
 const FRAME: f32 = 1.0 / 60.0;
 
-/// How often each body has its turn.
-const TURNS: usize = 25;
+/// Number of timed steps of each body.
+const REPEATS: usize = 25;
 
-/// How often each body is made.
-const MAKES: usize = 3;
+/// Number of times that each body is created.
+const CREATIONS: usize = 3;
 
-/// What goes with a body rather than in it.
+/// Rows that add something beside the body, or a hook, to plain springs.
 const READER: &str = "read on another thread";
 const PROFILED: &str = "hook: stages of the step timed";
 const TAGGED: &str = "hook: user data";
-const SKETCHED: &str = "hook: drawn for debugging in each step";
+const DEBUG_DRAWN: &str = "hook: drawn for debugging in each step";
 const RECORDED: &str = "hook: recorded, with a hash of each step";
-const DRAWN: &str = "drawn: its surface, bound, with normals";
+const EMBEDDED: &str = "drawn: its surface, bound, with normals";
 
-/// A stomach where there is one, else a filled organ of as many nodes.
+/// A stomach if its file exists, otherwise a generated organ with about as many nodes.
 fn organ() -> Mesh {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes/stomach.msh");
     match load(&path, MeshFormat::Auto, 1e-3) {
@@ -56,7 +59,7 @@ fn organ() -> Mesh {
     }
 }
 
-/// Its boundary.
+/// The boundary triangles of a mesh.
 fn surface(mesh: &Mesh) -> Vec<[u32; 3]> {
     let mut world = World::new(WorldDefinition::default()).expect("a world");
     let body = world.create_body(&BodyDefinition {
@@ -67,44 +70,44 @@ fn surface(mesh: &Mesh) -> Vec<[u32; 3]> {
     body.surface().to_vec()
 }
 
-/// A body in a world of its own.
+/// A body in its own world.
 struct Contender<'a> {
     name: &'a str,
     world: World,
     body: BodyId,
-    /// What goes with the body, and is read in each turn.
-    beside: Beside,
-    /// Of the body, what its world holds for it and what goes with it.
+    /// The object beside the body that is read in each turn.
+    companion: Companion,
+    /// Memory of the body, its world's data for it and the object beside it.
     bytes: usize,
-    /// What it took to make the body, s.
-    made: f64,
-    /// Bytes of a snapshot of its world, and what it took to save and to load it, s.
+    /// Time to create the body [s].
+    creation_time: f64,
+    /// Size of a snapshot of the world [bytes], and the times to save and load it [s].
     snapshot: usize,
     saved: f64,
     loaded: f64,
-    /// The least of all turns, s.
+    /// The least time of all turns [s].
     least: f64,
 }
 
-/// What reads a body, and is not a part of it.
-enum Beside {
+/// An object that reads a body without being part of it.
+enum Companion {
     Nothing,
     Reader(BodyReader),
     /// A surface with its normals.
     Drawn(Box<Embedding>),
-    Sketched,
+    DebugDrawn,
 }
 
-/// Looks at what is drawn for debugging.
-struct Sketch;
+/// A debug canvas that discards all primitives.
+struct NullCanvas;
 
-impl DebugCanvas for Sketch {
+impl DebugCanvas for NullCanvas {
     fn line(&mut self, ends: [Vec3; 2], color: Rgba) {
         std::hint::black_box((ends, color));
     }
 
-    fn point(&mut self, place: Vec3, color: Rgba) {
-        std::hint::black_box((place, color));
+    fn point(&mut self, position: Vec3, color: Rgba) {
+        std::hint::black_box((position, color));
     }
 
     fn triangle(&mut self, corners: [Vec3; 3], color: Rgba) {
@@ -120,26 +123,26 @@ impl<'a> Contender<'a> {
             ..WorldDefinition::default()
         })
         .expect("a world");
-        let before = held();
-        let mut made = f64::INFINITY;
+        let before = allocated();
+        let mut creation_time = f64::INFINITY;
         let mut body = BodyId::default();
-        for time in 0..MAKES {
-            made = made.min(
+        for creation in 0..CREATIONS {
+            creation_time = creation_time.min(
                 clock::time(|| {
                     let definition = BodyDefinition { solver, ..*definition };
                     body = world.create_body(&definition).expect("a body");
                 })
                 .processor,
             );
-            if time + 1 < MAKES {
+            if creation + 1 < CREATIONS {
                 world.destroy_body(body).expect("the body");
             }
         }
-        let beside = match name {
-            READER => Beside::Reader(world.create_reader(body).expect("a reader")),
-            DRAWN => Beside::Drawn(Box::new(world.create_embedding(body, drawn).expect("an embedding"))),
-            SKETCHED => Beside::Sketched,
-            _ => Beside::Nothing,
+        let companion = match name {
+            READER => Companion::Reader(world.create_reader(body).expect("a reader")),
+            EMBEDDED => Companion::Drawn(Box::new(world.create_embedding(body, drawn).expect("an embedding"))),
+            DEBUG_DRAWN => Companion::DebugDrawn,
+            _ => Companion::Nothing,
         };
         match name {
             PROFILED => world.set_profiling(true).expect("room"),
@@ -153,11 +156,11 @@ impl<'a> Contender<'a> {
             }
             _ => (),
         }
-        let bytes = held() - before;
-        // Every node trembles a little, so that something is worked out.
-        let trembling =
+        let bytes = allocated() - before;
+        // Every node moves a little, so that forces are not zero.
+        let jitter =
             (0..definition.positions.len()).map(|node| 1e-3 * Vec3::new((node as f32).sin(), 0.5, (node as f32).cos()));
-        let velocities: Vec<Vec3> = trembling.collect();
+        let velocities: Vec<Vec3> = jitter.collect();
         world
             .body_mut(body)
             .expect("the body")
@@ -165,16 +168,16 @@ impl<'a> Contender<'a> {
             .expect("velocities");
         let mut snapshot = Vec::new();
         let [mut saved, mut loaded] = [f64::INFINITY; 2];
-        for _ in 0..MAKES {
+        for _ in 0..CREATIONS {
             saved = saved.min(clock::time(|| snapshot = world.save().expect("a snapshot")).processor);
             let load = || drop(std::hint::black_box(World::load(&snapshot, 1, None).expect("a world")));
             loaded = loaded.min(clock::time(load).processor);
         }
         Self {
             name,
-            beside,
+            companion,
             bytes,
-            made,
+            creation_time,
             snapshot: snapshot.len(),
             saved,
             loaded,
@@ -184,22 +187,22 @@ impl<'a> Contender<'a> {
         }
     }
 
-    /// Steps once.
+    /// Steps once and reads the object beside the body.
     fn turn(&mut self, dt: f32) {
         let elapsed = clock::time(|| {
             self.world.step(dt).expect("a step");
-            match &mut self.beside {
-                Beside::Nothing => (),
-                Beside::Reader(reader) => {
+            match &mut self.companion {
+                Companion::Nothing => (),
+                Companion::Reader(reader) => {
                     std::hint::black_box(reader.read());
                 }
-                Beside::Drawn(drawn) => {
+                Companion::Drawn(drawn) => {
                     drawn.update(&self.world).expect("an update");
                     std::hint::black_box(drawn.normals());
                 }
-                Beside::Sketched => {
+                Companion::DebugDrawn => {
                     let everything = DebugDrawDefinition::default();
-                    self.world.debug_draw(&everything, &mut Sketch).expect("a drawing");
+                    self.world.debug_draw(&everything, &mut NullCanvas).expect("a drawing");
                 }
             }
         });
@@ -208,7 +211,7 @@ impl<'a> Contender<'a> {
 }
 
 fn main() -> ExitCode {
-    let asked = std::env::args().skip(1).find(|argument| argument != "--bench");
+    let filter = std::env::args().skip(1).find(|argument| argument != "--bench");
     let mesh = organ();
     let (node_count, tetrahedron_count) = (mesh.positions.len(), mesh.tetrahedra.len());
     let tissue = |model, poisson_ratio| Material {
@@ -237,7 +240,7 @@ fn main() -> ExitCode {
         vec![Vec3::ZERO; tetrahedron_count],
         vec![0.0; node_count.max(tetrahedron_count)],
     );
-    // What is asked for, one a line; the first is what all are compared with, the second must not differ from it.
+    // One body per row. The first is the baseline of all ratios; the second must not differ from it.
     let bodies: &[(&str, BodyDefinition)] = &[
         ("plain springs", springs),
         (
@@ -351,7 +354,7 @@ fn main() -> ExitCode {
         (
             "asleep where it rests, and awake",
             BodyDefinition {
-                // The smallest speed above 0: it never rests.
+                // The smallest speed above 0: the body never sleeps.
                 sleep: Sleep {
                     speed: f32::MIN_POSITIVE,
                     time: 0.5,
@@ -408,9 +411,9 @@ fn main() -> ExitCode {
         (READER, springs),
         (PROFILED, springs),
         (TAGGED, springs),
-        (SKETCHED, springs),
+        (DEBUG_DRAWN, springs),
         (RECORDED, springs),
-        (DRAWN, springs),
+        (EMBEDDED, springs),
         (
             "springs from E",
             BodyDefinition {
@@ -476,10 +479,10 @@ fn main() -> ExitCode {
             },
         ),
     ];
-    let is_asked =
-        |place: usize, name: &str| place < 2 || asked.as_ref().is_none_or(|asked| name.contains(asked.as_str()));
-    let mut report = String::from("# The bill\n\n");
-    report.push_str(&alone::report(held));
+    let is_selected =
+        |index: usize, name: &str| index < 2 || filter.as_ref().is_none_or(|filter| name.contains(filter.as_str()));
+    let mut report = String::from("# Cost table\n\n");
+    report.push_str(&alone::report(allocated));
     let drawn = EmbeddingDefinition {
         vertices: &mesh.positions,
         triangles: &surface,
@@ -497,7 +500,7 @@ fn main() -> ExitCode {
         let contenders = bodies
             .iter()
             .enumerate()
-            .filter(|(place, (name, _))| is_asked(*place, name));
+            .filter(|(index, (name, _))| is_selected(*index, name));
         let mut contenders: Vec<Contender> = contenders
             .map(|(_, (name, definition))| Contender::new(name, definition, solver, &drawn))
             .collect();
@@ -510,7 +513,7 @@ fn main() -> ExitCode {
                 .storage_report()
                 .spring_count
         };
-        for _ in 0..TURNS {
+        for _ in 0..REPEATS {
             for contender in &mut contenders {
                 contender.turn(dt);
             }
@@ -539,7 +542,7 @@ fn main() -> ExitCode {
                 contender.least / least,
                 contender.bytes as f64 / node_count as f64,
                 contender.bytes as f64 / bytes as f64,
-                1e6 * contender.made / node_count as f64,
+                1e6 * contender.creation_time / node_count as f64,
                 contender.snapshot as f64 / node_count as f64,
                 1e6 * contender.saved / node_count as f64,
                 1e6 * contender.loaded / node_count as f64,
@@ -550,7 +553,7 @@ fn main() -> ExitCode {
         if hashes[0] != hashes[1] || contenders[1].bytes != bytes {
             let _ = writeln!(
                 report,
-                "**What is off is not free**: {} bytes instead of {bytes}, {hashes:x?}.\n",
+                "**Disabled options are not free**: {} bytes instead of {bytes}, {hashes:x?}.\n",
                 contenders[1].bytes
             );
             is_free = false;

@@ -1,4 +1,4 @@
-//! A cloth that lies on a tool: the time of a step and what the tool feels, with each detection.
+//! A cloth on a tool: the time of a step and the error of the force on the tool, with each detection.
 
 use glam::Vec3;
 use sinew::{
@@ -13,17 +13,17 @@ use crate::scene::SIZE;
 use crate::shapes::{Shape, bumpy_radius};
 use crate::truth::Truth;
 
-/// kg, and what the cloth keeps off the tool, m.
+/// Mass of the cloth [kg] and its contact thickness [m].
 const MASS: f32 = 0.02;
 const THICKNESS: f32 = 0.2e-3;
 
-/// 1/s, so that it soon lies still.
+/// Damping rate, so that the cloth soon rests [1/s].
 const DAMPING: f32 = 100.0;
 
-/// s
+/// Duration of a step [s].
 const STEP: f32 = 1e-3;
 
-/// A cloth that nothing touches, for comparison.
+/// A cloth without contact, as the baseline.
 const FREE: &str = "no tool";
 
 const DETECTIONS: [(&str, Detection); 3] = [
@@ -32,35 +32,35 @@ const DETECTIONS: [(&str, Detection); 3] = [
     ("DISTANCE_FIELD, 1/64", Detection::DistanceField),
 ];
 
-/// A cloth and a tool that are measured.
+/// The size of a measured cloth and its tool.
 pub struct Extent {
     pub solver: Solver,
-    /// Triangles of the tool.
+    /// Number of triangles of the tool.
     pub tool: usize,
-    /// Cells along the cloth.
+    /// Number of cells along the cloth.
     pub cells: u32,
 }
 
-/// Steps until a cloth lies still.
+/// Steps until the cloth is at rest.
 const SETTLING: usize = 40;
 
-/// A cloth and perhaps a tool.
-struct Drape {
+/// A cloth, with a tool or without.
+struct DrapedCloth {
     world: World,
     cloth: BodyId,
     tool: Option<ToolId>,
 }
 
-impl Drape {
+impl DrapedCloth {
     fn new(detection: Option<Detection>, tool: &Shape, solver: Solver, cells: u32) -> Result<Self, String> {
         let row = cells + 1;
         let square = sinew::mesh::Mesh::cloth([SIZE, SIZE], [cells, cells]).map_err(|error| error.to_string())?;
-        // As it lies on the upper side, within 30 degrees of the top, so that friction holds it.
-        let lying = square.positions.iter().map(|place| {
-            let direction = Vec3::new(0.8 * place.x, SIZE, 0.8 * place.z).normalize();
+        // The cloth starts on the upper side, within 30 degrees of the top, so that friction holds it.
+        let draped = square.positions.iter().map(|position| {
+            let direction = Vec3::new(0.8 * position.x, SIZE, 0.8 * position.z).normalize();
             direction * (bumpy_radius(SIZE, direction) + THICKNESS)
         });
-        let positions: Vec<Vec3> = lying.collect();
+        let positions: Vec<Vec3> = draped.collect();
         let mass = MASS / (row * row) as f32;
         let mut world = World::new(WorldDefinition {
             thread_count: 1,
@@ -112,24 +112,24 @@ impl Drape {
     }
 }
 
-/// Where the cloth lies, and what the tool feels.
-struct Lie {
-    /// The force on the tool over the weight, less 1, of the mean over the last steps.
+/// The resting position of the cloth and the force on the tool.
+struct RestReport {
+    /// The mean force on the tool over the last steps, over the weight, less 1.
     force: f64,
-    /// The largest that a single step's differs from that mean, in the weight.
+    /// The largest deviation of a single step's force from that mean, over the weight.
     jitter: f64,
     inside: usize,
     nodes: usize,
-    /// m
+    /// The deepest penetration [m].
     deepest: f64,
-    /// Of the points in contact: how far off the thickness they are, RMS and worst, m.
-    off: f64,
+    /// Deviation of contact points from the contact thickness, RMS and worst [m].
+    thickness_error: f64,
     worst: f64,
     contacts: usize,
 }
 
-impl Lie {
-    fn of(drape: &mut Drape, truth: &Truth) -> Self {
+impl RestReport {
+    fn of(drape: &mut DrapedCloth, truth: &Truth) -> Self {
         const STEPS: usize = 10;
         let forces: Vec<Vec3> = (0..STEPS)
             .map(|_| {
@@ -151,7 +151,7 @@ impl Lie {
             .flat_map(|tool| drape.world.contacts(tool).expect("a tool"))
             .map(|contact| truth.signed_distance(contact.point.as_dvec3()) - f64::from(THICKNESS))
             .collect();
-        let squares: f64 = contacts.iter().map(|off| off * off).sum();
+        let squares: f64 = contacts.iter().map(|error| error * error).sum();
         Self {
             force: f64::from((mean + weight * Vec3::Y).length() / weight),
             jitter: f64::from(jitter / weight),
@@ -160,8 +160,8 @@ impl Lie {
             deepest: distances
                 .iter()
                 .fold(0.0, |deepest, distance| f64::max(deepest, -distance)),
-            off: (squares / contacts.len().max(1) as f64).sqrt(),
-            worst: contacts.iter().fold(0.0, |worst, off| f64::max(worst, off.abs())),
+            thickness_error: (squares / contacts.len().max(1) as f64).sqrt(),
+            worst: contacts.iter().fold(0.0, |worst, error| f64::max(worst, error.abs())),
             contacts: contacts.len(),
         }
     }
@@ -170,8 +170,8 @@ impl Lie {
 pub fn run(report: &mut Report, claims: &mut Claims, extents: &[Extent], effort: Effort) {
     report.write(&format!(
         "\n## A cloth on a tool\n\n{} g, on the upper side of a bumpy ball of {} mm, steps of {} ms on one thread. Over a free \
-         cloth: the median of the ratios within rounds. Force: the mean on the tool over 10 steps against the weight, and by how much a single step's \
-         differs from it. Off: of the points in contact, from the cloth's thickness.\n",
+         cloth: the median of the ratios within rounds. Force: the mean on the tool over 10 steps against the weight, and the deviation of a single step's \
+         force. Off: deviation of contact points from the contact thickness.\n",
         digits(1e3 * f64::from(MASS)),
         digits(1e3 * f64::from(SIZE)),
         digits(1e3 * f64::from(STEP))
@@ -192,12 +192,12 @@ pub fn run(report: &mut Report, claims: &mut Claims, extents: &[Extent], effort:
         "deepest mm",
     ]);
     for extent in extents {
-        lie(report, claims, &mut table, extent, effort);
+        rest(report, claims, &mut table, extent, effort);
     }
     report.table(&table);
 }
 
-fn lie(report: &mut Report, claims: &mut Claims, table: &mut Table, extent: &Extent, effort: Effort) {
+fn rest(report: &mut Report, claims: &mut Claims, table: &mut Table, extent: &Extent, effort: Effort) {
     let Extent { solver, tool, cells } = *extent;
     let tool = Shape::bumpy(SIZE, tool);
     let truth = Truth::new(&tool.positions, &tool.triangles);
@@ -205,7 +205,7 @@ fn lie(report: &mut Report, claims: &mut Claims, table: &mut Table, extent: &Ext
     report.progress(&format!("{solver:?}, a cloth on a tool of {triangles} triangles"));
     let mut drapes = Vec::new();
     for (name, detection) in DETECTIONS {
-        match Drape::new(Some(detection), &tool, solver, cells) {
+        match DrapedCloth::new(Some(detection), &tool, solver, cells) {
             Ok(mut drape) => {
                 drape.step(SETTLING);
                 report.progress(&format!("{name} has settled"));
@@ -214,8 +214,11 @@ fn lie(report: &mut Report, claims: &mut Claims, table: &mut Table, extent: &Ext
             Err(reason) => report.not_offered(name, &reason),
         }
     }
-    let lies: Vec<Lie> = drapes.iter_mut().map(|(_, drape)| Lie::of(drape, &truth)).collect();
-    if let Ok(free) = Drape::new(None, &tool, solver, cells) {
+    let lies: Vec<RestReport> = drapes
+        .iter_mut()
+        .map(|(_, drape)| RestReport::of(drape, &truth))
+        .collect();
+    if let Ok(free) = DrapedCloth::new(None, &tool, solver, cells) {
         drapes.push((FREE, free));
     }
     let contenders = drapes
@@ -224,26 +227,26 @@ fn lie(report: &mut Report, claims: &mut Claims, table: &mut Table, extent: &Ext
     let results = interleave(contenders.collect(), effort);
     report.disturbed(results.waited);
     let free = results.get(FREE);
-    for ((name, _), lie) in drapes.iter().zip(&lies) {
+    for ((name, _), rest) in drapes.iter().zip(&lies) {
         let Some(samples) = results.get(name) else { continue };
         let ratio = free.map_or(f64::NAN, |free| samples.ratio(free));
         table.row(vec![
             format!("{solver:?}"),
-            lie.nodes.to_string(),
+            rest.nodes.to_string(),
             count(triangles),
             (*name).into(),
             milliseconds(samples.minimum()),
             digits(ratio),
-            digits(100.0 * lie.force),
-            digits(100.0 * lie.jitter),
-            lie.contacts.to_string(),
-            digits(1e3 * lie.off),
-            digits(1e3 * lie.worst),
-            lie.inside.to_string(),
-            digits(1e3 * lie.deepest),
+            digits(100.0 * rest.force),
+            digits(100.0 * rest.jitter),
+            rest.contacts.to_string(),
+            digits(1e3 * rest.thickness_error),
+            digits(1e3 * rest.worst),
+            rest.inside.to_string(),
+            digits(1e3 * rest.deepest),
         ]);
         let what = format!("{solver:?}, a cloth on {} triangles, {name}:", count(triangles));
-        claims.at_most(format!("{what} the force off the weight"), lie.force, 0.01);
-        claims.at_most(format!("{what} the deepest node, m"), lie.deepest, 0.5e-3);
+        claims.at_most(format!("{what} the force off the weight"), rest.force, 0.01);
+        claims.at_most(format!("{what} the deepest node, m"), rest.deepest, 0.5e-3);
     }
 }

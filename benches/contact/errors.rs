@@ -1,4 +1,4 @@
-//! What a way of detection misses, finds that is not there, and how far its depths are off.
+//! Errors of a detection method: missed points, false points, and depth errors.
 
 use glam::{DVec3, Vec3};
 use sinew::detection::image_space::Placed;
@@ -7,46 +7,46 @@ use crate::random::Random;
 use crate::scene::{SIZE, Scene};
 use crate::truth::Truth;
 
-/// What a detection found of one surface in another, whatever the way.
+/// The result of one detection of one surface in another.
 #[derive(Default)]
-pub struct Found {
-    /// Nodes and their depths, m, in ascending order.
+pub struct DetectionResult {
+    /// Nodes and their depths [m], in ascending order of node.
     pub nodes: Vec<(u32, f32)>,
-    /// Edges and the shares of them between which they are inside, in ascending order.
+    /// Edges and the fractions of their length between which they are inside, in ascending order of edge.
     pub edges: Vec<(u32, [f32; 2])>,
 }
 
-impl Found {
+impl DetectionResult {
     fn has(&self, edge: u32, share: f32) -> bool {
-        let first = self.edges.partition_point(|part| part.0 < edge);
-        let parts = self.edges[first..].iter().take_while(|part| part.0 == edge);
-        parts
+        let first = self.edges.partition_point(|interval| interval.0 < edge);
+        let intervals = self.edges[first..].iter().take_while(|interval| interval.0 == edge);
+        intervals
             .into_iter()
             .any(|(_, [entry, exit])| (*entry..=*exit).contains(&share))
     }
 
     fn depth(&self, node: u32) -> Option<f32> {
-        let place = self.nodes.binary_search_by_key(&node, |found| found.0).ok()?;
-        Some(self.nodes[place].1)
+        let index = self.nodes.binary_search_by_key(&node, |entry| entry.0).ok()?;
+        Some(self.nodes[index].1)
     }
 }
 
-/// Points whose place is known: on edges and at nodes of both surfaces of every pair.
+/// Points with known distances: on edges and at nodes of both surfaces of every pair.
 pub struct Samples {
-    /// By pair, then the tissue's in the ring and the ring's in the tissue.
+    /// One entry per pair: tissue in the ring, then ring in the tissue.
     sides: Vec<[Side; 2]>,
 }
 
 #[derive(Default)]
 struct Side {
-    /// The edge, the share along it, and the signed distance from the other surface, m.
+    /// The edge, the fraction along it, and the signed distance from the other surface [m].
     on_edges: Vec<(u32, f32, f64)>,
-    /// Likewise.
+    /// The node and its signed distance from the other surface [m].
     nodes: Vec<(u32, f64)>,
 }
 
 impl Samples {
-    /// So many of each on each side.
+    /// Draws `count` points on edges and `count / 2` nodes for each side.
     pub fn new(scene: &Scene, count: usize) -> Self {
         let mut random = Random(7);
         let sides = scene.pairs.iter().map(|pair| {
@@ -59,7 +59,7 @@ impl Samples {
 }
 
 impl Side {
-    /// Of `body` within the box about `other`: beyond it nothing is found.
+    /// Draws points of `body` within the bounding box of `other`; no contact is possible outside.
     fn new(body: &Placed, other: &Placed, truth: &Truth, count: usize, random: &mut Random) -> Self {
         let low = other.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
         let high = other.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
@@ -93,13 +93,13 @@ impl Side {
     }
 }
 
-/// The errors of a way of detection, lengths in parts of the size.
+/// The errors of a detection method. Lengths are relative to the size.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Errors {
     inside: usize,
     missed: usize,
     false_ones: usize,
-    /// What lies deepest of what was missed, and furthest outside of what was found.
+    /// The depth of the deepest missed point, and the distance of the furthest false point.
     pub deepest_missed: f64,
     pub furthest_false: f64,
     depths: usize,
@@ -108,64 +108,64 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// Of everything found, by pair and side as in the samples; without nodes where the method finds none, without a side where
-    /// it was not asked.
-    pub fn of(samples: &Samples, found: &[[Option<Found>; 2]]) -> Self {
+    /// Errors of all results, by pair and side as in the samples. A method without nodes has no node errors; a side
+    /// that was not queried is `None`.
+    pub fn of(samples: &Samples, detections: &[[Option<DetectionResult>; 2]]) -> Self {
         let mut errors = Self::default();
-        for (sides, found) in samples.sides.iter().zip(found) {
-            for (side, found) in sides.iter().zip(found) {
-                if let Some(found) = found {
-                    errors.add(side, found);
+        for (sides, detections) in samples.sides.iter().zip(detections) {
+            for (side, detection) in sides.iter().zip(detections) {
+                if let Some(detection) = detection {
+                    errors.add(side, detection);
                 }
             }
         }
         errors
     }
 
-    fn add(&mut self, side: &Side, found: &Found) {
+    fn add(&mut self, side: &Side, detection: &DetectionResult) {
         for &(edge, share, distance) in &side.on_edges {
-            self.see(distance, found.has(edge, share));
+            self.record(distance, detection.has(edge, share));
         }
-        if found.nodes.is_empty() {
+        if detection.nodes.is_empty() {
             return;
         }
         for &(node, distance) in &side.nodes {
-            let depth = found.depth(node);
-            self.see(distance, depth.is_some());
+            let depth = detection.depth(node);
+            self.record(distance, depth.is_some());
             if let Some(depth) = depth.filter(|_| distance < 0.0) {
-                self.see_depth(f64::from(depth) + distance);
+                self.record_depth(f64::from(depth) + distance);
             }
         }
     }
 
-    /// A point this far from the surface, m, that was found inside or not.
-    pub fn see(&mut self, distance: f64, found: bool) {
+    /// Counts a point at this signed distance [m] that was reported inside or not.
+    pub fn record(&mut self, distance: f64, is_reported: bool) {
         let outside = distance / f64::from(SIZE);
         self.inside += usize::from(distance < 0.0);
-        if found && distance >= 0.0 {
+        if is_reported && distance >= 0.0 {
             self.false_ones += 1;
             self.furthest_false = self.furthest_false.max(outside);
         }
-        if !found && distance < 0.0 {
+        if !is_reported && distance < 0.0 {
             self.missed += 1;
             self.deepest_missed = self.deepest_missed.max(-outside);
         }
     }
 
-    /// A depth that is off by so much, m.
-    pub fn see_depth(&mut self, error: f64) {
+    /// Counts a depth error [m].
+    pub fn record_depth(&mut self, error: f64) {
         let error = error.abs() / f64::from(SIZE);
         self.depths += 1;
         self.squares += error * error;
         self.worst_depth = self.worst_depth.max(error);
     }
 
-    /// In parts of the points inside.
+    /// Missed points over points inside.
     pub fn missed(&self) -> f64 {
         self.missed as f64 / self.inside as f64
     }
 
-    /// Likewise.
+    /// False points over points inside.
     pub fn false_ones(&self) -> f64 {
         self.false_ones as f64 / self.inside as f64
     }
@@ -174,13 +174,13 @@ impl Errors {
         self.inside
     }
 
-    /// RMS; `None` where no depth is told.
+    /// RMS depth error; `None` if there are no depths.
     pub fn depth(&self) -> Option<f64> {
         (self.depths > 0).then(|| (self.squares / self.depths as f64).sqrt())
     }
 }
 
-/// The points of a surface within a distance of another's box: what a tool is asked about.
+/// The points of a surface within a distance of another's bounding box: the query points of a tool.
 pub fn near(positions: &[Vec3], other: &[Vec3], within: f32) -> Vec<Vec3> {
     let low = other.iter().copied().fold(Vec3::INFINITY, Vec3::min) - within;
     let high = other.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max) + within;
@@ -188,7 +188,7 @@ pub fn near(positions: &[Vec3], other: &[Vec3], within: f32) -> Vec<Vec3> {
     positions.iter().copied().filter(is_near).collect()
 }
 
-/// As vectors of `f64`.
+/// Converts points to `f64`.
 pub fn exact(points: &[Vec3]) -> impl Iterator<Item = DVec3> {
     points.iter().map(|point| point.as_dvec3())
 }

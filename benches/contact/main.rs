@@ -1,8 +1,8 @@
-//! Contact found in three ways: the time of a detection against what it misses and how far off it is, for surfaces of 1K to 200K
-//! triangles, and what tissue on a tool pays for it.
+//! Three contact detection methods: the time of a detection against its misses and errors, for surfaces of 1K to 200K
+//! triangles, and the cost for tissue on a tool.
 //!
-//! `cargo bench --bench contact [-- --quick] [--only pairs|tools|cloth]` writes `target/report/contact.md` and plots beside it. It fails where
-//! what FIGURES.md says of errors no longer holds.
+//! `cargo bench --bench contact [-- --quick] [--only pairs|tools|cloth]` writes `target/report/contact.md` and plots.
+//! It fails if an error exceeds the figure in FIGURES.md.
 #![allow(clippy::print_stderr)]
 
 mod claims;
@@ -41,7 +41,7 @@ use sinew::Solver;
 
 const PARTS: [&str; 3] = ["pairs", "tools", "cloth"];
 
-/// What is asked for on the command line.
+/// The command-line options.
 struct Options {
     quick: bool,
     parts: Vec<&'static str>,
@@ -56,7 +56,7 @@ impl Options {
         let mut arguments = std::env::args().skip(1);
         while let Some(argument) = arguments.next() {
             match argument.as_str() {
-                // Given by cargo itself.
+                // Passed by cargo.
                 "--bench" => {}
                 "--quick" => options.quick = true,
                 "--only" => {
@@ -73,7 +73,7 @@ impl Options {
     }
 }
 
-/// How much is measured.
+/// The sizes to measure.
 struct Plan {
     pairs: &'static [usize],
     tools: &'static [usize],
@@ -81,7 +81,7 @@ struct Plan {
     effort: Effort,
 }
 
-const fn cloth_of(solver: Solver, tool: usize, cells: u32) -> Extent {
+const fn cloth_sizes(solver: Solver, tool: usize, cells: u32) -> Extent {
     Extent { solver, tool, cells }
 }
 
@@ -89,8 +89,8 @@ const FULL: Plan = Plan {
     pairs: &[1_000, 5_000, 20_000, 70_000, 200_000],
     tools: &[1_000, 20_000, 200_000],
     cloth: &[
-        cloth_of(Solver::Verlet, 5_000, 31),
-        cloth_of(Solver::Verlet, 50_000, 15),
+        cloth_sizes(Solver::Verlet, 5_000, 31),
+        cloth_sizes(Solver::Verlet, 50_000, 15),
     ],
     effort: Effort {
         quick: false,
@@ -103,7 +103,7 @@ const FULL: Plan = Plan {
 const QUICK: Plan = Plan {
     pairs: &[1_000, 5_000, 12_000],
     tools: &[5_000],
-    cloth: &[cloth_of(Solver::Verlet, 5_000, 12)],
+    cloth: &[cloth_sizes(Solver::Verlet, 5_000, 12)],
     effort: Effort {
         quick: true,
         rounds: 3,
@@ -121,17 +121,17 @@ fn main() -> ExitCode {
         }
     };
     let plan = if options.quick { QUICK } else { FULL };
-    let asked = |part| options.parts.contains(&part);
+    let is_selected = |part| options.parts.contains(&part);
     let mut report = Report::new("contact");
     let mut claims = Claims::default();
     report.write(&introduction(options.quick));
-    if asked("pairs") {
+    if is_selected("pairs") {
         pairs::run(&mut report, &mut claims, plan.pairs, plan.effort);
     }
-    if asked("tools") {
+    if is_selected("tools") {
         tools::run(&mut report, &mut claims, plan.tools, plan.effort);
     }
-    if asked("cloth") {
+    if is_selected("cloth") {
         cloth::run(&mut report, &mut claims, plan.cloth, plan.effort);
     }
     claims.write(&mut report);
@@ -156,10 +156,10 @@ fn main() -> ExitCode {
 fn introduction(quick: bool) -> String {
     let mut text = format!("# Contact\n\n{}", machine::description());
     text.push_str(
-        "- Times are the least over rounds in which all contenders of a size take turns, in processor time of one thread: what disturbs \
-         makes them longer, never shorter.\n\
-         - Errors are against the same triangles in `f64`, each looked at: distances to all of them, and how often a ray \
-         passes them.\n",
+        "- Times are the least over rounds in which all contenders of a size take turns, in processor time of one thread: disturbances \
+         make them longer, never shorter.\n\
+         - Errors are relative to brute force over the same triangles in `f64`: distances to all of them, and the crossings of \
+         a ray.\n",
     );
     if quick {
         text.push_str("- A quick run: small sizes, few rounds.\n");

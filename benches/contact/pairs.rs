@@ -1,4 +1,4 @@
-//! Two surfaces that overlap, both of which may change their shape: IMAGE_SPACE in its forms, and EXACT.
+//! Two overlapping deformable surfaces: the variants of IMAGE_SPACE, and EXACT.
 
 use glam::Vec3;
 use sinew::detection::exact::{self, Exact};
@@ -6,7 +6,7 @@ use sinew::detection::image_space::{Form, ImageSpace, ImageSpaceDefinition, Surf
 
 use crate::claims::Claims;
 use crate::clock;
-use crate::errors::{Errors, Found, Samples};
+use crate::errors::{DetectionResult, Errors, Samples};
 use crate::report::{Report, Table, count, digits, milliseconds};
 use crate::rounds::{Contender, Effort, interleave};
 use crate::scene::{Pair, SIZE, Scene};
@@ -14,52 +14,52 @@ use crate::svg::{Series, plot};
 use crate::truth::Truth;
 use crate::volume;
 
-/// Pixels along the size; where time is short, every second one.
+/// Pixels along the size. Large surfaces skip every second resolution.
 const PIXELS: [u32; 4] = [64, 128, 256, 512];
 const FEW_PIXELS: [u32; 2] = [64, 256];
 
-/// From so many triangles on time is short, and shorter.
+/// From this number of triangles on, fewer resolutions and samples are measured.
 const LARGE: usize = 50_000;
 const LARGEST: usize = 150_000;
 
-/// Pixels of the size at which the forms of image space are compared over the triangles.
+/// Pixels along the size at which the variants of image space are compared over the number of triangles.
 const COMPARED: u32 = 256;
 
-/// Half of a pixel's diagonal: what is deeper is seen; and a little for what `f32` takes.
-const SEEN: f64 = 0.71;
+/// Half of a pixel's diagonal with a margin for `f32`: deeper points must be detected.
+const HALF_DIAGONAL: f64 = 0.71;
 
-/// What `f32` takes of a place, in parts of the size.
+/// Position error of `f32`, relative to the size.
 const ROUNDING: f64 = 1e-6;
 
-/// In parts of the sum of surfaces and samples that the error may be looked for in: triangles times samples.
-const LOOKS: usize = 300_000_000;
+/// Upper limit of triangles times samples in the reference computation of errors.
+const MAX_REFERENCE_TESTS: usize = 300_000_000;
 
-/// From so many triangles on the volume is not worked out: its time goes with their square.
-const TOO_MANY: usize = 6_000;
+/// From this number of triangles on the volume is not computed, since its time grows with their square.
+const MAX_FOR_VOLUME: usize = 6_000;
 
-/// A direction along which nothing of the scene lies.
-const ASKEW: Vec3 = Vec3::new(0.48, 0.64, 0.6);
+/// A direction that no edge or face of the scene follows.
+const OBLIQUE: Vec3 = Vec3::new(0.48, 0.64, 0.6);
 
-/// The least time of image space that is not of its pixels begins here.
-const MANY: f64 = 4_000.0;
+/// From this number of triangles on, the time of image space no longer depends mainly on its pixels.
+const FROM_TRIANGLES: f64 = 4_000.0;
 
-/// The steepest that its time may rise with the triangles.
-const LINEAR: f64 = 1.15;
+/// The largest exponent with which its time may grow with the number of triangles.
+const MAX_EXPONENT: f64 = 1.15;
 
-/// One way to detect.
+/// A detection method.
 #[derive(Clone, Copy, PartialEq)]
-enum Way {
+enum Method {
     Image {
         form: Form,
         axes: bool,
         pixels: u32,
     },
     Exact,
-    /// The part of that which takes the tissue's new shape.
+    /// The part of EXACT that updates the hierarchy for the deformed tissue.
     Refit,
 }
 
-impl Way {
+impl Method {
     fn all() -> Vec<Self> {
         Self::with(&PIXELS)
     }
@@ -79,7 +79,7 @@ impl Way {
         }
     }
 
-    /// Without its resolution.
+    /// The name without the resolution.
     fn kind(self) -> String {
         match self {
             Self::Image { form, axes, .. } => {
@@ -90,7 +90,7 @@ impl Way {
         }
     }
 
-    /// In parts of the size.
+    /// The pixel size, relative to the size.
     fn pixel(self) -> f64 {
         match self {
             Self::Image { pixels, .. } => 1.0 / f64::from(pixels),
@@ -99,12 +99,12 @@ impl Way {
     }
 }
 
-/// A detector of image space with room for a scene.
+/// Creates an image-space detector with capacity for a scene.
 fn detector(scene: &Scene, form: Form, axes: bool, pixels: u32) -> ImageSpace {
     let definition = ImageSpaceDefinition {
         form,
-        views: if axes { Views::Axes } else { Views::Along(ASKEW) },
-        // Seen askew what overlaps may be wider than the size.
+        views: if axes { Views::Axes } else { Views::Along(OBLIQUE) },
+        // Along an oblique view the overlap may be wider than the size.
         pixels: 1 << 20,
         crossings: 1 << 22,
         ..ImageSpaceDefinition::new(SIZE / pixels as f32)
@@ -114,13 +114,13 @@ fn detector(scene: &Scene, form: Form, axes: bool, pixels: u32) -> ImageSpace {
     ImageSpace::new(&definition, &surfaces).expect("a detector")
 }
 
-/// EXACT for all pairs of a scene.
-struct Solids {
+/// EXACT solids for all pairs of a scene.
+struct ExactPairs {
     tissue: Exact,
     rings: Vec<Exact>,
 }
 
-impl Solids {
+impl ExactPairs {
     fn new(scene: &Scene) -> Self {
         let ring = |pair: &Pair| Exact::new(&pair.ring.checked()).expect("a solid");
         Self {
@@ -129,7 +129,7 @@ impl Solids {
         }
     }
 
-    /// The tissue's in the ring, then the ring's in the tissue.
+    /// Detects the tissue in the ring, then the ring in the tissue.
     fn detect(&mut self, scene: &Scene, pair: usize, overlaps: &mut [exact::Overlap; 2]) {
         let Pair {
             positions,
@@ -138,31 +138,31 @@ impl Solids {
         } = &scene.pairs[pair];
         self.tissue.refit(positions).expect("positions");
         let [first, second] = overlaps;
-        let found = self.rings[pair].find(positions, scene.tissue_surface.edges(), first);
-        found
+        let result = self.rings[pair].find(positions, scene.tissue_surface.edges(), first);
+        result
             .and_then(|()| self.tissue.find(&ring.positions, ring_surface.edges(), second))
             .expect("an overlap");
     }
 }
 
-/// What was measured of one way at one size.
+/// The measurements of one method at one size.
 struct Row {
     triangles: usize,
-    way: Way,
-    /// Of one detection, s.
+    method: Method,
+    /// Time of one detection [s].
     time: f64,
     errors: Errors,
-    /// In parts of it; `None` where it is not told or not known.
+    /// Relative volume error; `None` if there is no volume or no reference.
     volume: Option<f64>,
 }
 
 pub fn run(report: &mut Report, claims: &mut Claims, sizes: &[usize], effort: Effort) {
     report.write(&format!(
-        "\n## Two surfaces that overlap\n\nTissue, a bumpy ball of {} mm that is bent and squeezed, and a ring 0.4, 0.8 and 1.2 times as \
-         wide that reaches into it, each of so many triangles. A detection finds what of each lies in the other: times are means over \
-         the three. Missed and false: of points on edges and at nodes, in parts of those inside, with the deepest that was missed \
-         and the furthest outside that was found; depths: RMS and worst difference to the shortest way out, of which image space tells that \
-         along its views; all lengths in parts of the size.\n",
+        "\n## Two surfaces that overlap\n\nTissue, a bumpy ball of {} mm that is bent and compressed, and a ring 0.4, 0.8 and 1.2 times as \
+         wide that reaches into it, all with the stated number of triangles. A detection finds the parts of each surface in the other: times are means over \
+         the three. Missed and false: of points on edges and at nodes, relative to those inside, with the deepest missed \
+         and the furthest false point. Depths: RMS and worst difference from the shortest distance to the surface; image space reports \
+         that along its views. All lengths are relative to the size.\n",
         digits(1e3 * f64::from(SIZE))
     ));
     let mut rows = Vec::new();
@@ -174,23 +174,27 @@ pub fn run(report: &mut Report, claims: &mut Claims, sizes: &[usize], effort: Ef
     write_table(report, &rows);
     write_plots(report, &rows);
     write_slopes(report, claims, &rows);
-    hold(claims, &rows);
+    check_claims(claims, &rows);
 }
 
 fn measure(report: &mut Report, scene: &Scene, effort: Effort, rows: &mut Vec<Row>) {
     let triangles = scene.triangle_count();
     let is_short = effort.quick || triangles > LARGE;
-    let ways = Way::with(if is_short { &FEW_PIXELS } else { &PIXELS });
+    let methods = Method::with(if is_short { &FEW_PIXELS } else { &PIXELS });
     let rounds = match triangles {
         0..LARGE => effort.rounds,
         LARGE..LARGEST => 2,
         _ => 1,
     };
     let effort = Effort { rounds, ..effort };
-    let looks = if effort.quick { LOOKS / 4 } else { LOOKS };
-    let samples = Samples::new(scene, (looks / triangles / 6).clamp(100, 2000));
+    let tests = if effort.quick {
+        MAX_REFERENCE_TESTS / 4
+    } else {
+        MAX_REFERENCE_TESTS
+    };
+    let samples = Samples::new(scene, (tests / triangles / 6).clamp(100, 2000));
     let mut solids = None;
-    let built = clock::time(|| solids = Some(Solids::new(scene)));
+    let built = clock::time(|| solids = Some(ExactPairs::new(scene)));
     let mut solids = solids.expect("solids");
     report.progress(&format!(
         "EXACT: {} ms to check and build a surface",
@@ -199,54 +203,56 @@ fn measure(report: &mut Report, scene: &Scene, effort: Effort, rows: &mut Vec<Ro
     let mut refitted = Exact::changing(&scene.tissue.checked()).expect("a solid");
     let mut overlaps = [exact::Overlap::default(), exact::Overlap::default()];
     let volumes: Vec<f64> = (0..scene.pairs.len())
-        .take_while(|_| triangles < TOO_MANY)
+        .take_while(|_| triangles < MAX_FOR_VOLUME)
         .map(|pair| true_volume(scene, pair))
         .collect();
-    let errors: Vec<(Errors, Option<f64>)> = ways
+    let errors: Vec<(Errors, Option<f64>)> = methods
         .iter()
         .copied()
-        .map(|way| match way {
-            Way::Image { form, axes, pixels } => image_errors(scene, &samples, &volumes, form, axes, pixels),
-            Way::Exact => {
-                let found: Vec<_> = (0..scene.pairs.len())
+        .map(|method| match method {
+            Method::Image { form, axes, pixels } => image_errors(scene, &samples, &volumes, form, axes, pixels),
+            Method::Exact => {
+                let detections: Vec<_> = (0..scene.pairs.len())
                     .map(|pair| {
                         solids.detect(scene, pair, &mut overlaps);
-                        overlaps.each_ref().map(|overlap| Some(found_exactly(overlap)))
+                        overlaps.each_ref().map(|overlap| Some(exact_result(overlap)))
                     })
                     .collect();
-                (Errors::of(&samples, &found), None)
+                (Errors::of(&samples, &detections), None)
             }
-            Way::Refit => (Errors::default(), None),
+            Method::Refit => (Errors::default(), None),
         })
         .collect();
     let mut contenders: Vec<Contender> = Vec::new();
-    for &way in &ways {
-        if let Way::Image { form, axes, pixels } = way {
+    for &method in &methods {
+        if let Method::Image { form, axes, pixels } = method {
             let mut detector = detector(scene, form, axes, pixels);
-            contenders.push(Contender::new(way.name(), 1, move |units| {
+            contenders.push(Contender::new(method.name(), 1, move |units| {
                 for pair in std::iter::repeat_n(&scene.pairs, units).flatten() {
                     std::hint::black_box(detector.detect(&scene.placed(pair)).expect("an overlap"));
                 }
             }));
         }
     }
-    contenders.push(Contender::new(Way::Exact.name(), 1, |units| {
+    contenders.push(Contender::new(Method::Exact.name(), 1, |units| {
         for pair in (0..scene.pairs.len()).cycle().take(units * scene.pairs.len()) {
             solids.detect(scene, pair, &mut overlaps);
         }
     }));
-    contenders.push(Contender::new(Way::Refit.name(), 1, |units| {
+    contenders.push(Contender::new(Method::Refit.name(), 1, |units| {
         for pair in std::iter::repeat_n(&scene.pairs, units).flatten() {
             refitted.refit(&pair.positions).expect("positions");
         }
     }));
     let results = interleave(contenders, effort);
     report.disturbed(results.waited);
-    for (way, (errors, volume)) in ways.into_iter().zip(errors) {
-        let time = results.get(&way.name()).map_or(f64::NAN, |samples| samples.minimum());
+    for (method, (errors, volume)) in methods.into_iter().zip(errors) {
+        let time = results
+            .get(&method.name())
+            .map_or(f64::NAN, |samples| samples.minimum());
         rows.push(Row {
             triangles,
-            way,
+            method,
             time: time / scene.pairs.len() as f64,
             errors,
             volume,
@@ -273,7 +279,7 @@ fn image_errors(
             worst = Some(worst.map_or(error, |worst| worst.max(error)));
         }
         all.push(overlap.inside.each_ref().map(|inside| {
-            Some(Found {
+            Some(DetectionResult {
                 nodes: inside.points.iter().map(|point| (point.node, point.depth)).collect(),
                 edges: inside
                     .edges
@@ -286,8 +292,8 @@ fn image_errors(
     (Errors::of(samples, &all), worst)
 }
 
-fn found_exactly(overlap: &exact::Overlap) -> Found {
-    Found {
+fn exact_result(overlap: &exact::Overlap) -> DetectionResult {
+    DetectionResult {
         nodes: overlap.points.iter().map(|point| (point.point, point.depth)).collect(),
         edges: overlap
             .edges
@@ -339,7 +345,7 @@ fn write_table(report: &mut Report, rows: &[Row]) {
         let depth = errors.depth();
         table.row(vec![
             count(row.triangles),
-            row.way.name(),
+            row.method.name(),
             milliseconds(row.time),
             cell(digits(100.0 * errors.missed())),
             cell(length(errors.deepest_missed)),
@@ -353,19 +359,19 @@ fn write_table(report: &mut Report, rows: &[Row]) {
     report.table(&table);
 }
 
-/// The rows of a kind of way, in the order measured.
+/// The rows of one kind of method, in order of measurement.
 fn of_kind<'a>(rows: &'a [Row], kind: &'a str) -> impl Iterator<Item = &'a Row> {
-    rows.iter().filter(move |row| row.way.kind() == kind)
+    rows.iter().filter(move |row| row.method.kind() == kind)
 }
 
 fn kinds() -> Vec<String> {
-    let mut kinds: Vec<String> = Way::all().into_iter().map(Way::kind).collect();
+    let mut kinds: Vec<String> = Method::all().into_iter().map(Method::kind).collect();
     kinds.dedup();
     kinds
 }
 
 fn is_compared(row: &Row) -> bool {
-    !matches!(row.way, Way::Image { pixels, .. } if pixels != COMPARED)
+    !matches!(row.method, Method::Image { pixels, .. } if pixels != COMPARED)
 }
 
 fn write_plots(report: &mut Report, rows: &[Row]) {
@@ -403,10 +409,7 @@ fn write_plots(report: &mut Report, rows: &[Row]) {
             dashed: false,
         })
         .collect();
-    let title = format!(
-        "What is missed against time, {} triangles (EXACT: nothing)",
-        count(middle)
-    );
+    let title = format!("Missed points against time, {} triangles (EXACT: none)", count(middle));
     report.plot(
         "contact_missed.svg",
         &title,
@@ -424,54 +427,54 @@ fn write_plots(report: &mut Report, rows: &[Row]) {
             dashed: false,
         })
         .collect();
-    let title = format!("The worst error of a place against time, {} triangles", count(middle));
+    let title = format!("The worst position error against time, {} triangles", count(middle));
     report.plot(
         "contact_error.svg",
         &title,
         plot(
             &title,
             "ms",
-            "deepest missed or furthest false, parts of the size",
+            "deepest missed or furthest false, relative to the size",
             &lines,
         ),
     );
 }
 
-/// How steeply times rise with the triangles: 1 is linear, less where pixels count too.
+/// The exponent of time against the number of triangles: 1 is linear, less if pixels dominate.
 fn write_slopes(report: &mut Report, claims: &mut Claims, rows: &[Row]) {
     report.write(&format!(
-        "\nTimes rise with the triangles, from {MANY:.0} on, to the power of this; as a straight line through the first and the last they \
-         are so much at no triangles, for the pixels, and so much more for each; between them they are off that line by so much at most:\n"
+        "\nExponent of time against the number of triangles, from {FROM_TRIANGLES:.0} on; as a straight line through the first and the last they \
+         have this time without triangles, for the pixels, and this time per triangle. The last column is the largest deviation from that line:\n"
     ));
     let mut table = Table::new(&["way", "power", "ms", "ns a triangle", "off the line %"]);
     for kind in kinds() {
         let points: Vec<(f64, f64)> = of_kind(rows, &kind)
-            .filter(|row| is_compared(row) && row.triangles as f64 >= MANY)
+            .filter(|row| is_compared(row) && row.triangles as f64 >= FROM_TRIANGLES)
             .map(|row| (row.triangles as f64, row.time))
             .collect();
         let power = slope(&points.iter().map(|(x, y)| (x.ln(), y.ln())).collect::<Vec<_>>());
         if !kind.starts_with("EXACT") {
-            let what = format!("{kind}: time rises with the triangles to the power of");
-            claims.at_most(what, power, LINEAR);
+            let claim = format!("{kind}: time rises with the triangles to the power of");
+            claims.at_most(claim, power, MAX_EXPONENT);
         }
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             continue;
         };
         let each = (last.1 - first.1) / (last.0 - first.0);
         let start = first.1 - each * first.0;
-        let off = points.iter().map(|(x, y)| (y / (start + each * x) - 1.0).abs());
+        let deviation = points.iter().map(|(x, y)| (y / (start + each * x) - 1.0).abs());
         table.row(vec![
             kind.clone(),
             digits(power),
             milliseconds(start),
             digits(1e9 * each),
-            digits(100.0 * off.fold(0.0, f64::max)),
+            digits(100.0 * deviation.fold(0.0, f64::max)),
         ]);
     }
     report.table(&table);
 }
 
-/// Of the straight line closest to the points.
+/// The slope of the least-squares line.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let count = points.len() as f64;
     let mean = points.iter().fold((0.0, 0.0), |sum, point| {
@@ -485,50 +488,50 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     products / squares
 }
 
-/// What must be so at every size.
-fn hold(claims: &mut Claims, rows: &[Row]) {
+/// Claims that must hold at every size.
+fn check_claims(claims: &mut Claims, rows: &[Row]) {
     let worst = |pick: &dyn Fn(&Row) -> bool, value: &dyn Fn(&Row) -> f64| {
         rows.iter().filter(|row| pick(row)).map(value).fold(0.0, f64::max)
     };
     let intervals = |row: &Row| {
         matches!(
-            row.way,
-            Way::Image {
+            row.method,
+            Method::Image {
                 form: Form::Intervals,
                 ..
             }
         )
     };
-    let off = |row: &Row| (row.errors.deepest_missed.max(row.errors.furthest_false) - ROUNDING) / row.way.pixel();
-    let what = "Intervals: the deepest missed and the furthest false, in pixels";
-    claims.at_most(what, worst(&intervals, &off), SEEN);
-    let fine = |row: &Row| intervals(row) && row.way.pixel() <= 1.0 / 256.0;
-    let what = "Intervals: missed at 1/256 of the size and finer";
-    claims.at_most(what, worst(&fine, &|row| row.errors.missed()), 0.01);
-    let exact = |row: &Row| row.way == Way::Exact;
-    let place = |row: &Row| {
+    let pixel_error =
+        |row: &Row| (row.errors.deepest_missed.max(row.errors.furthest_false) - ROUNDING) / row.method.pixel();
+    let claim = "Intervals: the deepest missed and the furthest false, in pixels";
+    claims.at_most(claim, worst(&intervals, &pixel_error), HALF_DIAGONAL);
+    let fine = |row: &Row| intervals(row) && row.method.pixel() <= 1.0 / 256.0;
+    let claim = "Intervals: missed at 1/256 of the size and finer";
+    claims.at_most(claim, worst(&fine, &|row| row.errors.missed()), 0.01);
+    let exact = |row: &Row| row.method == Method::Exact;
+    let worst_error = |row: &Row| {
         row.errors
             .deepest_missed
             .max(row.errors.furthest_false)
             .max(row.errors.worst_depth)
     };
-    let what = "EXACT: the worst error of a place or a depth, in parts of the size";
-    claims.at_most(what, worst(&exact, &place), ROUNDING);
-    // The volume: an order 1 bound over all that are known.
-    let volume = |row: &Row| row.volume.map_or(0.0, |error| error / row.way.pixel());
-    let what = "Intervals: the error of the volume, in itself, over pixels in parts of the size";
-    claims.at_most(what, worst(&intervals, &volume), 1.0);
-    let lost = |form: Form| {
-        let same =
-            move |row: &&Row| matches!(row.way, Way::Image { form: own, axes: true, pixels: COMPARED } if own == form);
+    let claim = "EXACT: the worst error of a position or a depth, relative to the size";
+    claims.at_most(claim, worst(&exact, &worst_error), ROUNDING);
+    // The volume error is first-order in the pixel size; the bound is the largest over all known values.
+    let volume = |row: &Row| row.volume.map_or(0.0, |error| error / row.method.pixel());
+    let claim = "Intervals: the error of the volume, in itself, over pixels in parts of the size";
+    claims.at_most(claim, worst(&intervals, &volume), 1.0);
+    let missed_fraction = |form: Form| {
+        let same = move |row: &&Row| matches!(row.method, Method::Image { form: own, axes: true, pixels: COMPARED } if own == form);
         rows.iter().filter(same).map(|row| row.errors.missed()).sum::<f64>()
     };
     claims.claim(
         format!("Counted misses more than Intervals, 3 axes, 1/{COMPARED}"),
         format!(
             "{:.1} times as much",
-            lost(Form::Counted) / lost(Form::Intervals).max(1e-9)
+            missed_fraction(Form::Counted) / missed_fraction(Form::Intervals).max(1e-9)
         ),
-        lost(Form::Counted) > lost(Form::Intervals),
+        missed_fraction(Form::Counted) > missed_fraction(Form::Intervals),
     );
 }

@@ -1,4 +1,4 @@
-//! Two closed surfaces that overlap: tissue, which changes its shape, and a ring, which reaches into it.
+//! Two overlapping closed surfaces: deformable tissue, and a ring that reaches into it.
 
 use glam::{Mat3, Quat, Vec3};
 use sinew::detection::image_space::{Placed, Surface};
@@ -6,29 +6,29 @@ use sinew::detection::image_space::{Placed, Surface};
 use crate::random::Random;
 use crate::shapes::Shape;
 
-/// Of the tissue, m; what pixels and errors are told in parts of.
+/// The size of the tissue [m]; pixels and errors are relative to it.
 pub const SIZE: f32 = 0.1;
 
-/// How wide the ring is, in parts of that.
+/// Widths of the rings, relative to the size.
 const RINGS: [f32; 3] = [0.4, 0.8, 1.2];
 
-/// The same tissue and rings of several sizes, each turned and placed at random.
+/// The same tissue and rings of several sizes, each with a random pose.
 pub struct Scene {
-    /// At rest.
+    /// The tissue at rest.
     pub tissue: Shape,
     pub tissue_surface: Surface,
     pub pairs: Vec<Pair>,
 }
 
 pub struct Pair {
-    /// Where the tissue's nodes are.
+    /// Positions of the tissue's nodes.
     pub positions: Vec<Vec3>,
     pub ring: Shape,
     pub ring_surface: Surface,
 }
 
 impl Scene {
-    /// Of surfaces of about so many triangles each.
+    /// Creates surfaces of about `triangles` triangles each.
     pub fn new(triangles: usize) -> Self {
         let tissue = Shape::bumpy(SIZE, triangles);
         let mut random = Random(6);
@@ -51,7 +51,7 @@ impl Scene {
         }
     }
 
-    /// The mean of both surfaces.
+    /// The mean number of triangles of both surfaces.
     pub fn triangle_count(&self) -> usize {
         (self.tissue.triangles.len() + self.pairs[0].ring.triangles.len()) / 2
     }

@@ -1,4 +1,4 @@
-//! Closed surfaces of about as many triangles as are asked for.
+//! Closed surfaces with about a given number of triangles.
 
 use std::collections::HashMap;
 use std::f32::consts::TAU;
@@ -6,7 +6,7 @@ use std::f32::consts::TAU;
 use glam::{Mat3, Vec3};
 use sinew::mesh::ClosedSurface;
 
-/// A closed surface; its triangles face outwards.
+/// A closed surface; its triangles face outward.
 #[derive(Clone)]
 pub struct Shape {
     pub positions: Vec<Vec3>,
@@ -14,7 +14,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// A ball of this diameter with bumps of a few parts of it: the six sides of a cube, blown up.
+    /// A bumpy ball of this diameter: the six sides of a cube, projected to a sphere.
     pub fn bumpy(diameter: f32, triangles: usize) -> Self {
         let cells = ((triangles as f32 / 12.0).sqrt().round() as i32).max(1);
         let mut numbers = HashMap::new();
@@ -23,12 +23,12 @@ impl Shape {
         for axis in 0..3 {
             for (side, outward) in [(0, false), (cells, true)] {
                 let mut node = |u: i32, v: i32| {
-                    let mut place = [0; 3];
-                    (place[axis], place[(axis + 1) % 3], place[(axis + 2) % 3]) = (side, u, v);
-                    *numbers.entry(place).or_insert_with(|| {
-                        // Equal angles, so that triangles are of about one size.
+                    let mut index = [0; 3];
+                    (index[axis], index[(axis + 1) % 3], index[(axis + 2) % 3]) = (side, u, v);
+                    *numbers.entry(index).or_insert_with(|| {
+                        // Equal angles, so that triangles have similar sizes.
                         let angle = |i: i32| (2.0 * i as f32 / cells as f32 - 1.0) * std::f32::consts::FRAC_PI_4;
-                        let direction = Vec3::from_array(place.map(|i| angle(i).tan())).normalize();
+                        let direction = Vec3::from_array(index.map(|i| angle(i).tan())).normalize();
                         positions.push(direction * bumpy_radius(diameter, direction));
                         positions.len() as u32 - 1
                     })
@@ -51,12 +51,12 @@ impl Shape {
         }
     }
 
-    /// A ring whose tube is a quarter as thick as it is wide.
+    /// A torus whose tube is a quarter as thick as the torus is wide.
     pub fn ring(diameter: f32, triangles: usize) -> Self {
         let across = ((triangles as f32 / 6.0).sqrt().round() as u32).max(3);
         let around = 3 * across;
         let (radius, tube) = (0.375 * diameter, 0.125 * diameter);
-        let place = |i: u32, j: u32| {
+        let point = |i: u32, j: u32| {
             let (u, v) = (TAU * i as f32 / around as f32, TAU * j as f32 / across as f32);
             let out = radius + tube * v.cos();
             Vec3::new(out * u.cos(), tube * v.sin(), out * u.sin())
@@ -64,7 +64,7 @@ impl Shape {
         let node = |i: u32, j: u32| i % around * across + j % across;
         let squares = || (0..around).flat_map(|i| (0..across).map(move |j| (i, j)));
         Self {
-            positions: squares().map(|(i, j)| place(i, j)).collect(),
+            positions: squares().map(|(i, j)| point(i, j)).collect(),
             triangles: squares()
                 .flat_map(|(i, j)| {
                     let [a, b, c, d] = [node(i, j), node(i, j + 1), node(i + 1, j + 1), node(i + 1, j)];
@@ -81,12 +81,12 @@ impl Shape {
         self
     }
 
-    /// As tissue of this size would deform: bent and squeezed by a twelfth of it.
+    /// Deforms the shape like tissue of this size: bent and compressed by a twelfth of it.
     pub fn deformed(mut self, size: f32, phase: f32) -> Self {
         for position in &mut self.positions {
             let at = *position * (3.0 / size);
-            let way = Vec3::new((at.y + phase).sin(), (at.z + 2.0 * phase).sin(), (at.x - phase).cos());
-            *position += size / 24.0 * way;
+            let shift = Vec3::new((at.y + phase).sin(), (at.z + 2.0 * phase).sin(), (at.x - phase).cos());
+            *position += size / 24.0 * shift;
         }
         self
     }
@@ -96,7 +96,7 @@ impl Shape {
     }
 }
 
-/// How far the surface of a bumpy ball is from its middle.
+/// The distance of a bumpy ball's surface from its center.
 pub fn bumpy_radius(diameter: f32, direction: Vec3) -> f32 {
     let bumps = (5.0 * direction.x + 1.0).sin() * (4.0 * direction.y).cos() + 0.5 * (7.0 * direction.z).sin();
     0.5 * diameter * (1.0 + 0.04 * bumps)

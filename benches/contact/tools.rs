@@ -1,4 +1,4 @@
-//! A rigid tool that is looked up: what is built once, drawn once or sampled once, and then asked how far points are.
+//! Distance queries of a rigid tool that is built, rendered or sampled once.
 
 use glam::Vec3;
 use sinew::detection::distance_field::DistanceField;
@@ -14,29 +14,29 @@ use crate::scene::{SIZE, Scene};
 use crate::svg::{Series, plot};
 use crate::truth::Truth;
 
-/// How far a tool looks, m.
+/// The largest distance outside a tool that a query reports [m].
 const WITHIN: f32 = 0.05 * SIZE;
 
-/// Points asked for at a time, and those of them that are checked, per pair: fewer of large tools.
-const ASKED: usize = 20_000;
+/// Number of query points per pair, and of those that are checked. Large tools check fewer.
+const QUERIES: usize = 20_000;
 const CHECKED: usize = 150_000_000;
 
 /// Pixels or cells along the ring.
 const PIXELS: [u32; 3] = [64, 128, 256];
 const CELLS: [u32; 3] = [32, 64, 128];
 
-/// Of larger tools the finest field is left out: it takes long to sample.
+/// Larger tools skip the finest field, which takes long to sample.
 const LARGE: usize = 50_000;
 
-/// Which ring of the scene is the tool: that of 0.8 times the size.
+/// The index of the ring that is the tool: the one of 0.8 times the size.
 const TOOL: usize = 1;
 
-/// How far off a distance may be as close to the surface as contact asks, in pixels or cells.
-const CLOSE: f64 = 1e-3;
-const IMAGE_OFF: f64 = 0.5;
-const FIELD_OFF: f64 = 0.5;
+/// Tolerances near the surface: the range in which contact queries distances [m], and errors in pixels or cells.
+const NEAR: f64 = 1e-3;
+const IMAGE_TOLERANCE: f64 = 0.5;
+const FIELD_TOLERANCE: f64 = 0.5;
 
-/// A tool in one of the ways.
+/// A tool in one of its representations.
 enum Tool {
     Exact(Box<Exact>),
     Image(Box<LayeredImage>),
@@ -44,26 +44,26 @@ enum Tool {
 }
 
 impl Tool {
-    /// Metres, below 0 inside; `None`: outside and further than `WITHIN`.
+    /// Signed distance [m], negative inside; `None` if the point is outside and further than `WITHIN`.
     fn distance(&self, point: Vec3) -> Option<f32> {
         match self {
-            Self::Exact(solid) => solid.distance(point, WITHIN).map(|found| found.0),
-            Self::Image(image) => image.distance(point, WITHIN).map(|found| found.0),
+            Self::Exact(solid) => solid.distance(point, WITHIN).map(|nearest| nearest.0),
+            Self::Image(image) => image.distance(point, WITHIN).map(|nearest| nearest.0),
             Self::Field(field) => Some(field.distance(point)).filter(|distance| *distance <= WITHIN),
         }
     }
 }
 
-struct Made {
+struct BuiltTool {
     name: String,
     kind: &'static str,
     tool: Tool,
-    /// To make it, s.
+    /// Time to build it [s].
     time: f64,
-    /// Of a pixel or cell, in parts of the size.
-    part: f64,
-    /// How far off it may be, in pixels or cells.
-    off: f64,
+    /// Size of a pixel or cell, relative to the size.
+    cell: f64,
+    /// Allowed distance error, in pixels or cells.
+    tolerance: f64,
 }
 
 struct Row {
@@ -71,9 +71,9 @@ struct Row {
     name: String,
     kind: &'static str,
     making: f64,
-    /// Of one query, s.
+    /// Time of one query [s].
     query: f64,
-    /// Close to the surface, and further from it.
+    /// Errors close to the surface, and further from it.
     errors: Errors,
     far: Errors,
     allowed: f64,
@@ -81,13 +81,13 @@ struct Row {
 
 pub fn run(report: &mut Report, claims: &mut Claims, sizes: &[usize], effort: Effort) {
     report.write(&format!(
-        "\n## A rigid tool\n\nThe ring {} mm wide, made once and then asked for the signed distance of the tissue's nodes and of points \
-         around its surface, up to {} mm away outside and at any depth: pixels and cells in parts of its width, errors in parts of {} mm, within {} mm of \
-         the surface and further from it. This is what contact with a tool that is a mesh asks.\n",
+        "\n## A rigid tool\n\nThe ring {} mm wide, built once and then queried for the signed distance of the tissue's nodes and of points \
+         around its surface, up to {} mm away outside and at any depth: pixels and cells relative to its width, errors relative to {} mm, within {} mm of \
+         the surface and further from it. These are the queries of contact with a mesh tool.\n",
         digits(800.0 * f64::from(SIZE)),
         digits(1e3 * f64::from(WITHIN)),
         digits(1e3 * f64::from(SIZE)),
-        digits(1e3 * CLOSE),
+        digits(1e3 * NEAR),
     ));
     let mut rows = Vec::new();
     for &triangles in sizes {
@@ -97,7 +97,7 @@ pub fn run(report: &mut Report, claims: &mut Claims, sizes: &[usize], effort: Ef
     }
     write(report, &rows);
     for row in &rows {
-        let off = row
+        let worst = row
             .errors
             .worst_depth
             .max(row.errors.deepest_missed)
@@ -108,7 +108,7 @@ pub fn run(report: &mut Report, claims: &mut Claims, sizes: &[usize], effort: Ef
                 count(row.triangles),
                 row.name
             ),
-            off,
+            worst,
             row.allowed,
         );
     }
@@ -119,79 +119,79 @@ fn measure(report: &mut Report, scene: &Scene, effort: Effort, rows: &mut Vec<Ro
     let points = points(scene);
     let truth = Truth::new(&pair.ring.positions, &pair.ring.triangles);
     let checked = (CHECKED / pair.ring.triangles.len()).clamp(300, 3000).min(points.len());
-    // Evenly among all of them.
+    // Evenly spaced among all points.
     let checked: Vec<usize> = (0..checked).map(|index| index * points.len() / checked).collect();
-    let asked: Vec<Vec3> = checked.iter().map(|&index| points[index]).collect();
-    let distances: Vec<f64> = exact(&asked).map(|point| truth.signed_distance(point)).collect();
-    let made = make(scene);
-    let contenders = made.iter().map(|made| {
-        Contender::new(made.name.clone(), 1, |units| {
+    let queries: Vec<Vec3> = checked.iter().map(|&index| points[index]).collect();
+    let distances: Vec<f64> = exact(&queries).map(|point| truth.signed_distance(point)).collect();
+    let built = make(scene);
+    let contenders = built.iter().map(|built| {
+        Contender::new(built.name.clone(), 1, |units| {
             for point in points.iter().cycle().take(units * points.len()) {
-                std::hint::black_box(made.tool.distance(*point));
+                std::hint::black_box(built.tool.distance(*point));
             }
         })
     });
     let results = interleave(contenders.collect(), effort);
     report.disturbed(results.waited);
-    for made in &made {
+    for built in &built {
         let (mut errors, mut far) = (Errors::default(), Errors::default());
-        for (point, &distance) in asked.iter().zip(&distances) {
-            let told = made.tool.distance(*point);
-            errors.see(distance, told.is_some_and(|told| told < 0.0));
-            if let Some(told) = told {
-                let errors = if distance.abs() < CLOSE { &mut errors } else { &mut far };
-                errors.see_depth(f64::from(told) - distance);
+        for (point, &distance) in queries.iter().zip(&distances) {
+            let reported = built.tool.distance(*point);
+            errors.record(distance, reported.is_some_and(|reported| reported < 0.0));
+            if let Some(reported) = reported {
+                let errors = if distance.abs() < NEAR { &mut errors } else { &mut far };
+                errors.record_depth(f64::from(reported) - distance);
             }
         }
-        let time = results.get(&made.name).map_or(f64::NAN, |samples| samples.minimum());
+        let time = results.get(&built.name).map_or(f64::NAN, |samples| samples.minimum());
         rows.push(Row {
             triangles: pair.ring.triangles.len(),
-            name: made.name.clone(),
-            kind: made.kind,
-            making: made.time,
+            name: built.name.clone(),
+            kind: built.kind,
+            making: built.time,
             query: time / points.len() as f64,
             errors,
             far,
-            // And what `f32` takes.
-            allowed: made.off * made.part + 2e-6,
+            // With a margin for `f32`.
+            allowed: built.tolerance * built.cell + 2e-6,
         });
     }
 }
 
-/// The tissue's nodes near the ring and as many points off the ring's own surface, both ways.
+/// The tissue's nodes near the ring and as many points near the ring's own surface, inside and outside.
 fn points(scene: &Scene) -> Vec<Vec3> {
     let pair = &scene.pairs[TOOL];
     let thinned = |points: Vec<Vec3>| -> Vec<Vec3> {
-        let step = points.len().div_ceil(ASKED / 2);
+        let step = points.len().div_ceil(QUERIES / 2);
         points.into_iter().step_by(step).collect()
     };
     let mut points = thinned(near(&pair.positions, &pair.ring.positions, WITHIN));
     let mut random = crate::random::Random(8);
-    let mut off = || Vec3::new(random.signed(), random.signed(), random.signed()) * WITHIN;
+    let mut random_offset = || Vec3::new(random.signed(), random.signed(), random.signed()) * WITHIN;
     points.extend(
         thinned(pair.ring.positions.clone())
             .into_iter()
-            .map(|point| point + off()),
+            .map(|point| point + random_offset()),
     );
     points
 }
 
-fn make(scene: &Scene) -> Vec<Made> {
+fn make(scene: &Scene) -> Vec<BuiltTool> {
     let ring = &scene.pairs[TOOL].ring;
     let width = 0.8 * SIZE;
     let surface = ring.checked();
     let mut all = Vec::new();
-    let mut add = |name: String, kind, part: f64, off, make: &dyn Fn() -> Tool| {
+    let mut add = |name: String, kind, cell: f64, tolerance, make: &dyn Fn() -> Tool| {
         let mut tool = None;
         let time = clock::time(|| tool = Some(make())).processor;
         let tool = tool.expect("a tool");
-        all.push(Made {
+        all.push(BuiltTool {
             name,
             kind,
             tool,
             time,
-            part: 0.8 * part,
-            off,
+            cell: 0.8 * cell,
+            tolerance,
         });
     };
     add("EXACT".into(), "EXACT", 0.0, 0.0, &|| {
@@ -199,7 +199,7 @@ fn make(scene: &Scene) -> Vec<Made> {
     });
     for pixels in PIXELS {
         let name = format!("IMAGE_SPACE, 1/{pixels}");
-        add(name, "IMAGE_SPACE", 1.0 / f64::from(pixels), IMAGE_OFF, &|| {
+        add(name, "IMAGE_SPACE", 1.0 / f64::from(pixels), IMAGE_TOLERANCE, &|| {
             let pixel = width / pixels as f32;
             Tool::Image(Box::new(
                 LayeredImage::new(&ring.positions, &ring.triangles, pixel).expect("an image"),
@@ -209,7 +209,7 @@ fn make(scene: &Scene) -> Vec<Made> {
     let few = if ring.triangles.len() > LARGE { 2 } else { CELLS.len() };
     for &cells in &CELLS[..few] {
         let name = format!("DISTANCE_FIELD, 1/{cells}");
-        add(name, "DISTANCE_FIELD", 1.0 / f64::from(cells), FIELD_OFF, &|| {
+        add(name, "DISTANCE_FIELD", 1.0 / f64::from(cells), FIELD_TOLERANCE, &|| {
             Tool::Field(DistanceField::new(&surface, width / cells as f32).expect("a field"))
         });
     }
@@ -268,10 +268,10 @@ fn write(report: &mut Report, rows: &[Row]) {
     let mut lines = Vec::new();
     for name in ["EXACT", "IMAGE_SPACE, 1/256", "DISTANCE_FIELD, 1/64"] {
         let of_name = || rows.iter().filter(|row| row.name == name);
-        let series = |what: &str, value: &dyn Fn(&Row) -> f64| Series {
-            name: format!("{name}, {what}"),
+        let series = |suffix: &str, value: &dyn Fn(&Row) -> f64| Series {
+            name: format!("{name}, {suffix}"),
             points: of_name().map(|row| (row.triangles as f64, value(row))).collect(),
-            dashed: what == "made",
+            dashed: suffix == "made",
         };
         lines.push(series("1000 queries", &|row| 1e6 * row.query));
         lines.push(series("made", &|row| 1e3 * row.making));

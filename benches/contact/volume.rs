@@ -1,21 +1,22 @@
-//! The volume that two closed surfaces have in common, from the corners of what they share alone.
+//! The common volume of two closed surfaces, from the corners of their intersection alone.
 
 use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 use sinew::detection::image_space::Placed;
 
-/// A surface with what its edges join.
+/// A surface with its edge topology.
 struct Faces {
     corners: Vec<[DVec3; 3]>,
-    /// Outward, of unit length.
+    /// Outward unit normals.
     normals: Vec<DVec3>,
-    /// The ends of each edge, and the two triangles at it.
+    /// The ends of each edge, and its two adjacent triangles.
     edges: Vec<([DVec3; 2], [usize; 2])>,
 }
 
-/// In m³: over each corner of the solid, each edge there and each face at that edge, a sixth of the product of what the corner's place
-/// has along the edge, into the face and along its normal (Franklin 1987). `inside` tells which nodes of each lie in the other.
+/// Computes the common volume [m³] (Franklin 1987). It is the sum over each corner of the intersection, each edge there
+/// and each face at that edge of a sixth of a product. The factors are the corner's coordinates along the edge, into
+/// the face and along its normal. `inside` returns true for nodes of a surface that lie in the other.
 pub fn common(bodies: &[Placed; 2], inside: [&dyn Fn(u32) -> bool; 2]) -> f64 {
     let faces = [0, 1].map(|side| Faces::new(bodies[side].positions, bodies[side].surface.triangles()));
     let mut six_volumes = 0.0;
@@ -28,7 +29,7 @@ pub fn common(bodies: &[Placed; 2], inside: [&dyn Fn(u32) -> bool; 2]) -> f64 {
         }
         for (ends, joined) in &own.edges {
             for (pierced, corners) in other.corners.iter().enumerate() {
-                if let Some(point) = meeting(*ends, *corners) {
+                if let Some(point) = intersection(*ends, *corners) {
                     six_volumes += own.at_crossing(point, *ends, *joined, other.normals[pierced]);
                 }
             }
@@ -39,15 +40,15 @@ pub fn common(bodies: &[Placed; 2], inside: [&dyn Fn(u32) -> bool; 2]) -> f64 {
 
 impl Faces {
     fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        let place = |node: u32| positions[node as usize].as_dvec3();
-        let corners: Vec<[DVec3; 3]> = triangles.iter().map(|nodes| nodes.map(place)).collect();
+        let position = |node: u32| positions[node as usize].as_dvec3();
+        let corners: Vec<[DVec3; 3]> = triangles.iter().map(|nodes| nodes.map(position)).collect();
         let mut first = HashMap::new();
         let mut edges = Vec::new();
         for (triangle, nodes) in triangles.iter().enumerate() {
             for side in 0..3 {
                 let (from, to) = (nodes[side], nodes[(side + 1) % 3]);
                 match first.remove(&(to, from)) {
-                    Some(other) => edges.push(([place(from), place(to)], [triangle, other])),
+                    Some(other) => edges.push(([position(from), position(to)], [triangle, other])),
                     None => {
                         first.insert((from, to), triangle);
                     }
@@ -62,7 +63,7 @@ impl Faces {
         }
     }
 
-    /// A node of one surface inside the other, in one of its triangles.
+    /// The terms of a node inside the other surface, in one of its triangles.
     fn at_node(&self, triangle: usize, corner: usize) -> f64 {
         let corners = self.corners[triangle];
         let at = corners[corner];
@@ -71,16 +72,17 @@ impl Faces {
         term(at, one, two, normal) + term(at, two, one, normal)
     }
 
-    /// Where an edge of one surface passes through a triangle of the other, with this normal: three faces and three edges meet.
+    /// The terms of the point where an edge of one surface crosses a triangle of the other with this normal; three
+    /// faces and three edges meet there.
     fn at_crossing(&self, at: DVec3, [from, to]: [DVec3; 2], joined: [usize; 2], normal: DVec3) -> f64 {
-        let way = to - from;
-        let inward = if way.dot(normal) < 0.0 { way } else { -way };
+        let edge = to - from;
+        let inward = if edge.dot(normal) < 0.0 { edge } else { -edge };
         let faces = joined.map(|face| {
             let own = self.normals[face];
             let middle = self.corners[face].iter().sum::<DVec3>() / 3.0;
             let into = middle - from;
             let along_both = own.cross(normal);
-            let across = into - way * (into.dot(way) / way.length_squared());
+            let across = into - edge * (into.dot(edge) / edge.length_squared());
             let line = if along_both.dot(across) > 0.0 {
                 along_both
             } else {
@@ -92,7 +94,7 @@ impl Faces {
     }
 }
 
-/// Of a corner: along an edge, into a face at it, and out of the solid there.
+/// The term of a corner: along an edge, into a face at it, and out of the solid there.
 fn term(at: DVec3, edge: DVec3, into: DVec3, normal: DVec3) -> f64 {
     let edge = edge.normalize();
     let flat = into - normal * into.dot(normal);
@@ -100,8 +102,8 @@ fn term(at: DVec3, edge: DVec3, into: DVec3, normal: DVec3) -> f64 {
     at.dot(edge) * at.dot(into) * at.dot(normal)
 }
 
-/// Where a segment passes through a triangle.
-fn meeting([from, to]: [DVec3; 2], [a, b, c]: [DVec3; 3]) -> Option<DVec3> {
+/// The intersection point of a segment and a triangle.
+fn intersection([from, to]: [DVec3; 2], [a, b, c]: [DVec3; 3]) -> Option<DVec3> {
     let (low, high) = (a.min(b).min(c), a.max(b).max(c));
     if !(from.min(to).cmple(high).all() && from.max(to).cmpge(low).all()) {
         return None;

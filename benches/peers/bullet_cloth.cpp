@@ -1,4 +1,4 @@
-// The cloth in Bullet, answering as src/protocol.rs says. Compiled by the measuring program where Bullet is installed.
+// The cloth in Bullet, with the protocol of src/protocol.rs. The measuring program compiles it if Bullet is installed.
 
 #include <chrono>
 #include <cmath>
@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include <BulletSoftBody/btSoftBody.h>
-#include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
+# Each iteration removes this fraction of a link's stretch. All iterations together then move a single spring like an
+# implicit Euler step of the same stiffness.
 #include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
 #include <btBulletDynamicsCommon.h>
 
@@ -27,12 +27,12 @@ constexpr int position_iterations = 4;
 
 // Each iteration takes a share of a link's stretch away. The share with which all of them together move a lone spring
 // as an implicit Euler step of the same stiffness would.
-double share_per_iteration(const Cloth &cloth, double mass) {
+double fraction_per_iteration(const Cloth &cloth, double mass) {
     const double ratio = cloth.stiffness * cloth.step * cloth.step / mass;
     return 1.0 - std::pow(1.0 - ratio / (1.0 + ratio), 1.0 / position_iterations);
 }
 
-// Bytes in a line of what Linux tells a process about itself.
+// The value of a line of /proc/self/status, in bytes.
 long long memory(const char *name) {
     long long kibibytes = 0;
     char line[256];
@@ -65,13 +65,13 @@ btSoftBody *build(const Cloth &cloth, btSoftBodyWorldInfo &info) {
     for (int node = 0; node < count; ++node) {
         const int row = node / cloth.side, column = node % cloth.side;
         positions[node].setValue(btScalar(column * cloth.spacing), 0, btScalar(row * cloth.spacing));
-        if (row == 0) masses[node] = 0;  // Bullet's way to pin.
+        if (row == 0) masses[node] = 0;  // A mass of 0 pins a node in Bullet.
     }
     auto *body = new btSoftBody(&info, count, positions.data(), masses.data());
     btSoftBody::Material *free_links = body->m_materials[0];
-    free_links->m_kLST = btScalar(share_per_iteration(cloth, cloth.node_mass / 2));
+    free_links->m_kLST = btScalar(fraction_per_iteration(cloth, cloth.node_mass / 2));
     btSoftBody::Material *pinned_links = body->appendMaterial();
-    pinned_links->m_kLST = btScalar(share_per_iteration(cloth, cloth.node_mass));
+    pinned_links->m_kLST = btScalar(fraction_per_iteration(cloth, cloth.node_mass));
     body->m_links.reserve(4 * count);
     each_spring(cloth.side, [&](int a, int b, bool) {
         body->appendLink(a, b, a < cloth.side || b < cloth.side ? pinned_links : free_links);

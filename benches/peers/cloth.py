@@ -1,17 +1,17 @@
-"""A contender's side of src/protocol.rs, for those written in Python."""
+"""The contender's side of src/protocol.rs in Python."""
 
 import json
 import os
 import sys
 import time
 
-# Engines print what they like: only answers go where answers are read.
+# Engines print to standard output; answers need a separate descriptor.
 _answers = os.fdopen(os.dup(1), "w")
 os.dup2(2, 1)
 
 
 class Cloth:
-    """The cloth of src/cloth.rs, from the command line, and the number of threads."""
+    """The cloth of src/cloth.rs from the command line, and the number of threads."""
 
     def __init__(self):
         threads, side, *numbers = sys.argv[1:]
@@ -19,7 +19,7 @@ class Cloth:
         self.spacing, self.node_mass, self.stiffness, self.gravity, self.step = map(float, numbers)
 
     def positions(self):
-        """side x side x 3, row by row; the first row is pinned."""
+        """An array of side x side x 3, row by row; the first row is pinned."""
         import numpy as np
 
         along = np.arange(self.side, dtype=np.float32) * np.float32(self.spacing)
@@ -43,13 +43,13 @@ class Cloth:
 
 
 def refuse(reason):
-    """Says why this engine cannot be measured, and ends."""
-    _say({"refused": reason})
+    """Reports the reason that this engine cannot be measured, and exits."""
+    _send({"refused": reason})
     sys.exit()
 
 
 def memory(name):
-    """Bytes in a line of what Linux tells a process about itself; None elsewhere."""
+    """The value of a line of /proc/self/status, in bytes; None on other systems."""
     try:
         with open("/proc/self/status") as status:
             return next(int(line.split()[1]) * 1024 for line in status if line.startswith(name))
@@ -58,8 +58,8 @@ def memory(name):
 
 
 def serve(cloth, version, before, step, positions):
-    """Answers until the input ends. `before`: resident bytes before the cloth was built."""
-    _say({"version": version})
+    """Answers until the input ends. `before` is the resident size before the cloth was built [bytes]."""
+    _send({"version": version})
     for line in sys.stdin:
         if line.startswith("steps "):
             milliseconds = []
@@ -67,15 +67,15 @@ def serve(cloth, version, before, step, positions):
                 start = time.perf_counter()
                 step()
                 milliseconds.append((time.perf_counter() - start) * 1e3)
-            _say({"milliseconds": milliseconds})
+            _send({"milliseconds": milliseconds})
         else:
             resident, peak = memory("VmRSS:"), memory("VmHWM:")
             mean, largest, height = cloth.shape(positions())
             answer = {"body_bytes": before and resident - before, "peak_bytes": peak}
             if mean - mean == 0.0:
                 answer |= {"mean_stretch": mean, "max_stretch": largest, "mean_height": height}
-            _say(answer)
+            _send(answer)
 
 
-def _say(answer):
+def _send(answer):
     print(json.dumps(answer), file=_answers, flush=True)

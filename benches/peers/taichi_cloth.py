@@ -1,4 +1,4 @@
-"""The cloth in Taichi: symplectic Euler, each node looking at its 8 neighbours in the grid."""
+"""The cloth in Taichi: symplectic Euler; each node sums the springs to its 8 neighbors in the grid."""
 
 import cloth as common
 
@@ -17,7 +17,7 @@ x = ti.Vector.field(3, dtype=ti.f32, shape=shape)
 v = ti.Vector.field(3, dtype=ti.f32, shape=shape)
 x.from_numpy(cloth.positions())
 
-neighbours = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+neighbors = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
 pull = dt * cloth.stiffness / cloth.node_mass
 
 
@@ -26,7 +26,7 @@ def step():
     for node in ti.grouped(x):
         if node[0] > 0:
             velocity = v[node] - ti.Vector([0.0, dt * cloth.gravity, 0.0])
-            for i, j in ti.static(neighbours):
+            for i, j in ti.static(neighbors):
                 other = node + ti.Vector([i, j])
                 if 0 <= other[0] < side and 0 <= other[1] < side:
                     rest = ti.static(cloth.spacing * (i * i + j * j) ** 0.5)

@@ -1,4 +1,4 @@
-"""The cloth in NVIDIA Warp on the processor: symplectic Euler, each node looking at its 8 neighbours in the grid."""
+"""The cloth in NVIDIA Warp on the processor: symplectic Euler; each node sums the springs to its 8 neighbors."""
 
 import cloth as common
 

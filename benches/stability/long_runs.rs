@@ -1,10 +1,12 @@
-//! The table of long runs, all of it: hours.
+//! The complete table of long runs, which takes hours.
 //!
-//! `cargo bench --bench stability -- long [parts of a row's name] [--not PART] [--seconds S] [--minutes M] [--quick] [--list]` writes
-//! `target/report/long_runs.md` as it goes. Only rows that have all these parts in their names are run, and none of those after `--not`,
-//! each for S simulated seconds, 600 where it is not given, and no longer than M minutes of processor time, 10. It fails where a row does.
+//! `cargo bench --bench stability -- long [parts of a row's name] [--not PART] [--seconds S] [--minutes M] [--quick]
+//! [--list]` writes `target/report/long_runs.md` while it runs. It runs only rows whose names contain all these parts,
+//! and none of those after `--not`. Each row takes S simulated seconds (default 600), and at most M minutes of
+//! processor time (default 10). It fails if a row fails.
 //!
-//! `--quick` takes the rows that `cargo test` takes, for as long as it does. `--list` shows the rows. `cargo bench --profile dev ...` takes the library as tests do.
+//! `--quick` runs the rows that `cargo test` runs, for the same time. `--list` prints the rows. `cargo bench --profile
+//! dev ...` builds the library as the tests do.
 
 use std::fs;
 use std::process::ExitCode;
@@ -13,21 +15,21 @@ use std::time::Instant;
 use crate::cases::long_runs::{Outcome, Row, full, quick};
 use crate::support::report_folder;
 
-/// What is asked for.
-struct Asked {
+/// The command-line options.
+struct Options {
     parts: Vec<String>,
     others: Vec<String>,
-    /// Simulated, s.
+    /// Simulated time [s].
     seconds: f64,
-    /// Of processor time at the most.
+    /// Limit of processor time [min].
     minutes: f64,
     quick: bool,
     list: bool,
 }
 
-impl Asked {
+impl Options {
     fn of(arguments: &[String]) -> Result<Self, String> {
-        let mut asked = Self {
+        let mut options = Self {
             parts: Vec::new(),
             others: Vec::new(),
             seconds: 600.0,
@@ -44,18 +46,18 @@ impl Asked {
             };
             let mut number = || word()?.parse().map_err(|_| format!("a number must follow {argument}"));
             match argument.as_str() {
-                "--quick" => asked.quick = true,
-                "--list" => asked.list = true,
-                "--not" => asked.others.push(word()?.to_lowercase()),
-                "--seconds" => asked.seconds = number()?,
-                "--minutes" => asked.minutes = number()?,
-                part => asked.parts.push(part.to_lowercase()),
+                "--quick" => options.quick = true,
+                "--list" => options.list = true,
+                "--not" => options.others.push(word()?.to_lowercase()),
+                "--seconds" => options.seconds = number()?,
+                "--minutes" => options.minutes = number()?,
+                part => options.parts.push(part.to_lowercase()),
             }
         }
-        Ok(asked)
+        Ok(options)
     }
 
-    /// The rows, and for how many simulated seconds.
+    /// The rows and their simulated times [s].
     fn rows(&self) -> Vec<(Row, f64)> {
         let mut rows = match self.quick {
             true => quick(),
@@ -70,13 +72,13 @@ impl Asked {
 }
 
 pub fn main(arguments: &[String]) -> ExitCode {
-    let failed = Asked::of(arguments).and_then(|asked| {
-        let rows = asked.rows();
-        if asked.list {
+    let failed = Options::of(arguments).and_then(|options| {
+        let rows = options.rows();
+        if options.list {
             rows.iter().for_each(|(row, _)| eprintln!("{row}"));
             return Ok(0);
         }
-        run(&asked, &rows)
+        run(&options, &rows)
     });
     match failed {
         Ok(0) => ExitCode::SUCCESS,
@@ -88,22 +90,22 @@ pub fn main(arguments: &[String]) -> ExitCode {
     }
 }
 
-/// Runs the rows; how many failed.
-fn run(asked: &Asked, rows: &[(Row, f64)]) -> Result<usize, String> {
+/// Runs the rows and returns the number of failures.
+fn run(options: &Options, rows: &[(Row, f64)]) -> Result<usize, String> {
     let path = report_folder().join("long_runs.md");
     let mut report = format!("# Long runs\n\n| row | {}\n", Outcome::HEADS);
     report += &format!("|---|{}\n", "---|".repeat(Outcome::HEADS.matches('|').count()));
     let mut failed = 0;
     for (index, (row, seconds)) in rows.iter().enumerate() {
         let number = format!("{}/{} {row}", index + 1, rows.len());
-        let (start, mut told) = (Instant::now(), Instant::now());
-        let outcome = row.run(*seconds, 60.0 * asked.minutes, &mut |figures| {
-            if told.elapsed().as_secs() >= 10 {
-                told = Instant::now();
+        let (start, mut last_report) = (Instant::now(), Instant::now());
+        let outcome = row.run(*seconds, 60.0 * options.minutes, &mut |figures| {
+            if last_report.elapsed().as_secs() >= 10 {
+                last_report = Instant::now();
                 let rate = figures.time / start.elapsed().as_secs_f64();
                 eprintln!(
                     "{number}: {:.0} of {} s, {rate:.1} times real time",
-                    figures.time, asked.seconds
+                    figures.time, options.seconds
                 );
             }
         });

@@ -1,10 +1,10 @@
-//! Worlds with one body, to be stepped.
+//! Worlds with one body for step measurements.
 
 use sinew::{BodyDefinition, BodyId, Error, Kernel, Storage, StorageReport, Values, World, WorldDefinition};
 
 use crate::scenes::{GRAVITY, MASS, STIFFNESS, SUBSTEP, Scene};
 
-/// How a scene is stepped.
+/// The settings of a step measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup {
     pub storage: Storage,
@@ -34,12 +34,12 @@ pub struct Stepped {
 }
 
 impl Stepped {
-    /// The scene's body as `setup` wants it; or why this version does not offer it.
+    /// Creates the scene's body with `setup`, or returns the reason that this version does not support it.
     pub fn new(scene: &Scene, setup: Setup) -> Result<Self, String> {
         Self::with(scene, setup, |definition| definition)
     }
 
-    /// The same, with the definition changed by `change`.
+    /// Creates the body with its definition modified by `change`.
     pub fn with<'a>(
         scene: &'a Scene,
         setup: Setup,
@@ -74,7 +74,7 @@ impl Stepped {
         })
     }
 
-    /// Takes so many steps of as many substeps as were set up.
+    /// Takes `steps` steps with the number of substeps of the setup.
     pub fn step(&mut self, steps: usize) {
         for _ in 0..steps {
             let report = self.world.step(SUBSTEP * self.substeps as f32).expect("a stable step");
@@ -95,7 +95,7 @@ impl Stepped {
     }
 }
 
-/// What is not offered is an answer; whatever else fails is a mistake of this bench or of the library.
+/// An unsupported feature is a valid result; any other failure is a bug of this bench or of the library.
 fn offered<T>(result: sinew::Result<T>) -> Result<T, String> {
     match result {
         Ok(value) => Ok(value),

@@ -1,13 +1,13 @@
-//! Clocks: the wall's, and the processor time of the calling thread, which does not run while other programs do.
+//! Clocks: wall time, and the processor time of the calling thread, which excludes other programs.
 #![allow(unsafe_code)]
 
 use std::time::Instant;
 
-/// Times of a piece of work, s.
+/// Times of a piece of work [s].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Elapsed {
     pub wall: f64,
-    /// The calling thread's; the wall's where there is no such clock.
+    /// Processor time of the calling thread; wall time if there is no such clock.
     pub processor: f64,
 }
 
@@ -27,7 +27,7 @@ pub fn time(work: impl FnOnce()) -> Elapsed {
 #[cfg(unix)]
 fn thread_seconds() -> Option<f64> {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `time` is a valid place for the answer.
+    // SAFETY: `time` is a valid destination.
     let answer = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut time) };
     (answer == 0).then_some(time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64)
 }

@@ -1,4 +1,4 @@
-//! `benches/fast_link.c`: compiled here by the system's C compiler for this very processor, and opened.
+//! Compiles `benches/fast_link.c` with the system's C compiler for this processor, and loads it.
 #![allow(unsafe_code)]
 
 #[cfg(unix)]
@@ -6,20 +6,20 @@ pub use offered::{FastLink, Library};
 #[cfg(not(unix))]
 pub use refused::{FastLink, Library};
 
-/// How the C program works.
+/// A variant of the C program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Way {
-    /// Forces and integration in one pass over the nodes, or in two.
+pub struct Variant {
+    /// One pass over the nodes for forces and integration, or two.
     pub passes: u32,
-    /// The nodes from here whose neighbours are prefetched; 0: no prefetch.
+    /// Prefetch distance in nodes; 0: no prefetch.
     pub ahead: u32,
 }
 
-impl Way {
-    /// As the paper has it, straight on.
+impl Variant {
+    /// The plain variant of the paper.
     pub const PLAIN: Self = Self { passes: 2, ahead: 0 };
 
-    /// The ways with prefetch, of which the fastest counts.
+    /// The variants with prefetch, of which the fastest counts.
     pub fn prefetching() -> impl Iterator<Item = Self> {
         [1, 2]
             .into_iter()
@@ -36,7 +36,7 @@ mod offered {
 
     use glam::Vec3;
 
-    use super::Way;
+    use super::Variant;
     use crate::scenes::{GRAVITY, MASS, STIFFNESS, SUBSTEP, Scene};
 
     type Create =
@@ -45,7 +45,7 @@ mod offered {
     type Positions = unsafe extern "C" fn(*const c_void) -> *const f32;
     type Destroy = unsafe extern "C" fn(*mut c_void);
 
-    /// The C program, open until this program ends.
+    /// The C program, loaded until this program ends.
     pub struct Library {
         create: Create,
         step: Step,
@@ -54,13 +54,13 @@ mod offered {
     }
 
     impl Library {
-        /// Or why there is none.
+        /// Compiles and loads the C program, or returns the reason of a failure.
         pub fn compile() -> Result<Self, String> {
             let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/fast_link.c");
             let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
             std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
             let library: PathBuf = folder.join(format!("fast_link_{}.so", std::process::id()));
-            // Strict C11 would have gcc leave out fused multiply-add.
+            // With strict C11, gcc would not use fused multiply-add.
             let output = Command::new("cc")
                 .args([
                     "-std=gnu11",
@@ -80,20 +80,20 @@ mod offered {
                 return Err(format!("cc: {}", String::from_utf8_lossy(&output.stderr)));
             }
             let opened = Self::open(&library);
-            // Once open, it needs no file.
+            // The file is not needed after loading.
             let _ = std::fs::remove_file(&library);
             opened
         }
 
         fn open(path: &Path) -> Result<Self, String> {
             let name = CString::new(path.as_os_str().as_bytes()).map_err(|error| error.to_string())?;
-            // SAFETY: a string that ends; the library was compiled from our own source and runs nothing on opening.
+            // SAFETY: a terminated string; the library was compiled from our own source and has no load-time code.
             let handle = unsafe { libc::dlopen(name.as_ptr(), libc::RTLD_NOW | libc::RTLD_LOCAL) };
             if handle.is_null() {
                 return Err(format!("{} cannot be opened", path.display()));
             }
             let symbol = |name: &std::ffi::CStr| {
-                // SAFETY: an open library and a string that ends.
+                // SAFETY: a loaded library and a terminated string.
                 let symbol = unsafe { libc::dlsym(handle, name.as_ptr()) };
                 if symbol.is_null() {
                     Err(format!("{name:?} is missing"))
@@ -133,8 +133,8 @@ mod offered {
                 inverse_masses[node as usize] = 0.0;
             }
             let rest_lengths: Vec<f32> = scene.springs.iter().map(|&pair| scene.rest_length(pair)).collect();
-            // SAFETY: arrays of the lengths given: 3 floats a position, 2 indices below the node count a spring; they are
-            // used during the call alone.
+            // SAFETY: arrays of the stated lengths, with 3 floats per position and 2 indices below the node count per
+            // spring. They are used only during the call.
             let body = unsafe {
                 (library.create)(
                     node_count as u32,
@@ -155,22 +155,22 @@ mod offered {
             }
         }
 
-        pub fn step(&mut self, way: Way, steps: usize) {
+        pub fn step(&mut self, variant: Variant, steps: usize) {
             for _ in 0..steps {
-                // SAFETY: a body that was made by this library and not destroyed.
-                unsafe { (self.library.step)(self.body, SUBSTEP, GRAVITY, way.ahead, way.passes) };
+                // SAFETY: a body that was created by this library and not destroyed.
+                unsafe { (self.library.step)(self.body, SUBSTEP, GRAVITY, variant.ahead, variant.passes) };
             }
         }
 
         pub fn positions(&self) -> &[Vec3] {
-            // SAFETY: the body keeps that many positions of three floats, and no step runs while this is borrowed.
+            // SAFETY: the body has this many positions of three floats, and no step runs while the slice is borrowed.
             unsafe { std::slice::from_raw_parts((self.library.positions)(self.body).cast(), self.node_count) }
         }
     }
 
     impl Drop for FastLink<'_> {
         fn drop(&mut self) {
-            // SAFETY: made by this library, destroyed once.
+            // SAFETY: created by this library, destroyed once.
             unsafe { (self.library.destroy)(self.body) };
         }
     }
@@ -182,10 +182,10 @@ mod refused {
 
     use glam::Vec3;
 
-    use super::Way;
+    use super::Variant;
     use crate::scenes::Scene;
 
-    /// There is none here.
+    /// Not available on this platform.
     pub enum Library {}
 
     impl Library {
@@ -194,7 +194,7 @@ mod refused {
         }
     }
 
-    /// There is none here.
+    /// Not available on this platform.
     pub struct FastLink<'a> {
         library: Library,
         borrowed: PhantomData<&'a ()>,
@@ -205,7 +205,7 @@ mod refused {
             match *library {}
         }
 
-        pub fn step(&mut self, _: Way, _: usize) {
+        pub fn step(&mut self, _: Variant, _: usize) {
             match self.library {}
         }
 

@@ -1,4 +1,4 @@
-//! Experiment C: a body pays for what its definition asks for, and for nothing else.
+//! Experiment C: the cost of optional features of a body's definition.
 
 use sinew::{BodyDefinition, Values};
 
@@ -13,15 +13,15 @@ const SUBSTEPS: u32 = 4;
 
 const PLAIN: &str = "nothing more";
 
-/// A change of the plain definition.
+/// A modification of the plain definition.
 type Change<'a> = Box<dyn Fn(BodyDefinition<'a>) -> BodyDefinition<'a> + 'a>;
 
 pub fn run(report: &mut Report, effort: Effort) {
     let nodes = if effort.quick { 100_000 } else { 1_000_000 };
     report.write(&format!(
         "\n## C. Model only what a scene needs\n\nThe sheet of {} nodes in PACKED, one thread, the substep of a step of \
-         {SUBSTEPS} substeps. Bytes of the springs as the storage reports them, and of the whole body by the allocator's \
-         account.\n",
+         {SUBSTEPS} substeps. Bytes of the springs as the storage reports them, and of the whole body as the \
+         allocator reports them.\n",
         count(nodes)
     ));
     let scene = Scene::grid(nodes);
@@ -102,10 +102,10 @@ pub fn run(report: &mut Report, effort: Effort) {
         let before = heap::allocated();
         match Stepped::with(&scene, setup, change) {
             Ok(mut body) => {
-                let whole = heap::allocated()
+                let body_bytes = heap::allocated()
                     .zip(before)
                     .map(|(after, before)| after.saturating_sub(before));
-                bytes.push((*name, body.storage_report().bytes_used, whole));
+                bytes.push((*name, body.storage_report().bytes_used, body_bytes));
                 contenders.push(Contender::new(*name, 1, move |steps| body.step(steps)));
             }
             Err(reason) => report.not_offered(name, &reason),
@@ -115,7 +115,7 @@ pub fn run(report: &mut Report, effort: Effort) {
     let results = interleave(contenders, effort);
     report.disturbed(results.waited);
     let mut table = Table::new(&["asked for", "substep, ms", "of plain", "springs, MB", "body, MB"]);
-    for (name, springs, whole) in bytes {
+    for (name, springs, body_bytes) in bytes {
         let (Some(samples), Some(plain)) = (results.get(name), results.get(PLAIN)) else {
             continue;
         };
@@ -124,7 +124,7 @@ pub fn run(report: &mut Report, effort: Effort) {
             milliseconds(samples.minimum() / f64::from(SUBSTEPS)),
             digits(samples.ratio(plain)),
             megabytes(springs),
-            whole.map_or("-".into(), megabytes),
+            body_bytes.map_or("-".into(), megabytes),
         ]);
     }
     report.table(&table);

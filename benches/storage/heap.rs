@@ -1,4 +1,4 @@
-//! A heap as much cutting leaves it: its free blocks lie scattered, in no order.
+//! A fragmented heap, as after many cuts: free blocks are scattered in random order.
 #![allow(unsafe_code)]
 
 use std::ffi::c_void;
@@ -6,24 +6,24 @@ use std::ffi::c_void;
 use crate::clock;
 use crate::random::Random;
 
-/// A heap whose free blocks of one size lie scattered among others that are taken until this is dropped.
+/// A heap whose free blocks of one size are scattered among others, which stay allocated until this is dropped.
 pub struct Fragmented {
-    taken: Vec<*mut c_void>,
+    allocated_blocks: Vec<*mut c_void>,
 }
 
 impl Fragmented {
-    /// Leaves `count` free blocks for what is allocated next with `size` bytes or up to 16 fewer.
+    /// Leaves `count` free blocks for later allocations of `size` bytes or up to 16 fewer.
     ///
-    /// Twice as many are allocated, and every second one is freed, in random order: those between keep the allocator from
-    /// joining neighbours to one large block.
+    /// It allocates twice as many blocks and frees every second one, in random order. The blocks between prevent the
+    /// allocator from merging neighbors.
     pub fn new(size: usize, count: usize) -> Self {
         // SAFETY: malloc may be called with any size.
         let mut blocks: Vec<*mut c_void> = (0..2 * count).map(|_| unsafe { libc::malloc(size) }).collect();
-        let mut taken = Vec::with_capacity(count);
+        let mut allocated_blocks = Vec::with_capacity(count);
         let mut free = Vec::with_capacity(count);
         for pair in blocks.chunks_exact(2) {
             free.push(pair[0]);
-            taken.push(pair[1]);
+            allocated_blocks.push(pair[1]);
         }
         blocks.clear();
         Random(5).shuffle(&mut free);
@@ -31,20 +31,20 @@ impl Fragmented {
             // SAFETY: from malloc, or null, and freed once.
             unsafe { libc::free(block) };
         }
-        Self { taken }
+        Self { allocated_blocks }
     }
 }
 
 impl Drop for Fragmented {
     fn drop(&mut self) {
-        for &block in &self.taken {
+        for &block in &self.allocated_blocks {
             // SAFETY: from malloc, or null, and freed once.
             unsafe { libc::free(block) };
         }
     }
 }
 
-/// Gives what is free back to the system, so that what comes next finds a heap without history.
+/// Returns free memory to the system, so that later allocations use a fresh heap.
 pub fn trim() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: may be called at any time.
@@ -53,35 +53,35 @@ pub fn trim() {
     }
 }
 
-/// Bytes that the program holds from its allocator now; where it does not tell, `None`.
+/// Bytes currently allocated by the program; `None` if the allocator does not report them.
 pub fn allocated() -> Option<usize> {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
         // SAFETY: may be called at any time.
-        let account = unsafe { libc::mallinfo2() };
-        Some(account.uordblks + account.hblkhd)
+        let statistics = unsafe { libc::mallinfo2() };
+        Some(statistics.uordblks + statistics.hblkhd)
     }
     #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
     None
 }
 
-/// A link of a list, as large as one that holds a spring.
+/// A link of a list, as large as one that stores a spring.
 struct Link {
     next: Option<Box<Link>>,
     value: [u32; 4],
 }
 
-/// How many times as long a walk over lists takes that were made in a fragmented heap as over those made in a fresh one: a
-/// check that fragmentation does what it is meant to.
+/// The time of a walk over lists in a fragmented heap over that in a fresh heap. It checks that fragmentation has an
+/// effect.
 pub fn effect(links: usize) -> f64 {
     const ROW: usize = 8;
     let make = || {
         let lists = (0..links / ROW).map(|list| {
             let mut first = None;
-            for place in 0..ROW {
+            for index in 0..ROW {
                 first = Some(Box::new(Link {
                     next: first,
-                    value: [list as u32, place as u32, 0, 1],
+                    value: [list as u32, index as u32, 0, 1],
                 }));
             }
             first

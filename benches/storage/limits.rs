@@ -1,19 +1,19 @@
-//! What the memory allows: the bytes a substep must move, moved by loops that do nothing else.
+//! Memory limits: the bytes that a substep must move, moved by loops that do nothing else.
 #![allow(unsafe_code)]
 
 use std::hint::black_box;
 
 use crate::clock;
 
-/// How positions are advanced. Which is fastest depends on the processor and on where the arrays lie.
+/// Methods to advance positions. The fastest depends on the processor and on the addresses of the arrays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
-    /// x of all nodes, then y, then z.
+enum Method {
+    /// All x, then all y, then all z.
     AxisByAxis,
     /// All axes in one loop.
     Together,
-    /// New positions are written past the caches, which need not read them first.
-    PastCaches,
+    /// Non-temporal stores of new positions, which avoid reading their cache lines first.
+    Streaming,
 }
 
 /// The state of a thread's share of the nodes, one array per axis.
@@ -21,7 +21,7 @@ struct Share {
     positions: [Vec<f32>; 3],
     next: [Vec<f32>; 3],
     velocities: [Vec<f32>; 3],
-    /// As many bytes as the links take.
+    /// Data of the same size as the links.
     links: Vec<u64>,
 }
 
@@ -37,18 +37,18 @@ impl Share {
     }
 
     /// Reads positions, reads and writes velocities, writes the next positions.
-    fn advance(&mut self, way: Way) {
+    fn advance(&mut self, method: Method) {
         let (kick, drift) = (black_box(1e-9f32), black_box(1e-4f32));
         let [x, y, z] = &self.positions;
         let [next_x, next_y, next_z] = &mut self.next;
         let [velocity_x, velocity_y, velocity_z] = &mut self.velocities;
-        match way {
-            Way::AxisByAxis => {
+        match method {
+            Method::AxisByAxis => {
                 axis(x, velocity_x, next_x, kick, drift);
                 axis(y, velocity_y, next_y, kick, drift);
                 axis(z, velocity_z, next_z, kick, drift);
             }
-            Way::Together => {
+            Method::Together => {
                 let positions = x.iter().zip(y).zip(z);
                 let velocities = velocity_x.iter_mut().zip(velocity_y).zip(velocity_z);
                 let next = next_x.iter_mut().zip(next_y).zip(next_z);
@@ -61,10 +61,10 @@ impl Share {
                     *next_z = z + drift * *w;
                 }
             }
-            Way::PastCaches => {
-                axis_past_caches(x, velocity_x, next_x, kick, drift);
-                axis_past_caches(y, velocity_y, next_y, kick, drift);
-                axis_past_caches(z, velocity_z, next_z, kick, drift);
+            Method::Streaming => {
+                axis_streaming(x, velocity_x, next_x, kick, drift);
+                axis_streaming(y, velocity_y, next_y, kick, drift);
+                axis_streaming(z, velocity_z, next_z, kick, drift);
             }
         }
         std::mem::swap(&mut self.positions, &mut self.next);
@@ -83,9 +83,9 @@ fn axis(positions: &[f32], velocities: &mut [f32], next: &mut [f32], kick: f32, 
 }
 
 #[cfg(target_arch = "x86_64")]
-fn axis_past_caches(positions: &[f32], velocities: &mut [f32], next: &mut [f32], kick: f32, drift: f32) {
+fn axis_streaming(positions: &[f32], velocities: &mut [f32], next: &mut [f32], kick: f32, drift: f32) {
     use std::arch::x86_64::{__m128, _mm_add_ps, _mm_loadu_ps, _mm_mul_ps, _mm_set1_ps, _mm_sfence, _mm_storeu_ps};
-    // SAFETY: four floats are one such register, of which every pattern of bits is one.
+    // SAFETY: four floats have the size of this register type, for which every bit pattern is valid.
     let (before, middle, after) = unsafe { next.align_to_mut::<__m128>() };
     let (start, end) = (before.len(), before.len() + 4 * middle.len());
     axis(&positions[..start], &mut velocities[..start], before, kick, drift);
@@ -93,8 +93,8 @@ fn axis_past_caches(positions: &[f32], velocities: &mut [f32], next: &mut [f32],
     let sources = positions[start..end]
         .chunks_exact(4)
         .zip(velocities[start..end].chunks_exact_mut(4));
-    // SAFETY: SSE is part of x86-64; four floats are read and written at a time, and the place that is written past the
-    // caches is aligned.
+    // SAFETY: SSE is part of x86-64. Four floats are read and written at a time, and the destination of the
+    // non-temporal store is aligned.
     unsafe {
         let (kick, drift) = (_mm_set1_ps(kick), _mm_set1_ps(drift));
         for (next, (position, velocity)) in middle.iter_mut().zip(sources) {
@@ -108,14 +108,14 @@ fn axis_past_caches(positions: &[f32], velocities: &mut [f32], next: &mut [f32],
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn axis_past_caches(positions: &[f32], velocities: &mut [f32], next: &mut [f32], kick: f32, drift: f32) {
+fn axis_streaming(positions: &[f32], velocities: &mut [f32], next: &mut [f32], kick: f32, drift: f32) {
     axis(positions, velocities, next, kick, drift);
 }
 
 /// A body's state and its links' bytes, moved by one or more threads.
 pub struct Memory {
     shares: Vec<Share>,
-    way: Way,
+    method: Method,
 }
 
 impl Memory {
@@ -124,37 +124,37 @@ impl Memory {
             shares: (0..threads)
                 .map(|_| Share::new(nodes / threads, link_bytes / threads))
                 .collect(),
-            way: Way::AxisByAxis,
+            method: Method::AxisByAxis,
         };
         let passes = 1 + 2_000_000 / nodes;
-        let mut time = |way| {
-            memory.way = way;
+        let mut time = |method| {
+            memory.method = method;
             let times = (0..4).map(|_| clock::time(|| memory.advance(passes)).wall);
             times.fold(f64::INFINITY, f64::min)
         };
-        let ways = [Way::AxisByAxis, Way::Together, Way::PastCaches].map(|way| (time(way), way));
-        let best = ways.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-        memory.way = best.map_or(Way::AxisByAxis, |(_, way)| way);
+        let timings = [Method::AxisByAxis, Method::Together, Method::Streaming].map(|method| (time(method), method));
+        let best = timings.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        memory.method = best.map_or(Method::AxisByAxis, |(_, method)| method);
         memory
     }
 
-    /// Moves what a substep moves of the state, so many times.
+    /// Moves the state's bytes of a substep, `passes` times.
     pub fn advance(&mut self, passes: usize) {
-        let way = self.way;
+        let method = self.method;
         self.share(|share| {
             for _ in 0..passes {
-                share.advance(way);
+                share.advance(method);
             }
         });
     }
 
-    /// The same, and reads the links.
+    /// Moves the state's bytes and reads the links, `passes` times.
     pub fn substep(&mut self, passes: usize) {
-        let way = self.way;
+        let method = self.method;
         self.share(|share| {
             for _ in 0..passes {
                 black_box(share.read_links());
-                share.advance(way);
+                share.advance(method);
             }
         });
     }

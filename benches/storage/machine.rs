@@ -1,8 +1,8 @@
-//! The machine, as it describes itself.
+//! A description of the machine.
 
 use std::fmt::Write;
 
-/// Processor, caches, instructions and load, as the points of a list.
+/// Processor, caches, instruction sets and load, as a Markdown list.
 pub fn description() -> String {
     let mut text = String::new();
     let processor = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
@@ -37,7 +37,7 @@ pub fn description() -> String {
     text
 }
 
-/// Of the first core.
+/// The caches of the first core.
 fn caches() -> Option<String> {
     let mut caches = Vec::new();
     for entry in std::fs::read_dir("/sys/devices/system/cpu/cpu0/cache").ok()? {

@@ -1,7 +1,8 @@
-//! The time and memory of a step against the number of nodes: the table and the figure of Halic, Kockara, Bayrak, Rowe and
-//! Chen (section 4: table 3 and figure 8) for their three storages, and PACKED against what the processor allows.
+//! Time and memory of a step against the number of nodes. It measures the table and the figure of Halic, Kockara,
+//! Bayrak, Rowe and Chen (section 4: table 3 and figure 8) for their three storages, and compares PACKED with the
+//! limits of the processor.
 //!
-//! `cargo bench --bench storage [-- --quick] [--only a|b|c]` writes `target/report/storage.md` and plots beside it.
+//! `cargo bench --bench storage [-- --quick] [--only a|b|c]` writes `target/report/storage.md` and plots.
 #![allow(clippy::print_stderr)]
 
 mod bodies;
@@ -22,10 +23,10 @@ mod svg;
 use report::Report;
 use rounds::Effort;
 
-/// What is asked for on the command line.
+/// The command-line options.
 struct Options {
     quick: bool,
-    /// Of the experiments a, b and c.
+    /// A selection of the experiments a, b and c.
     experiments: String,
 }
 
@@ -38,7 +39,7 @@ impl Options {
         let mut arguments = std::env::args().skip(1);
         while let Some(argument) = arguments.next() {
             match argument.as_str() {
-                // Given by cargo itself.
+                // Passed by cargo.
                 "--bench" => {}
                 "--quick" => options.quick = true,
                 "--only" => match arguments.next() {
@@ -92,9 +93,9 @@ fn main() -> std::process::ExitCode {
 fn introduction(quick: bool) -> String {
     let mut text = format!("# Storages\n\n{}", machine::description());
     text.push_str(
-        "- Times are the least over rounds in which all contenders of a size take turns: what disturbs makes them longer, \
-         never shorter. Ratios are medians of the ratios within rounds. What runs on one thread is measured in processor time of that thread, what runs on several on \
-         the wall's clock.\n",
+        "- Times are the least over rounds in which all contenders of a size take turns: disturbances make them longer, \
+         never shorter. Ratios are medians of the ratios within rounds. Work on one thread is measured in processor time of that thread, work on several threads in \
+         wall time.\n",
     );
     if quick {
         text.push_str("- A quick run: few sizes, few rounds.\n");

@@ -1,4 +1,4 @@
-//! Experiment B: PACKED against what memory and arithmetic allow, and against the paper's fast link in C.
+//! Experiment B: PACKED against the limits of memory and arithmetic, and against the paper's fast link in C.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -7,23 +7,23 @@ use glam::Vec3;
 use sinew::Kernel;
 
 use crate::bodies::{Setup, Stepped};
-use crate::fast_link::{FastLink, Library, Way};
+use crate::fast_link::{FastLink, Library, Variant};
 use crate::heap;
 use crate::limits::Memory;
 use crate::report::{Report, Table, count, digits, milliseconds};
 use crate::rounds::{Contender, Effort, Results, interleave};
 use crate::scenes::{Kind, Scene};
-use crate::storages::fastest_way;
+use crate::storages::fastest_variant;
 use crate::svg::{self, Series};
 
 const SIZES: [usize; 5] = [1_000, 10_000, 100_000, 1_000_000, 2_000_000];
 
 const THREADS: [u32; 2] = [1, 2];
 
-/// Substeps of a step, in which a substep's own time shows: what a step does once is shared among them.
+/// Substeps of a step, enough to measure a single substep: the fixed cost of a step is divided among them.
 const SUBSTEPS: u32 = 16;
 
-/// Bodies that stay in the caches of a core. The smallest has most of its springs near its border, where rows are uneven.
+/// Bodies that fit into a core's caches. The smallest has most of its springs near its border, where rows are uneven.
 const CACHED_SIZES: [usize; 3] = [1_000, 4_000, 16_000];
 
 const KERNELS: [(&str, Kernel); 4] = [
@@ -33,7 +33,7 @@ const KERNELS: [(&str, Kernel); 4] = [
     ("portable", Kernel::Portable),
 ];
 
-/// Beyond, a sheet numbered at random takes seconds per step, and shows nothing new.
+/// Above this size, a randomly numbered sheet takes seconds per step without new information.
 const MOST_AT_RANDOM: usize = 1_000_000;
 
 const MOST_FOR_KERNELS: usize = 100_000;
@@ -45,14 +45,14 @@ pub fn run(report: &mut Report, effort: Effort, library: Option<&Library>) {
     report.write(&format!(
         "\n## B. PACKED against the limits\n\n\
          - *step*: a step of one substep. *substep*: a {SUBSTEPS}th of a step of {SUBSTEPS} substeps. The C program runs one \
-         substep per call and keeps velocities; it is compared with both.\n\
+         substep per call and stores velocities; it is compared with both.\n\
          - *memory*: reading positions (12 B a node), reading and writing velocities (24 B), writing the next positions (12 B, \
-         and 12 B to fetch them unless they are written past the caches), and reading the links' bytes, by loops that do \
+         and 12 B to fetch them unless stores are non-temporal), and reading the links' bytes, by loops that do \
          nothing else. *state*: the same without the links.\n\
          - *arithmetic*: PACKED itself, a substep of bodies of 1K, 4K and 16K nodes of the same kind, all in cache; the least \
          time per spring of the three, times the springs; halved for two threads.\n\
          - The limit is the larger of memory and arithmetic; *of limit*: substep over limit, and step over limit. \
-         Below 1 where a large body has less border for its size than those in cache.\n"
+         It is below 1 if a large body has less border for its size than those in cache.\n"
     ));
     agreement(report, library);
     let sizes = if effort.quick { &SIZES[..3] } else { &SIZES[..] };
@@ -107,12 +107,12 @@ fn state_name(threads: u32) -> String {
     format!("state, {threads}")
 }
 
-/// A scene measured.
+/// The measurements of a scene.
 struct Row {
     nodes: usize,
     springs: usize,
     results: Results,
-    /// The names of the bodies in cache, and how many springs each has.
+    /// The names of the bodies in cache, and their numbers of springs.
     cached: Vec<(String, usize)>,
 }
 
@@ -121,7 +121,7 @@ impl Row {
         Some(self.results.get(name)?.minimum())
     }
 
-    /// More threads can be slower, but never have to be.
+    /// More threads can be slower, but are never necessary.
     fn memory(&self, threads: u32) -> Option<f64> {
         let alone = self.least(&memory_name(1))?;
         Some(self.least(&memory_name(threads))?.min(alone))
@@ -169,7 +169,7 @@ fn measure(report: &mut Report, effort: Effort, library: Option<&Library>, kind:
             }
         }
     }
-    // Large bodies wait for memory, whatever the kernel.
+    // Large bodies are limited by memory at every SIMD level.
     if nodes <= MOST_FOR_KERNELS {
         for (name, kernel) in KERNELS {
             let setup = Setup {
@@ -208,11 +208,13 @@ fn measure(report: &mut Report, effort: Effort, library: Option<&Library>, kind:
     }
     if let Some(library) = library {
         let mut body = FastLink::new(library, &scene);
-        let way = fastest_way(&mut body);
+        let variant = fastest_variant(&mut body);
         let body = Rc::new(RefCell::new(body));
-        for (name, way) in [(C_PLAIN, Way::PLAIN), (C_PREFETCH, way)] {
+        for (name, variant) in [(C_PLAIN, Variant::PLAIN), (C_PREFETCH, variant)] {
             let body = Rc::clone(&body);
-            contenders.push(Contender::new(name, 1, move |steps| body.borrow_mut().step(way, steps)));
+            contenders.push(Contender::new(name, 1, move |steps| {
+                body.borrow_mut().step(variant, steps)
+            }));
         }
     }
     let results = interleave(contenders, effort);
@@ -225,26 +227,26 @@ fn measure(report: &mut Report, effort: Effort, library: Option<&Library>, kind:
     }
 }
 
-/// The same scene stepped by the C program and by PACKED: both do the same work, or one of them is not worth a comparison.
+/// Steps the same scene in the C program and in PACKED, and checks that both agree.
 fn agreement(report: &mut Report, library: Option<&Library>) {
     const STEPS: usize = 200;
     let Some(library) = library else { return };
     let scene = Scene::grid(1_000);
     let mut packed = Stepped::new(&scene, Setup::default()).expect("PACKED on one thread");
     packed.step(STEPS);
-    for way in Way::prefetching().chain([Way::PLAIN]) {
+    for variant in Variant::prefetching().chain([Variant::PLAIN]) {
         let mut body = FastLink::new(library, &scene);
-        body.step(way, STEPS);
+        body.step(variant, STEPS);
         let difference = |(a, b): (&Vec3, &Vec3)| a.distance(*b);
-        let apart = packed.body().positions().iter().zip(body.positions()).map(difference);
-        let apart = apart.fold(0.0, f32::max);
-        let moved = packed.body().positions().iter().zip(&scene.positions).map(difference);
-        let moved = moved.fold(0.0, f32::max);
-        // The C program starts with a whole kick where PACKED starts with half of one, h² g / 2 a step apart: a 200th of
+        let distance = packed.body().positions().iter().zip(body.positions()).map(difference);
+        let distance = distance.fold(0.0, f32::max);
+        let displacement = packed.body().positions().iter().zip(&scene.positions).map(difference);
+        let displacement = displacement.fold(0.0, f32::max);
+        // The C program starts with a full kick, PACKED with half a kick. They differ by h² g / 2 per step, a 200th of
         // the fall.
         assert!(
-            moved > 1e-4 && apart < 0.05 * moved,
-            "{way:?}: {apart} m apart from PACKED, which moved by {moved} m"
+            displacement > 1e-4 && distance < 0.05 * displacement,
+            "{variant:?}: {distance} m apart from PACKED, which moved by {displacement} m"
         );
     }
     report.write(&format!(

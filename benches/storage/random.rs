@@ -1,4 +1,4 @@
-//! Random numbers that are the same in every run.
+//! Reproducible random numbers.
 
 /// SplitMix64 (Steele, Lea and Flood 2014).
 pub struct Random(pub u64);
@@ -12,12 +12,12 @@ impl Random {
         bits ^ (bits >> 31)
     }
 
-    /// Below `count`.
+    /// A random integer below `count`.
     pub fn below(&mut self, count: usize) -> usize {
         ((u128::from(self.next()) * count as u128) >> 64) as usize
     }
 
-    /// From -1 to 1.
+    /// A random number from -1 to 1.
     pub fn signed(&mut self) -> f32 {
         (self.next() >> 40) as f32 / (1u32 << 23) as f32 - 1.0
     }

@@ -1,4 +1,4 @@
-//! What comes of it all: a file in `target/report`, and lines on the way.
+//! Reports: a file in `target/report`, and progress lines.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -15,7 +15,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// To be `target/report/<name>.md`.
+    /// Creates the report `target/report/<name>.md`.
     pub fn new(name: &'static str) -> Self {
         Self {
             name,
@@ -36,19 +36,19 @@ impl Report {
         self.text.push_str(text);
     }
 
-    /// Says loudly, once, what this version or this machine does not have.
-    pub fn not_offered(&mut self, what: &str, reason: &str) {
-        if self.not_offered.insert(what.to_owned(), reason.to_owned()).is_none() {
-            eprintln!("!! NOT OFFERED: {what}: {reason}");
+    /// Prints once, clearly visible, a feature that this version or this machine does not have.
+    pub fn not_offered(&mut self, feature: &str, reason: &str) {
+        if self.not_offered.insert(feature.to_owned(), reason.to_owned()).is_none() {
+            eprintln!("!! NOT OFFERED: {feature}: {reason}");
         }
     }
 
-    /// Notes the share of some measurement's time in which the machine ran other programs.
+    /// Records the fraction of a measurement's time in which the machine ran other programs.
     pub fn disturbed(&mut self, waited: f64) {
         self.waited = self.waited.max(waited);
     }
 
-    /// A plot beside the report, shown in it.
+    /// Adds a plot file and shows it in the report.
     pub fn plot(&mut self, file: &str, title: &str, svg: String) {
         self.plots.push((file.to_owned(), svg));
         self.write(&format!("\n![{title}]({file})\n"));
@@ -58,20 +58,20 @@ impl Report {
         self.write(&table.to_string());
     }
 
-    /// Writes it all to `target/report`.
+    /// Writes the report and its plots to `target/report`.
     pub fn finish(mut self) -> std::io::Result<PathBuf> {
         let mut missing = String::from("\n## Not offered\n\n");
-        for (what, reason) in &self.not_offered {
-            let _ = writeln!(missing, "- **{what}**: {reason}");
+        for (feature, reason) in &self.not_offered {
+            let _ = writeln!(missing, "- **{feature}**: {reason}");
         }
         if self.not_offered.is_empty() {
-            missing.push_str("Nothing: everything asked for was measured.\n");
+            missing.push_str("Nothing: all requested measurements were made.\n");
         }
         if self.waited > 0.05 {
             let _ = write!(
                 missing,
                 "\n**The machine was busy**: for up to {:.0} % of the time it ran other programs. Times on two threads are not \
-                 to be relied on, and others are too long by what caches and memory were shared with.\n",
+                 reliable, and others include the effects of shared caches and memory.\n",
                 100.0 * self.waited
             );
         }
@@ -133,12 +133,12 @@ impl std::fmt::Display for Table {
     }
 }
 
-/// Seconds in milliseconds, three digits.
+/// Formats seconds as milliseconds, three digits.
 pub fn milliseconds(seconds: f64) -> String {
     digits(1e3 * seconds)
 }
 
-/// Three digits.
+/// Formats a number with three digits.
 pub fn digits(value: f64) -> String {
     match value.abs() {
         size if !size.is_finite() => "-".into(),
@@ -150,12 +150,12 @@ pub fn digits(value: f64) -> String {
     }
 }
 
-/// Megabytes of 10^6.
+/// Formats bytes in megabytes of 10^6.
 pub fn megabytes(bytes: usize) -> String {
     digits(bytes as f64 * 1e-6)
 }
 
-/// How many nodes, short.
+/// Formats a number of nodes in short form.
 pub fn count(nodes: usize) -> String {
     match nodes {
         0..1_000 => nodes.to_string(),

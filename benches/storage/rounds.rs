@@ -1,18 +1,18 @@
-//! Contenders measured in rounds: each round gives every contender a few units of its work, so that what disturbs the
-//! machine for a while disturbs all of them, and ratios within a round hold.
+//! Interleaved measurements. Each round runs a few units of work of every contender, so that temporary disturbances
+//! affect all of them and ratios within a round are valid.
 
 use std::time::{Duration, Instant};
 
 use crate::clock::{self, Elapsed};
 
-/// How much is measured.
+/// The measuring effort.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     pub quick: bool,
     pub rounds: usize,
-    /// Rounds end early, but not before three, once a group has taken so long.
+    /// Rounds end early, but not before the third, when a group has taken this long.
     pub patience: Duration,
-    /// A sample lasts at least so long, in seconds.
+    /// The minimum duration of a sample [s].
     pub sample: f64,
 }
 
@@ -31,15 +31,15 @@ impl Effort {
     };
 }
 
-/// A unit of work of so many seconds needs no second look before it is measured.
+/// A unit of work of at least this duration is not repeated before it is measured [s].
 const LONG: f64 = 0.3;
 
-/// Something whose time is measured.
+/// A piece of work that is measured.
 pub struct Contender<'a> {
     pub name: String,
-    /// Above 1: measured on the wall's clock, since the caller's thread does not do it all.
+    /// Above 1, wall time is measured, since other threads do part of the work.
     pub threads: u32,
-    /// Does so many units of work.
+    /// Does this many units of work.
     pub work: Box<dyn FnMut(usize) + 'a>,
 }
 
@@ -53,7 +53,7 @@ impl<'a> Contender<'a> {
     }
 }
 
-/// What was measured of a contender: seconds per unit, a sample per round.
+/// The measurements of a contender: seconds per unit, one sample per round.
 #[derive(Clone, Debug)]
 pub struct Samples {
     pub name: String,
@@ -69,7 +69,7 @@ impl Samples {
         median(self.seconds.clone())
     }
 
-    /// How many times as long this takes as `other`: the median of the ratios within rounds.
+    /// The time relative to `other`: the median of the ratios within rounds.
     pub fn ratio(&self, other: &Samples) -> f64 {
         median(self.seconds.iter().zip(&other.seconds).map(|(a, b)| a / b).collect())
     }
@@ -83,10 +83,10 @@ pub fn median(mut values: Vec<f64>) -> f64 {
     }
 }
 
-/// What rounds gave.
+/// The results of all rounds.
 pub struct Results {
     samples: Vec<Samples>,
-    /// The share of the time in which the machine did not run us.
+    /// The fraction of the time in which the machine ran other programs.
     pub waited: f64,
 }
 
@@ -102,7 +102,7 @@ pub fn interleave(mut contenders: Vec<Contender>, effort: Effort) -> Results {
     let units: Vec<usize> = contenders
         .iter_mut()
         .map(|contender| {
-            // The first unit is slower: memory is touched for the first time. Of what is long, that is all the same.
+            // The first unit is slower, as it touches memory for the first time. For long units this is negligible.
             let mut once = seconds(contender.threads, clock::time(|| (contender.work)(1)));
             if once < LONG {
                 once = seconds(contender.threads, clock::time(|| (contender.work)(1)));
@@ -122,12 +122,12 @@ pub fn interleave(mut contenders: Vec<Contender>, effort: Effort) -> Results {
         if round >= 3 && start.elapsed() > effort.patience {
             break;
         }
-        for place in 0..contenders.len() {
-            // To and fro, so that nobody always follows the same one.
+        for position in 0..contenders.len() {
+            // Alternating order, so that no contender always follows the same one.
             let index = if round % 2 == 0 {
-                place
+                position
             } else {
-                contenders.len() - 1 - place
+                contenders.len() - 1 - position
             };
             let contender = &mut contenders[index];
             let elapsed = clock::time(|| (contender.work)(units[index]));
@@ -146,7 +146,7 @@ pub fn interleave(mut contenders: Vec<Contender>, effort: Effort) -> Results {
     }
 }
 
-/// The time that counts.
+/// The counted time: processor time for one thread, wall time for more.
 fn seconds(threads: u32, elapsed: Elapsed) -> f64 {
     if threads == 1 { elapsed.processor } else { elapsed.wall }
 }

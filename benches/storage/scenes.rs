@@ -1,33 +1,33 @@
-//! Bodies to be measured: a sheet, the same numbered at random, an organ of tetrahedra.
+//! Bodies to measure: a sheet, a sheet numbered at random, an organ of tetrahedra.
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
 
 use crate::random::Random;
 
-/// Between the nodes of a sheet, m.
+/// Spacing of the nodes of a sheet [m].
 const SPACING: f32 = 1e-3;
-/// How far nodes start from rest, in spacings: forces are at work everywhere from the first step on, and none is so
-/// small that the processor slows down over it.
+/// Initial displacement of nodes, in spacings. It causes forces everywhere from the first step on, none so small that
+/// the processor slows down.
 const DISTURBANCE: f32 = 0.02;
-/// How far the nodes of an organ lie from the lattice it was cut from, in spacings: no two springs are of one length, as in
-/// a mesh of a real organ.
+/// Displacement of an organ's nodes from the lattice, in spacings. All springs have different lengths, as in a mesh of
+/// a real organ.
 const UNEVENNESS: f32 = 0.1;
 
-/// kg
+/// Mass of a node [kg].
 pub const MASS: f32 = 1e-4;
-/// N/m
+/// Stiffness of a spring [N/m].
 pub const STIFFNESS: f32 = 100.0;
-/// s; stable wherever the nodes of these scenes go, so that no step has to estimate.
+/// Substep [s], always stable in these scenes, so that no step has to estimate it.
 pub const SUBSTEP: f32 = 1e-4;
-/// Along y, m/s².
+/// Gravity along y [m/s²].
 pub const GRAVITY: f32 = -9.81;
 
-/// A body to be.
+/// The data of a body.
 pub struct Scene {
     pub name: &'static str,
     pub rest_positions: Vec<Vec3>,
-    /// Where nodes start: a little off rest.
+    /// Initial positions, slightly displaced from rest.
     pub positions: Vec<Vec3>,
     pub springs: Vec<[u32; 2]>,
     pub pinned: Vec<u32>,
@@ -52,7 +52,7 @@ impl Kind {
         }
     }
 
-    /// A scene of about so many nodes.
+    /// Creates a scene of about `nodes` nodes.
     pub fn scene(self, nodes: usize) -> Scene {
         match self {
             Self::Grid => Scene::grid(nodes),
@@ -63,7 +63,7 @@ impl Kind {
 }
 
 impl Scene {
-    /// A nearly square sheet of about so many nodes, each joined to its 8 neighbours, pinned along one side.
+    /// A nearly square sheet of about `nodes` nodes, each joined to its 8 neighbors, pinned along one side.
     pub fn grid(nodes: usize) -> Self {
         let rows = (nodes as f64).sqrt().round().max(2.0) as u32;
         let columns = (nodes as f64 / f64::from(rows)).round().max(2.0) as u32;
@@ -95,7 +95,7 @@ impl Scene {
         }
     }
 
-    /// The same body, its nodes numbered at random.
+    /// The same body with its nodes numbered at random.
     fn renumbered(self) -> Self {
         let mut names: Vec<u32> = (0..self.positions.len() as u32).collect();
         Random(2).shuffle(&mut names);
@@ -119,9 +119,10 @@ impl Scene {
         }
     }
 
-    /// An organ of tetrahedra, about so many nodes, uneven, pinned at one end.
+    /// An irregular organ of tetrahedra with about `nodes` nodes, pinned at one end.
     pub fn organ(nodes: usize) -> Self {
-        // An organ of length 1 and spacing s has about 0.154 / s³ nodes, small ones more for their surface.
+        // An organ of unit length and spacing s has about 0.154 / s³ nodes; small ones have more because of their
+        // surface.
         const COARSEST: f64 = 0.124;
         let mut spacing = (0.154 / nodes as f64).cbrt().min(COARSEST);
         let mut mesh = Mesh::organ(1.0, spacing as f32).expect("an organ of this spacing");
@@ -147,13 +148,13 @@ impl Scene {
         }
     }
 
-    /// The rest length of a spring, m.
+    /// The rest length of a spring [m].
     pub fn rest_length(&self, [a, b]: [u32; 2]) -> f32 {
         self.rest_positions[a as usize].distance(self.rest_positions[b as usize])
     }
 }
 
-/// Each position moved at random by up to `reach` along each axis.
+/// Moves each position at random by up to `reach` along each axis.
 fn jittered(positions: &[Vec3], reach: f32, seed: u64) -> Vec<Vec3> {
     let mut random = Random(seed);
     let mut moved = |position: &Vec3| *position + reach * Vec3::from_array(std::array::from_fn(|_| random.signed()));

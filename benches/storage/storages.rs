@@ -7,7 +7,7 @@ use sinew::Storage;
 
 use crate::bodies::{Setup, Stepped};
 use crate::clock;
-use crate::fast_link::{FastLink, Library, Way};
+use crate::fast_link::{FastLink, Library, Variant};
 use crate::heap::{self, Fragmented};
 use crate::random::Random;
 use crate::report::{Report, Table, count, digits, megabytes, milliseconds};
@@ -24,8 +24,7 @@ const STORAGES: [(&str, Storage); 4] = [
 
 const SIZES: [usize; 6] = [100_000, 200_000, 300_000, 500_000, 1_000_000, 2_000_000];
 
-/// What the paper's table 3 says of each storage at each of `SIZES`, in seconds. Its numbers are not at hand; once they
-/// are, they belong here.
+/// The times of each storage in the paper's table 3 at each of `SIZES` [s]. The numbers are not available yet.
 const PAPER: [(&str, [Option<f64>; 6]); 3] = [
     ("EFFICIENT", [None; 6]),
     ("FAST_LINK", [None; 6]),
@@ -35,17 +34,17 @@ const PAPER: [(&str, [Option<f64>; 6]); 3] = [
 const C_PLAIN: &str = "C fast link";
 const C_PREFETCH: &str = "C fast link, prefetch";
 
-/// Springs removed, and added, between two steps, of all.
+/// Fraction of springs removed, and added, between two steps.
 const CUT_SHARE: f64 = 0.01;
 /// Nodes of a sheet have 8 springs; cutting adds up to 4.
 const ROW_WHEN_CUT: u32 = 12;
 
 pub fn run(report: &mut Report, effort: Effort, library: Option<&Library>) {
     report.write(
-        "\n## A. The paper's table 3 and figure 8\n\nA sheet with 8 neighbours per node, one thread, steps of one \
-         substep, its storages as the paper describes them; PACKED is ours.\n",
+        "\n## A. The paper's table 3 and figure 8\n\nA sheet with 8 neighbors per node, one thread, steps of one \
+         substep, its storages as the paper describes them; PACKED is sinew's.\n",
     );
-    report.progress("does fragmenting the heap have an effect?");
+    report.progress("checking the effect of a fragmented heap");
     let links = if effort.quick { 400_000 } else { 2_000_000 };
     report.write(&format!(
         "\nA fragmented heap works: walking {links} links of lists in it takes {} times as long as in a fresh one.\n",
@@ -61,7 +60,7 @@ pub fn run(report: &mut Report, effort: Effort, library: Option<&Library>) {
     figure(report, &sizes);
 }
 
-/// What was measured at one size.
+/// The measurements at one size.
 struct Size {
     nodes: usize,
     times: Results,
@@ -69,15 +68,15 @@ struct Size {
     cuts: Vec<(&'static str, Cutting)>,
 }
 
-/// Bytes a body takes.
+/// Memory of a body [bytes].
 struct Memory {
     used: usize,
     reserved: usize,
-    /// By the allocator's account, the body with all it has.
+    /// Memory of the whole body, as reported by the allocator.
     body: Option<usize>,
 }
 
-/// Under cutting load, s.
+/// Times under cutting load [s].
 struct Cutting {
     step: f64,
     edit: f64,
@@ -130,17 +129,17 @@ fn measure(report: &mut Report, effort: Effort, library: Option<&Library>, nodes
         };
         worn.push((
             fragmented(name),
-            Stepped::new(&scene, setup).expect("what was offered before"),
+            Stepped::new(&scene, setup).expect("a setup that worked before"),
         ));
         drop(heap);
     }
-    let mut rivals: Vec<(&str, FastLink, Way)> = Vec::new();
+    let mut rivals: Vec<(&str, FastLink, Variant)> = Vec::new();
     if let Some(library) = library {
-        rivals.push((C_PLAIN, FastLink::new(library, &scene), Way::PLAIN));
+        rivals.push((C_PLAIN, FastLink::new(library, &scene), Variant::PLAIN));
         let mut body = FastLink::new(library, &scene);
-        let way = fastest_way(&mut body);
-        report.progress(&format!("   {C_PREFETCH}: {way:?}"));
-        rivals.push((C_PREFETCH, body, way));
+        let variant = fastest_variant(&mut body);
+        report.progress(&format!("   {C_PREFETCH}: {variant:?}"));
+        rivals.push((C_PREFETCH, body, variant));
     }
 
     let mut contenders = Vec::new();
@@ -150,9 +149,9 @@ fn measure(report: &mut Report, effort: Effort, library: Option<&Library>, nodes
     for (name, body) in &mut worn {
         contenders.push(Contender::new(name.clone(), 1, |steps| body.step(steps)));
     }
-    for (name, body, way) in &mut rivals {
-        let way = *way;
-        contenders.push(Contender::new(*name, 1, move |steps| body.step(way, steps)));
+    for (name, body, variant) in &mut rivals {
+        let variant = *variant;
+        contenders.push(Contender::new(*name, 1, move |steps| body.step(variant, steps)));
     }
     let times = interleave(contenders, effort);
     report.disturbed(times.waited);
@@ -164,7 +163,7 @@ fn measure(report: &mut Report, effort: Effort, library: Option<&Library>, nodes
                 springs_per_node: ROW_WHEN_CUT,
                 ..Setup::default()
             };
-            *body = Stepped::new(&scene, setup).expect("what was offered before");
+            *body = Stepped::new(&scene, setup).expect("a setup that worked before");
         }
     }
     let cuts = cut(&scene, fresh, effort);
@@ -176,42 +175,43 @@ fn measure(report: &mut Report, effort: Effort, library: Option<&Library>, nodes
     }
 }
 
-/// The size of what a storage allocates piece by piece, and how many pieces there are.
+/// The size and number of a storage's small allocations.
 fn small_blocks(storage: Storage, body: &Stepped) -> (usize, usize) {
     let bytes = body.storage_report();
     match storage {
         Storage::Efficient => (bytes.bytes_used / (2 * bytes.spring_count), 2 * bytes.spring_count),
         Storage::DynamicBulk => (bytes.bytes_reserved / bytes.node_count, bytes.node_count),
-        // A few large pieces.
+        // These storages allocate a few large blocks.
         Storage::FastLink | Storage::Packed => (64, bytes.node_count),
     }
 }
 
-/// The way with prefetch that is fastest here.
-pub fn fastest_way(body: &mut FastLink) -> Way {
-    let mut time = |way| {
-        let times = (0..3).map(|_| clock::time(|| body.step(way, 2)).processor);
+/// The fastest variant with prefetch on this machine.
+pub fn fastest_variant(body: &mut FastLink) -> Variant {
+    let mut time = |variant| {
+        let times = (0..3).map(|_| clock::time(|| body.step(variant, 2)).processor);
         times.fold(f64::INFINITY, f64::min)
     };
-    let ways = Way::prefetching().map(|way| (time(way), way));
-    ways.min_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or(Way::PLAIN, |(_, way)| way)
+    let timings = Variant::prefetching().map(|variant| (time(variant), variant));
+    timings
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or(Variant::PLAIN, |(_, variant)| variant)
 }
 
-/// Steps with springs removed and added between them, the same in every storage.
+/// Steps with springs removed and added between them, identically in every storage.
 fn cut(
     scene: &Scene,
     mut bodies: Vec<(&'static str, Storage, Stepped)>,
     effort: Effort,
 ) -> Vec<(&'static str, Cutting)> {
     let start = Instant::now();
-    let mut knife = Knife::new(scene);
+    let mut edits = SpringEdits::new(scene);
     let mut seconds: Vec<[Vec<f64>; 2]> = bodies.iter().map(|_| Default::default()).collect();
     for round in 0..effort.rounds {
         if round >= 3 && start.elapsed() > effort.patience {
             break;
         }
-        let (removed, added) = knife.next();
+        let (removed, added) = edits.next();
         for ((_, _, stepped), [steps, edits]) in bodies.iter_mut().zip(&mut seconds) {
             let edit = clock::time(|| {
                 let body = stepped.body_mut();
@@ -237,8 +237,8 @@ fn cut(
     results.collect()
 }
 
-/// Chooses the springs to remove, and those to add: between nodes two apart along a row.
-struct Knife {
+/// Chooses springs to remove, and springs to add between nodes two apart along a row.
+struct SpringEdits {
     random: Random,
     columns: usize,
     node_count: usize,
@@ -246,7 +246,7 @@ struct Knife {
     added: HashSet<[u32; 2]>,
 }
 
-impl Knife {
+impl SpringEdits {
     fn new(scene: &Scene) -> Self {
         Self {
             random: Random(6),
@@ -286,20 +286,20 @@ fn cell(samples: Option<&Samples>) -> String {
     samples.map_or("not offered".into(), |samples| milliseconds(samples.minimum()))
 }
 
-/// As the paper's table.
+/// The table of the paper.
 fn times(report: &mut Report, sizes: &[Size]) {
     report.write("\n### Time per step, ms (in brackets: the paper's)\n");
     let mut header = vec!["nodes"];
     header.extend(STORAGES.iter().map(|(name, _)| *name));
     header.extend([C_PLAIN, C_PREFETCH, "not run"]);
     let mut table = Table::new(&header);
-    for (place, size) in sizes.iter().enumerate() {
+    for (index, size) in sizes.iter().enumerate() {
         let mut cells = vec![count(size.nodes)];
         for (name, _) in STORAGES {
             let paper = PAPER.iter().find(|(paper, _)| *paper == name);
-            let paper = paper.map(|(_, times)| match times[place] {
+            let paper = paper.map(|(_, times)| match times[index] {
                 Some(time) => format!(" ({})", milliseconds(time)),
-                None => " (not at hand)".into(),
+                None => " (not available)".into(),
             });
             cells.push(cell(size.times.get(name)) + &paper.unwrap_or_default());
         }
@@ -314,7 +314,7 @@ fn times(report: &mut Report, sizes: &[Size]) {
 fn details(report: &mut Report, sizes: &[Size]) {
     report.write(&format!(
         "\n### Heap, cutting, memory\n\nCutting: {} % of the springs removed and as many others added before each step; a \
-         row of FAST_LINK has {ROW_WHEN_CUT} places then. Memory in MB of 10^6: springs' bytes used and held, and the whole \
+         row of FAST_LINK has {ROW_WHEN_CUT} slots then. Memory in MB of 10^6: springs' bytes used and held, and the whole \
          body by the allocator's account.\n",
         digits(100.0 * CUT_SHARE)
     ));

@@ -5,13 +5,13 @@ use std::fmt::Write;
 /// A line of a plot.
 pub struct Series {
     pub name: String,
-    /// Above 0.
+    /// Positive coordinates.
     pub points: Vec<(f64, f64)>,
-    /// For what is not measured but allowed, and the like.
+    /// For limits and other values that are not measured.
     pub dashed: bool,
 }
 
-const COLOURS: [&str; 12] = [
+const COLORS: [&str; 12] = [
     "#1f6fb4", "#d1495b", "#2e8b57", "#8e5ea2", "#e08e2b", "#3aa6a6", "#7a5c3e", "#c2569b", "#6b7280", "#9aa52c",
     "#12355b", "#f08080",
 ];
@@ -22,7 +22,7 @@ const RIGHT: f64 = 670.0;
 const TOP: f64 = 50.0;
 const BOTTOM: f64 = 460.0;
 
-/// One axis: the decades it reaches over and where it lies in the picture.
+/// One axis: its range in decades and its position in the image.
 struct Axis {
     low: f64,
     high: f64,
@@ -31,7 +31,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// Over all values, with a little room at both ends.
+    /// An axis over all values, with a margin at both ends.
     fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (low, high) = values.fold((f64::INFINITY, 0.0f64), |(low, high), value| {
             (low.min(value), high.max(value))
@@ -44,11 +44,11 @@ impl Axis {
         }
     }
 
-    fn place(&self, value: f64) -> f64 {
+    fn position(&self, value: f64) -> f64 {
         self.from + (self.to - self.from) * (value.log10() - self.low) / (self.high - self.low)
     }
 
-    /// Values to be marked: 1, 2 and 5 of each decade, or 1 alone where there are many.
+    /// Tick values: 1, 2 and 5 of each decade, or 1 only for many decades.
     fn ticks(&self) -> Vec<f64> {
         let steps: &[f64] = if self.high - self.low > 3.5 {
             &[1.0]
@@ -57,12 +57,13 @@ impl Axis {
         };
         let decades = self.low.floor() as i32..=self.high.ceil() as i32;
         let values = decades.flat_map(|decade| steps.iter().map(move |step| step * 10f64.powi(decade)));
-        let shown = |value: &f64| (self.low..=self.high).contains(&value.log10());
-        values.filter(shown).collect()
+        let is_visible = |value: &f64| (self.low..=self.high).contains(&value.log10());
+        values.filter(is_visible).collect()
     }
 }
 
-/// The plot, with a legend in the order of the lines at their right ends; below it, those that have no points.
+/// Draws the plot, with a legend in the order of the lines at their right ends. Series without points are listed below
+/// it.
 pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series]) -> String {
     let (series, missing): (Vec<&Series>, Vec<&Series>) = series.iter().partition(|series| !series.points.is_empty());
     let points = || series.iter().flat_map(|series| &series.points);
@@ -81,17 +82,17 @@ pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series]) -> Str
         let mut order: Vec<usize> = (0..series.len()).collect();
         let end = |index: &usize| series[*index].points.last().map_or(0.0, |point| point.1);
         order.sort_by(|a, b| end(b).total_cmp(&end(a)));
-        for (place, &index) in order.iter().enumerate() {
-            let legend = TOP + 12.0 + 22.0 * place as f64;
-            line(&mut svg, series[index], COLOURS[index % COLOURS.len()], &x, &y, legend);
+        for (row, &index) in order.iter().enumerate() {
+            let legend = TOP + 12.0 + 22.0 * row as f64;
+            line(&mut svg, series[index], COLORS[index % COLORS.len()], &x, &y, legend);
         }
     }
-    for (place, missing) in (series.len()..).zip(missing) {
+    for (row, missing) in (series.len()..).zip(missing) {
         let _ = writeln!(
             svg,
             "<text x=\"{}\" y=\"{}\" fill=\"#888\">{}</text>",
             RIGHT + 50.0,
-            TOP + 16.5 + 22.0 * place as f64,
+            TOP + 16.5 + 22.0 * row as f64,
             escaped(&missing.name)
         );
     }
@@ -110,23 +111,23 @@ pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series]) -> Str
 
 fn grid(svg: &mut String, x: &Axis, y: &Axis) {
     for value in x.ticks() {
-        let place = x.place(value);
+        let position = x.position(value);
         let _ = writeln!(
             svg,
-            "<path d=\"M{place:.1} {TOP}V{BOTTOM}\" stroke=\"#e3e3e3\"/>\
-             <text x=\"{place:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
+            "<path d=\"M{position:.1} {TOP}V{BOTTOM}\" stroke=\"#e3e3e3\"/>\
+             <text x=\"{position:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
             BOTTOM + 20.0,
             tick(value)
         );
     }
     for value in y.ticks() {
-        let place = y.place(value);
+        let position = y.position(value);
         let _ = writeln!(
             svg,
-            "<path d=\"M{LEFT} {place:.1}H{RIGHT}\" stroke=\"#e3e3e3\"/>\
+            "<path d=\"M{LEFT} {position:.1}H{RIGHT}\" stroke=\"#e3e3e3\"/>\
              <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
             LEFT - 8.0,
-            place + 4.5,
+            position + 4.5,
             tick(value)
         );
     }
@@ -136,26 +137,26 @@ fn grid(svg: &mut String, x: &Axis, y: &Axis) {
     );
 }
 
-fn line(svg: &mut String, series: &Series, colour: &str, x: &Axis, y: &Axis, legend: f64) {
+fn line(svg: &mut String, series: &Series, color: &str, x: &Axis, y: &Axis, legend: f64) {
     let dashes = if series.dashed { " stroke-dasharray=\"7 5\"" } else { "" };
-    let places: Vec<String> = series
+    let points_text: Vec<String> = series
         .points
         .iter()
-        .map(|&(nodes, time)| format!("{:.1},{:.1}", x.place(nodes), y.place(time)))
+        .map(|&(nodes, time)| format!("{:.1},{:.1}", x.position(nodes), y.position(time)))
         .collect();
     let _ = writeln!(
         svg,
-        "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2.2\"{dashes}/>",
-        places.join(" ")
+        "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"2.2\"{dashes}/>",
+        points_text.join(" ")
     );
-    for place in &places {
-        let (x, y) = place.split_once(',').unwrap_or_default();
-        let _ = writeln!(svg, "<circle cx=\"{x}\" cy=\"{y}\" r=\"3.2\" fill=\"{colour}\"/>");
+    for point in &points_text {
+        let (x, y) = point.split_once(',').unwrap_or_default();
+        let _ = writeln!(svg, "<circle cx=\"{x}\" cy=\"{y}\" r=\"3.2\" fill=\"{color}\"/>");
     }
     let start = RIGHT + 16.0;
     let _ = writeln!(
         svg,
-        "<path d=\"M{start} {legend}h26\" stroke=\"{colour}\" stroke-width=\"2.6\"{dashes}/>\
+        "<path d=\"M{start} {legend}h26\" stroke=\"{color}\" stroke-width=\"2.6\"{dashes}/>\
          <text x=\"{}\" y=\"{}\">{}</text>",
         start + 34.0,
         legend + 4.5,
@@ -163,7 +164,7 @@ fn line(svg: &mut String, series: &Series, colour: &str, x: &Axis, y: &Axis, leg
     );
 }
 
-/// A number on an axis, without needless digits.
+/// A number on an axis, without superfluous digits.
 fn tick(value: f64) -> String {
     match value {
         value if value >= 999_999.0 => format!("{:.0}M", value * 1e-6),

@@ -1,7 +1,8 @@
-//! Steps that are to end in time while other work keeps every core busy, and how far from their solution they stop.
+//! Steps with a deadline while other work keeps every core busy, and their errors.
 //!
-//! The processor is shared with as many idle loops as it has cores. The wall's time of a step then says how the system schedules, the thread's own time what the step
-//! does; both are counted. Now and then a saved copy of the world takes the same step in as many parts with as much work as those can have.
+//! The processor is shared with as many idle loops as it has cores. The wall time of a step then measures the
+//! scheduling, the thread's own time the step itself; both are counted. Now and then a saved copy of the world takes the
+//! same step in the same number of parts, with the largest budget of work that they allow.
 
 use std::fmt::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,19 +13,19 @@ use sinew::{Model, Solver, World};
 
 use super::{FRAME, Scene, Times, clock};
 
-/// How much later than asked for a step is to be counted as late.
+/// A step is late if it takes longer than the deadline times this factor.
 const LATE: f64 = 1.05;
 
-/// How many steps are compared with their solutions.
+/// Number of steps that are compared with their solutions.
 const COMPARED: u32 = 50;
 
-/// In so many units of work a step is taken in one part more.
-const PER_PART: u32 = 20;
+/// Each `PER_PART` units of work add one part to a step.
+const WORK_PER_PART: u32 = 20;
 
-/// Steps until the pace is known and the ball is in contact.
-const FIRST: u32 = 60;
+/// Warm-up steps, until the pace is known and the ball is in contact.
+const WARM_UP: u32 = 60;
 
-/// How often an error is no larger than its bound, and how many times as large the bound is.
+/// How often an error is within its bound, and the ratios of bound to error.
 #[derive(Default)]
 struct Bounds {
     covered: u32,
@@ -46,7 +47,7 @@ impl Bounds {
     }
 }
 
-/// What a step left: where nodes are and what the ball feels.
+/// The state after a step: positions of nodes and the force on the ball.
 fn state(scene: &Scene, world: &World) -> (Vec<Vec3>, Vec3) {
     let positions = world.body(scene.body).expect("the body").positions().to_vec();
     (positions, world.wrench(scene.ball).expect("the ball").0)
@@ -56,8 +57,8 @@ pub fn run(report: &mut String, mesh: &Mesh, steps: u32) {
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
     let _ = writeln!(
         report,
-        "## Steps with a deadline\n\n{} nodes, {} tetrahedra, {steps} steps of 1/60 s each, one thread beside {cores} that never rest. Late: more than 5 % after the \
-         deadline, by the wall's clock and by the thread's own. Error: of {COMPARED} steps, against the same step with as much work as its parts can have, whose own bound is added.\n\n\
+        "## Steps with a deadline\n\n{} nodes, {} tetrahedra, {steps} steps of 1/60 s each, one thread beside {cores} busy threads. Late: more than 5 % after the \
+         deadline, in wall time and in the thread's own time. Error: of {COMPARED} steps, against the same step in as many parts with the largest budget of work, whose own bound is added.\n\n\
          | body | deadline, ms | wall, of the deadline: p50 | p99 | p99.9 | most | late, % | late by own time, % | behind at most, s | error in position within \
          its bound, % | bound over error, median | in the ball's force, % | median |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|",
         mesh.positions.len(),
@@ -87,58 +88,59 @@ pub fn run(report: &mut String, mesh: &Mesh, steps: u32) {
 }
 
 fn row(report: &mut String, mut scene: Scene, steps: u32, deadline: f64, name: &str) {
-    let (mut walls, mut late, mut own, mut behind) = (Vec::new(), 0, 0, 0.0_f64);
-    let (mut in_place, mut in_force) = (Bounds::default(), Bounds::default());
-    for step in 0..FIRST + steps {
-        let place = Scene::place(scene.touch, (step + 1) as f32 * FRAME);
-        let is_compared = step >= FIRST && step % (steps / COMPARED).max(1) == 0;
+    let (mut walls, mut late, mut late_by_own_time, mut behind) = (Vec::new(), 0, 0, 0.0_f64);
+    let (mut position_bounds, mut force_bounds) = (Bounds::default(), Bounds::default());
+    for step in 0..WARM_UP + steps {
+        let commanded = Scene::ball_position(scene.touch, (step + 1) as f32 * FRAME);
+        let is_compared = step >= WARM_UP && step % (steps / COMPARED).max(1) == 0;
         let saved = is_compared.then(|| scene.world.save().expect("a snapshot"));
-        scene.world.set_pose(scene.ball, place, None).expect("a pose");
+        scene.world.set_pose(scene.ball, commanded, None).expect("a pose");
         let mut done = None;
-        let took = clock::time(|| done = Some(scene.world.step_within(FRAME, deadline).expect("a step")));
+        let elapsed = clock::time(|| done = Some(scene.world.step_within(FRAME, deadline).expect("a step")));
         let done = done.expect("a step");
-        if step < FIRST {
+        if step < WARM_UP {
             continue;
         }
-        walls.push(took.wall / deadline);
-        late += u32::from(took.wall > LATE * deadline);
-        own += u32::from(took.processor > LATE * deadline);
+        walls.push(elapsed.wall / deadline);
+        late += u32::from(elapsed.wall > LATE * deadline);
+        late_by_own_time += u32::from(elapsed.processor > LATE * deadline);
         behind = behind.max(done.lag);
         if let Some(saved) = saved
             && done.lag == 0.0
             && done.error > 0.0
         {
             let mut solved = World::load(&saved, 1, None).expect("a world");
-            solved.set_pose(scene.ball, place, None).expect("a pose");
+            solved.set_pose(scene.ball, commanded, None).expect("a pose");
             let more = solved
-                .step_with_budget(FRAME, done.work / PER_PART * PER_PART + PER_PART - 1)
+                .step_with_budget(FRAME, done.work / WORK_PER_PART * WORK_PER_PART + WORK_PER_PART - 1)
                 .expect("a step");
-            let ((places, force), (right, right_force)) = (state(&scene, &scene.world), state(&scene, &solved));
+            let ((positions, force), (reference, reference_force)) =
+                (state(&scene, &scene.world), state(&scene, &solved));
             let body = scene.world.body(scene.body).expect("the body");
             let [mut sum, mut all] = [0.0; 2];
-            for (node, (place, right)) in (0..).zip(places.iter().zip(&right)) {
+            for (node, (position, reference)) in (0..).zip(positions.iter().zip(&reference)) {
                 let mass = f64::from(body.node_mass(node).expect("a node"));
-                sum += mass * f64::from(place.distance_squared(*right));
+                sum += mass * f64::from(position.distance_squared(*reference));
                 all += mass;
             }
             let error = (sum / all).sqrt();
-            in_place.take(f64::from(done.error) + f64::from(more.error), error);
+            position_bounds.take(f64::from(done.error) + f64::from(more.error), error);
             let bound = [&scene.world, &solved].map(|world| world.force_error(scene.ball).expect("the ball"));
-            in_force.take(
+            force_bounds.take(
                 bound.map(f64::from).iter().sum(),
-                f64::from(force.distance(right_force)),
+                f64::from(force.distance(reference_force)),
             );
         }
     }
-    let part = |count: u32| 100.0 * f64::from(count) / f64::from(steps);
+    let percentage = |count: u32| 100.0 * f64::from(count) / f64::from(steps);
     let line = format!(
         "| {name} | {:.0} | {} | {:.3} | {:.3} | {behind:.3} | {} | {} |",
         1e3 * deadline,
         Times(walls).row(),
-        part(late),
-        part(own),
-        in_place.cells(),
-        in_force.cells(),
+        percentage(late),
+        percentage(late_by_own_time),
+        position_bounds.cells(),
+        force_bounds.cells(),
     );
     eprintln!("{line}");
     report.push_str(&line);

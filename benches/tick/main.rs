@@ -1,8 +1,9 @@
-//! A kilohertz hand: a step in each tick, and steps of a frame beside the ticks of a handle.
+//! Haptic rates: a step in each 1 ms tick, and simulation frames beside the ticks of a haptic handle.
 //!
-//! `cargo bench --bench tick` (ten minutes; `-- --quick`: one; `-- --deadlines 1000000`: so many steps with deadlines alone) writes `target/report/tick.md`. A ball presses into an organ of tissue
-//! (E 5 kPa) by 5 mm and slides there, and each millisecond a step is taken: how much of the processor's time steps take, and how many of them end late, beside a
-//! loop that does nothing. Then larger organs are stepped at 60 Hz by two threads while a third ticks a handle a thousand times a second.
+//! `cargo bench --bench tick` (ten minutes; `-- --quick`: one; `-- --deadlines 1000000`: only this many steps with
+//! deadlines) writes `target/report/tick.md`. A ball presses 5 mm into an organ of tissue (E 5 kPa) and slides there,
+//! with a step in each millisecond. It reports the processor time of steps and the number of late steps, beside that of
+//! an empty loop. Then two threads step larger organs at 60 Hz while a third ticks a handle a thousand times a second.
 #![allow(clippy::print_stderr)]
 
 #[path = "../storage/clock.rs"]
@@ -23,37 +24,37 @@ use sinew::{
     World, WorldDefinition,
 };
 
-/// Of the ball, m, how deep it presses, and how far it slides.
+/// Radius of the ball, its depth, and its sliding distance [m].
 const RADIUS: f32 = 0.01;
 const DEPTH: f32 = 0.005;
 const SLIDE: f32 = 0.005;
 
-/// s
+/// Durations of a tick and a frame [s].
 const TICK: f32 = 1e-3;
 const FRAME: f32 = 1.0 / 60.0;
 
-/// What is timed, as it is asked for in a row of its report.
+/// Measured times, in the unit of their row in the report.
 struct Times(Vec<f64>);
 
 impl Times {
-    /// The value that this part of them does not exceed, in the unit that they are in.
-    fn quantile(&self, part: f64) -> f64 {
+    /// The value that this fraction of the times does not exceed, in their unit.
+    fn quantile(&self, fraction: f64) -> f64 {
         let mut sorted = self.0.clone();
         sorted.sort_by(f64::total_cmp);
-        let place = (part * sorted.len() as f64) as usize;
+        let index = (fraction * sorted.len() as f64) as usize;
         sorted
-            .get(place.min(sorted.len().saturating_sub(1)))
+            .get(index.min(sorted.len().saturating_sub(1)))
             .copied()
             .unwrap_or(0.0)
     }
 
     fn row(&self) -> String {
-        let [half, most, nearly_all, all] = [0.5, 0.99, 0.999, 1.0].map(|part| self.quantile(part));
-        format!("{half:.3} | {most:.3} | {nearly_all:.3} | {all:.3}")
+        let [p50, p99, p999, all] = [0.5, 0.99, 0.999, 1.0].map(|fraction| self.quantile(fraction));
+        format!("{p50:.3} | {p99:.3} | {p999:.3} | {all:.3}")
     }
 }
 
-/// A stomach where there is one, else a filled organ of as many nodes.
+/// A stomach if its file exists, otherwise a generated organ with about as many nodes.
 fn stomach() -> Mesh {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes/stomach.msh");
     match load(&path, MeshFormat::Auto, 1e-3) {
@@ -62,32 +63,36 @@ fn stomach() -> Mesh {
     }
 }
 
-/// Places with the shortest side upright, on the ground, about the middle; and how high they are, m.
-fn lying(places: &[Vec3]) -> (Vec<Vec3>, f32) {
-    let (low, high) = { places.iter() }.fold((Vec3::MAX, Vec3::MIN), |(low, high), place| {
-        (low.min(*place), high.max(*place))
+/// Rotates positions so that the shortest side is vertical, and centers them on the ground. Returns them and their
+/// height [m].
+fn laid_flat(positions: &[Vec3]) -> (Vec<Vec3>, f32) {
+    let (low, high) = { positions.iter() }.fold((Vec3::MAX, Vec3::MIN), |(low, high), position| {
+        (low.min(*position), high.max(*position))
     });
     let size = high - low;
-    let turned = |place: Vec3| match size.min_position() {
-        0 => Vec3::new(place.y, place.x, -place.z),
-        1 => place,
-        _ => Vec3::new(place.x, place.z, -place.y),
+    let turned = |point: Vec3| match size.min_position() {
+        0 => Vec3::new(point.y, point.x, -point.z),
+        1 => point,
+        _ => Vec3::new(point.x, point.z, -point.y),
     };
     let middle = turned(0.5 * (low + high));
     let height = size.min_element();
     let ground = middle.with_y(middle.y - 0.5 * height);
-    (places.iter().map(|place| turned(*place) - ground).collect(), height)
+    (
+        positions.iter().map(|position| turned(*position) - ground).collect(),
+        height,
+    )
 }
 
-/// What it is made of, how it is stepped, and what part of its mass may be added.
+/// The model of the tissue, its solver, and its mass scaling.
 type Tissue = (Model, Solver, f32);
 
-/// An organ and a ball that stands on its highest point.
+/// An organ and a ball on its highest point.
 struct Scene {
     world: World,
     body: BodyId,
     ball: ToolId,
-    /// Where the ball first touches.
+    /// The first contact point of the ball.
     touch: Vec3,
 }
 
@@ -100,11 +105,11 @@ impl Scene {
             ..WorldDefinition::default()
         })
         .expect("a world");
-        let (places, height) = lying(&mesh.positions);
+        let (positions, height) = laid_flat(&mesh.positions);
         let node_mass = 1060.0 * mesh.volume().expect("a volume") as f32 / mesh.positions.len() as f32;
         let body = world
             .create_body(&BodyDefinition {
-                positions: &places,
+                positions: &positions,
                 tetrahedra: &mesh.tetrahedra,
                 material: Some(Material {
                     model,
@@ -119,16 +124,18 @@ impl Scene {
                 ..BodyDefinition::default()
             })
             .expect("a body");
-        // It lies on its lowest tenth, and is touched on top of its middle.
-        let is_low = |place: &Vec3| place.y < 0.1 * height;
+        // The lowest tenth is pinned; the ball touches the top of the middle.
+        let is_low = |position: &Vec3| position.y < 0.1 * height;
         for node in (0..)
-            .zip(&places)
-            .filter(|(_, place)| is_low(place))
+            .zip(&positions)
+            .filter(|(_, position)| is_low(position))
             .map(|(node, _)| node)
         {
             world.body_mut(body).expect("the body").pin(node).expect("a pin");
         }
-        let in_the_middle = places.iter().filter(|place| place.with_y(0.0).length() < RADIUS);
+        let in_the_middle = positions
+            .iter()
+            .filter(|position| position.with_y(0.0).length() < RADIUS);
         let touch = in_the_middle.max_by(|one, other| one.y.total_cmp(&other.y));
         let touch = *touch.expect("a node in the middle");
         let ball = ToolDefinition {
@@ -147,14 +154,15 @@ impl Scene {
         }
     }
 
-    /// Where the ball is after so many seconds.
-    fn place(touch: Vec3, time: f32) -> Vec3 {
+    /// The commanded position of the ball at a time [s].
+    fn ball_position(touch: Vec3, time: f32) -> Vec3 {
         let press = 0.5 - 0.5 * (std::f32::consts::TAU * time).cos();
         touch + Vec3::new(SLIDE * (4.0 * time).sin(), RADIUS - DEPTH * press, 0.0)
     }
 }
 
-/// Does `work` each millisecond, so many times: how much of the processor each took, ms, and how often it ended after its millisecond.
+/// Calls `work` each millisecond, `count` times. Returns the processor times [ms], and how often it ended after its
+/// millisecond.
 fn paced(count: u32, mut work: impl FnMut(u32)) -> (Times, u32) {
     let (mut times, mut late) = (Vec::new(), 0);
     let mut due = Instant::now();
@@ -172,12 +180,12 @@ fn paced(count: u32, mut work: impl FnMut(u32)) -> (Times, u32) {
     (Times(times), late)
 }
 
-/// A step in each tick.
+/// Measures a step in each tick.
 fn step_in_the_tick(report: &mut String, ticks: u32) {
     let mesh = stomach();
     let _ = writeln!(
         report,
-        "## A step in each tick\n\n{} nodes, {} tetrahedra, {ticks} ticks, one thread; a loop that did nothing was late {} times.\n\n\
+        "## A step in each tick\n\n{} nodes, {} tetrahedra, {ticks} ticks, one thread; an empty loop was late {} times.\n\n\
          | body | processor's time of a step, ms: p50 | p99 | p99.9 | most | late | substeps | force at most, N |\n|---|---|---|---|---|---|---|---|",
         mesh.positions.len(),
         mesh.tetrahedra.len(),
@@ -201,8 +209,8 @@ fn step_in_the_tick(report: &mut String, ticks: u32) {
         } = Scene::new(&mesh, tissue, 1);
         let (mut substeps, mut force) = (0, 0.0_f32);
         let (times, late) = paced(ticks, |tick| {
-            let place = Scene::place(touch, (tick + 1) as f32 * TICK);
-            world.set_pose(ball, place, None).expect("a pose");
+            let commanded = Scene::ball_position(touch, (tick + 1) as f32 * TICK);
+            world.set_pose(ball, commanded, None).expect("a pose");
             substeps = world.step(TICK).expect("a step").substeps.max(substeps);
             force = force.max(world.wrench(ball).expect("the ball").0.length());
         });
@@ -216,11 +224,11 @@ fn step_in_the_tick(report: &mut String, ticks: u32) {
     report.push('\n');
 }
 
-/// Frames beside the ticks of a handle.
-fn frames_beside_a_hand(report: &mut String, frames: u32) {
+/// Measures frames beside the ticks of a handle.
+fn frames_beside_a_handle(report: &mut String, frames: u32) {
     let _ = writeln!(
         report,
-        "## Frames of 1/60 s beside a hand of 1 kHz\n\nTwo threads step, a third ticks a handle.\n\n\
+        "## Frames of 1/60 s beside a haptic device of 1 kHz\n\nTwo threads step, a third ticks a handle.\n\n\
          | body | nodes | wall time of a frame, ms: p50 | p99 | p99.9 | most | late | substeps | of real time | a tick, us: p50 | p99 | p99.9 | most |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|---|"
     );
@@ -245,7 +253,7 @@ fn frames_beside_a_hand(report: &mut String, frames: u32) {
         let is_over = AtomicBool::new(false);
         let (mut walls, mut substeps) = (Vec::new(), 0);
         let ticks = std::thread::scope(|scope| {
-            let hand = scope.spawn(|| {
+            let device = scope.spawn(|| {
                 let mut ticks = Vec::new();
                 let start = Instant::now();
                 let mut due = start;
@@ -253,25 +261,25 @@ fn frames_beside_a_hand(report: &mut String, frames: u32) {
                     due += Duration::from_secs_f32(TICK);
                     std::thread::sleep(due.saturating_duration_since(Instant::now()));
                     let pose = Pose {
-                        position: Scene::place(touch, start.elapsed().as_secs_f32()),
+                        position: Scene::ball_position(touch, start.elapsed().as_secs_f32()),
                         ..Pose::IDENTITY
                     };
-                    let took = clock::time(|| {
+                    let elapsed = clock::time(|| {
                         std::hint::black_box(handle.tick(pose, None, None, TICK).expect("a pose"));
                     });
-                    ticks.push(1e6 * took.processor);
+                    ticks.push(1e6 * elapsed.processor);
                 }
                 Times(ticks)
             });
             for _ in 0..frames {
-                let begun = Instant::now();
+                let start = Instant::now();
                 substeps = world.step(FRAME).expect("a step").substeps.max(substeps);
-                let took = begun.elapsed();
-                walls.push(1e3 * took.as_secs_f64());
-                std::thread::sleep(Duration::from_secs_f32(FRAME).saturating_sub(took));
+                let elapsed = start.elapsed();
+                walls.push(1e3 * elapsed.as_secs_f64());
+                std::thread::sleep(Duration::from_secs_f32(FRAME).saturating_sub(elapsed));
             }
             is_over.store(true, Ordering::Relaxed);
-            hand.join().expect("the hand")
+            device.join().expect("the device thread")
         });
         let late = walls.iter().filter(|&&wall| wall > 1e3 * f64::from(FRAME)).count();
         let share = walls.iter().sum::<f64>() / (1e3 * f64::from(frames) * f64::from(FRAME));
@@ -296,10 +304,10 @@ fn main() -> ExitCode {
         .nth(1);
     let deadlines = deadlines.map(|count| count.parse().expect("--deadlines: a number of steps"));
     let (ticks, frames) = if is_quick { (1_000, 60) } else { (10_000, 600) };
-    let mut report = String::from("# A kilohertz hand\n\n");
+    let mut report = String::from("# Haptic rendering at 1 kHz\n\n");
     if deadlines.is_none() {
         step_in_the_tick(&mut report, ticks);
-        frames_beside_a_hand(&mut report, frames);
+        frames_beside_a_handle(&mut report, frames);
     }
     deadline::run(&mut report, &stomach(), deadlines.unwrap_or(ticks));
     eprintln!("{report}");

@@ -1,8 +1,9 @@
-//! What contact costs: whole scenes with a tool and without, and tissue with contact and without, in one run.
+//! The cost of contact: scenes with a tool and without, and tissue with contact and without, in one run.
 //!
-//! `cargo bench --bench touch [-- --quick] [-- --only NAME]` writes `target/report/touch.md`. A row steps the same body twice, frame by frame
-//! of 1/60 s: once beside a tool, once without one. It reports processor time per frame (one thread), their ratio, the slowest frame, the
-//! deepest penetration of nodes and of the middles of faces, and the force on the tools. `tissue.rs` has the second group of rows.
+//! `cargo bench --bench touch [-- --quick] [-- --only NAME]` writes `target/report/touch.md`. A row steps the same body
+//! twice, frame by frame of 1/60 s: once with a tool, once without. It reports processor time per frame (one thread),
+//! their ratio and the slowest frame. It also reports the deepest penetration of nodes and of centers of faces, and the
+//! force on the tools. `tissue.rs` has the second group of rows.
 #![allow(clippy::print_stderr)]
 
 #[path = "../storage/clock.rs"]
@@ -18,7 +19,7 @@ use std::process::ExitCode;
 use scene::Scene;
 use scenes::SCENES;
 
-/// Times of the frames of a run, ms, in order of size.
+/// Frame times of a run [ms], sorted.
 struct Frames(Vec<f64>);
 
 impl Frames {
@@ -36,43 +37,43 @@ impl Frames {
     }
 }
 
-/// What a run with a tool showed.
+/// The results of a run with a tool.
 #[derive(Default)]
-struct Shown {
-    /// m
+struct ToolResult {
+    /// Deepest penetration of nodes and of face centers [m].
     nodes_inside: f64,
     faces_inside: f64,
-    /// N, mean over the last quarter, and the largest change from frame to frame there.
+    /// Mean force over the last quarter, and its largest change between frames [N].
     force: f64,
     jump: f64,
     substeps: u32,
 }
 
-/// Steps a scene: times of its frames once the tool touches, and what it showed.
-fn run(mut scene: Scene, frames: usize, from: usize) -> Result<(Frames, Shown), sinew::Error> {
-    let (mut times, mut shown) = (Vec::new(), Shown::default());
+/// Steps a scene. Returns the frame times from the first contact on, and the results.
+fn run(mut scene: Scene, frames: usize, from: usize) -> Result<(Frames, ToolResult), sinew::Error> {
+    let (mut times, mut outcome) = (Vec::new(), ToolResult::default());
     let mut forces: Vec<f64> = Vec::new();
     for frame in 0..frames {
         scene.act(frame)?;
         let mut result = Ok(());
-        let elapsed = clock::time(|| result = scene.step().map(|substeps| shown.substeps = substeps));
+        let elapsed = clock::time(|| result = scene.step().map(|substeps| outcome.substeps = substeps));
         result?;
         if frame >= from {
             times.push(1e3 * elapsed.processor);
             let [nodes, faces] = scene.deepest();
-            shown.nodes_inside = shown.nodes_inside.max(nodes);
-            shown.faces_inside = shown.faces_inside.max(faces);
+            outcome.nodes_inside = outcome.nodes_inside.max(nodes);
+            outcome.faces_inside = outcome.faces_inside.max(faces);
         }
         if frame >= frames - frames / 4 {
             forces.push(scene.force());
         }
     }
-    shown.force = forces.iter().sum::<f64>() / forces.len().max(1) as f64;
-    shown.jump = forces
+    outcome.force = forces.iter().sum::<f64>() / forces.len().max(1) as f64;
+    outcome.jump = forces
         .windows(2)
         .map(|pair| (pair[1] - pair[0]).abs())
         .fold(0.0, f64::max);
-    Ok((Frames::new(times), shown))
+    Ok((Frames::new(times), outcome))
 }
 
 fn main() -> ExitCode {
@@ -83,7 +84,7 @@ fn main() -> ExitCode {
     let is_quick = arguments.iter().any(|argument| argument == "--quick");
     let only = arguments.iter().position(|argument| argument == "--only");
     let only = only
-        .and_then(|place| arguments.get(place + 1))
+        .and_then(|index| arguments.get(index + 1))
         .cloned()
         .unwrap_or_default();
     let mut report = String::from(
@@ -95,7 +96,7 @@ fn main() -> ExitCode {
         let frames = if is_quick { frames / 4 + touches } else { *frames };
         let row = (|| {
             let (without, alone) = run(make(false)?, frames, *touches)?;
-            let (with, shown) = run(make(true)?, frames, *touches)?;
+            let (with, outcome) = run(make(true)?, frames, *touches)?;
             Ok::<_, sinew::Error>(format!(
                 "| {name} | {:.3} | {:.3} | {:.1} | {:.3} | {} / {} | {:.3} | {:.3} | {:.4} | {:.1e} |",
                 without.median(),
@@ -103,11 +104,11 @@ fn main() -> ExitCode {
                 with.median() / without.median(),
                 with.slowest(),
                 alone.substeps,
-                shown.substeps,
-                1e3 * shown.nodes_inside,
-                1e3 * shown.faces_inside,
-                shown.force,
-                shown.jump,
+                outcome.substeps,
+                1e3 * outcome.nodes_inside,
+                1e3 * outcome.faces_inside,
+                outcome.force,
+                outcome.jump,
             ))
         })();
         let row = row.unwrap_or_else(|error| format!("| {name} | refused: {error} |"));

@@ -1,14 +1,14 @@
-//! A body and perhaps tools that touch it.
+//! A body and optional tools that touch it.
 
 use glam::{Quat, Vec3};
 use sinew::{BodyId, Error, Pose, Shape, ToolDefinition, ToolId, World, WorldDefinition};
 
-/// s
+/// Duration of a frame [s].
 pub const FRAME: f32 = 1.0 / 60.0;
 
-/// A tool, and its pose at a frame.
-pub struct Hand {
-    pub tool: ToolId,
+/// A tool and its pose at each frame.
+pub struct MovingTool {
+    pub id: ToolId,
     pub pose: fn(usize) -> Pose,
     /// For depths: the radius of a ball or capsule and half the length of its axis; `None` for a mesh.
     pub rounded: Option<(f32, f32)>,
@@ -18,11 +18,11 @@ pub struct Scene {
     pub world: World,
     pub body: BodyId,
     pub triangles: Vec<[u32; 3]>,
-    pub hands: Vec<Hand>,
+    pub tools: Vec<MovingTool>,
 }
 
 impl Scene {
-    /// A world of one thread.
+    /// Creates a world with one thread.
     pub fn world(gravity: f32) -> Result<World, Error> {
         World::new(WorldDefinition {
             gravity: Vec3::NEG_Y * gravity,
@@ -33,26 +33,26 @@ impl Scene {
     }
 
     /// Adds a tool with this motion.
-    pub fn hold(&mut self, shape: Shape, friction: f32, pose: fn(usize) -> Pose) -> Result<(), Error> {
+    pub fn add_tool(&mut self, shape: Shape, friction: f32, pose: fn(usize) -> Pose) -> Result<(), Error> {
         let rounded = match shape {
             Shape::Sphere { radius } => Some((radius, 0.0)),
             Shape::Capsule { radius, half_length } => Some((radius, half_length)),
             _ => None,
         };
-        let tool = self.world.create_tool(&ToolDefinition {
+        let id = self.world.create_tool(&ToolDefinition {
             friction,
             pose: pose(0),
             ..ToolDefinition::new(shape)
         })?;
-        self.hands.push(Hand { tool, pose, rounded });
+        self.tools.push(MovingTool { id, pose, rounded });
         Ok(())
     }
 
-    /// Sends the tools on.
+    /// Sets the next poses of the tools.
     pub fn act(&mut self, frame: usize) -> Result<(), Error> {
-        for hand in &self.hands {
-            let pose = (hand.pose)(frame + 1);
-            self.world.set_pose(hand.tool, pose.position, Some(pose.orientation))?;
+        for tool in &self.tools {
+            let pose = (tool.pose)(frame + 1);
+            self.world.set_pose(tool.id, pose.position, Some(pose.orientation))?;
         }
         Ok(())
     }
@@ -61,30 +61,30 @@ impl Scene {
         Ok(self.world.step(FRAME)?.substeps)
     }
 
-    /// The forces on all tools together, N.
+    /// The sum of the forces on all tools [N].
     pub fn force(&self) -> f64 {
         let forces = self
-            .hands
+            .tools
             .iter()
-            .map(|hand| self.world.wrench(hand.tool).map_or(Vec3::ZERO, |wrench| wrench.0));
+            .map(|tool| self.world.wrench(tool.id).map_or(Vec3::ZERO, |wrench| wrench.0));
         forces.map(|force| f64::from(force.length())).sum()
     }
 
-    /// How deep nodes are within round tools, and middles of faces, m.
+    /// The largest depth of nodes and of face centers in round tools [m].
     pub fn deepest(&self) -> [f64; 2] {
         let mut deepest = [0.0_f64; 2];
         let Ok(body) = self.world.body(self.body) else {
             return deepest;
         };
         let positions: Vec<Vec3> = body.positions().to_vec();
-        for hand in &self.hands {
-            let (Some((radius, half_length)), Ok(pose)) = (hand.rounded, self.world.pose(hand.tool)) else {
+        for tool in &self.tools {
+            let (Some((radius, half_length)), Ok(pose)) = (tool.rounded, self.world.pose(tool.id)) else {
                 continue;
             };
             let depth = |point: Vec3| {
-                let own = pose.orientation.conjugate() * (point - pose.position);
-                let axis = Vec3::Y * own.y.clamp(-half_length, half_length);
-                f64::from(radius - own.distance(axis))
+                let local = pose.orientation.conjugate() * (point - pose.position);
+                let axis = Vec3::Y * local.y.clamp(-half_length, half_length);
+                f64::from(radius - local.distance(axis))
             };
             for &point in &positions {
                 deepest[0] = deepest[0].max(depth(point));
@@ -98,7 +98,7 @@ impl Scene {
     }
 }
 
-/// Upright at a point.
+/// The identity orientation at a point.
 pub fn at(position: Vec3) -> Pose {
     Pose {
         position,
@@ -106,7 +106,7 @@ pub fn at(position: Vec3) -> Pose {
     }
 }
 
-/// Turned about an axis at a point.
+/// A rotation about an axis at a point.
 pub fn turned(position: Vec3, axis: Vec3, angle: f32) -> Pose {
     Pose {
         position,
@@ -114,8 +114,8 @@ pub fn turned(position: Vec3, axis: Vec3, angle: f32) -> Pose {
     }
 }
 
-/// From 0 to 1 within so many frames, smoothly.
+/// A smooth ramp from 0 to 1 within this many frames.
 pub fn ramp(frame: usize, frames: f32) -> f32 {
-    let part = (frame as f32 / frames).min(1.0);
-    part * part * (3.0 - 2.0 * part)
+    let fraction = (frame as f32 / frames).min(1.0);
+    fraction * fraction * (3.0 - 2.0 * fraction)
 }

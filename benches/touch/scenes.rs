@@ -9,7 +9,7 @@ use sinew::{BodyDefinition, Error, Material, Model, Pose, Shape, Solver, Values}
 
 use crate::scene::{Scene, at, ramp, turned};
 
-/// A scene with a tool or without, the frame from which the tool touches, and how many frames there are.
+/// A scene with or without a tool, the frame of the first contact, and the number of frames.
 pub type Row = (&'static str, fn(bool) -> Result<Scene, Error>, usize, usize);
 
 pub const SCENES: [Row; 18] = [
@@ -106,16 +106,16 @@ const TETRAHEDRA_16: Tissue = (Model::Tetrahedra, Solver::Implicit, 16);
 
 type Tools = fn(&mut Scene) -> Result<(), Error>;
 
-/// A cloth of 0.2 m whose rim is held: 100 N/m, 0.1 kg.
+/// A cloth of 0.2 m with a pinned border: 100 N/m, 0.1 kg.
 fn pressed(cells: u32, with: bool, tools: Tools) -> Result<Scene, Error> {
     let mesh = Mesh::cloth([0.2; 2], [cells; 2])?;
     let mut scene = cloth(mesh, Vec3::ZERO, 0.0)?;
-    let rim = scene.world.body(scene.body)?.positions().iter().enumerate();
-    let rim: Vec<u32> = rim
-        .filter(|(_, place)| place.x.abs().max(place.z.abs()) > 0.0999)
+    let border = scene.world.body(scene.body)?.positions().iter().enumerate();
+    let border: Vec<u32> = border
+        .filter(|(_, position)| position.x.abs().max(position.z.abs()) > 0.0999)
         .map(|(node, _)| node as u32)
         .collect();
-    for node in rim {
+    for node in border {
         scene.world.body_mut(scene.body)?.pin(node)?;
     }
     if with {
@@ -125,21 +125,21 @@ fn pressed(cells: u32, with: bool, tools: Tools) -> Result<Scene, Error> {
 }
 
 fn ball(scene: &mut Scene) -> Result<(), Error> {
-    scene.hold(Shape::Sphere { radius: 0.03 }, 0.0, |frame| {
+    scene.add_tool(Shape::Sphere { radius: 0.03 }, 0.0, |frame| {
         at(Vec3::Y * (0.03 - 0.04 * ramp(frame, 30.0)))
     })
 }
 
-/// It lies across the cloth, pressed 20 mm, and moves 60 mm aside.
+/// A capsule lies across the cloth, presses 20 mm and moves 60 mm aside.
 fn capsule(scene: &mut Scene) -> Result<(), Error> {
     let shape = Shape::Capsule {
         radius: 0.01,
         half_length: 0.03,
     };
-    scene.hold(shape, 0.3, |frame| {
+    scene.add_tool(shape, 0.3, |frame| {
         let aside = 0.03 - 0.06 * ramp(frame.saturating_sub(30), 60.0);
-        let place = Vec3::new(aside, 0.01 - 0.02 * ramp(frame, 30.0), 0.0);
-        turned(place, Vec3::X, std::f32::consts::FRAC_PI_2)
+        let position = Vec3::new(aside, 0.01 - 0.02 * ramp(frame, 30.0), 0.0);
+        turned(position, Vec3::X, std::f32::consts::FRAC_PI_2)
     })
 }
 
@@ -148,7 +148,7 @@ fn draped(cells: u32, with: bool) -> Result<Scene, Error> {
     let mesh = Mesh::cloth([0.2; 2], [cells; 2])?;
     let mut scene = cloth(mesh, Vec3::Y * 0.061, 9.81)?;
     if with {
-        scene.hold(Shape::Sphere { radius: 0.06 }, 0.5, |_| at(Vec3::ZERO))?;
+        scene.add_tool(Shape::Sphere { radius: 0.06 }, 0.5, |_| at(Vec3::ZERO))?;
     }
     Ok(scene)
 }
@@ -157,7 +157,11 @@ fn draped(cells: u32, with: bool) -> Result<Scene, Error> {
 fn on_a_mesh(cells: u32, with: bool) -> Result<Scene, Error> {
     let organ = Mesh::organ(0.12, 0.0029)?;
     let triangles = organ.surface()?;
-    let top = organ.positions.iter().map(|place| place.y).fold(f32::MIN, f32::max);
+    let top = organ
+        .positions
+        .iter()
+        .map(|position| position.y)
+        .fold(f32::MIN, f32::max);
     let mesh = Mesh::cloth([0.12; 2], [cells; 2])?;
     let middle = organ.positions.iter().sum::<Vec3>() / organ.positions.len() as f32;
     let mut scene = cloth(mesh, middle.with_y(top + 0.001), 9.81)?;
@@ -166,14 +170,14 @@ fn on_a_mesh(cells: u32, with: bool) -> Result<Scene, Error> {
             positions: &organ.positions,
             triangles: &triangles,
         };
-        scene.hold(shape, 0.5, |_| Pose::IDENTITY)?;
+        scene.add_tool(shape, 0.5, |_| Pose::IDENTITY)?;
     }
     Ok(scene)
 }
 
-fn cloth(mesh: Mesh, place: Vec3, gravity: f32) -> Result<Scene, Error> {
+fn cloth(mesh: Mesh, position: Vec3, gravity: f32) -> Result<Scene, Error> {
     let mut world = Scene::world(gravity)?;
-    let positions: Vec<Vec3> = mesh.positions.iter().map(|corner| *corner + place).collect();
+    let positions: Vec<Vec3> = mesh.positions.iter().map(|corner| *corner + position).collect();
     let mass = 0.1 / positions.len() as f32;
     let body = world.create_body(&BodyDefinition {
         positions: &positions,
@@ -187,15 +191,19 @@ fn cloth(mesh: Mesh, place: Vec3, gravity: f32) -> Result<Scene, Error> {
         world,
         body,
         triangles: mesh.triangles,
-        hands: Vec::new(),
+        tools: Vec::new(),
     })
 }
 
-/// An organ of 5.8K nodes and 23K tetrahedra that is held at one end.
+/// An organ of 5.8K nodes and 23K tetrahedra, fixed at one end.
 fn organ((model, solver, iterations): Tissue, with: bool, tools: Tools) -> Result<Scene, Error> {
     let mesh = Mesh::organ(0.2, 0.0074)?;
     let mut world = Scene::world(0.0)?;
-    let left = mesh.positions.iter().map(|place| place.x).fold(f32::MAX, f32::min);
+    let left = mesh
+        .positions
+        .iter()
+        .map(|position| position.x)
+        .fold(f32::MAX, f32::min);
     let body = world.create_body(&BodyDefinition {
         positions: &mesh.positions,
         tetrahedra: &mesh.tetrahedra,
@@ -211,8 +219,10 @@ fn organ((model, solver, iterations): Tissue, with: bool, tools: Tools) -> Resul
         mass_scaling: 1e-3,
         ..Default::default()
     })?;
-    let held = (0..).zip(&mesh.positions).filter(|(_, place)| place.x < left + 0.02);
-    for (node, _) in held {
+    let pinned = (0..)
+        .zip(&mesh.positions)
+        .filter(|(_, position)| position.x < left + 0.02);
+    for (node, _) in pinned {
         world.body_mut(body)?.pin(node)?;
     }
     let triangles = world.body(body)?.surface().to_vec();
@@ -220,7 +230,7 @@ fn organ((model, solver, iterations): Tissue, with: bool, tools: Tools) -> Resul
         world,
         body,
         triangles,
-        hands: Vec::new(),
+        tools: Vec::new(),
     };
     if with {
         tools(&mut scene)?;
@@ -228,7 +238,7 @@ fn organ((model, solver, iterations): Tissue, with: bool, tools: Tools) -> Resul
     Ok(scene)
 }
 
-/// The highest point of the organ near its middle, m.
+/// The highest point of the organ near its middle, shifted by `along` [m].
 fn top(along: f32) -> Vec3 {
     static ORGAN: OnceLock<Mesh> = OnceLock::new();
     let mesh = ORGAN.get_or_init(|| Mesh::organ(0.2, 0.0074).expect("an organ"));
@@ -236,13 +246,13 @@ fn top(along: f32) -> Vec3 {
     let near = mesh
         .positions
         .iter()
-        .filter(|place| (place.x - middle.x - along).abs() < 0.008 && (place.z - middle.z).abs() < 0.008);
+        .filter(|position| (position.x - middle.x - along).abs() < 0.008 && (position.z - middle.z).abs() < 0.008);
     *near.max_by(|a, b| a.y.total_cmp(&b.y)).expect("a node")
 }
 
 /// A ball of 8 mm, 6 mm deep.
 fn one_ball(scene: &mut Scene) -> Result<(), Error> {
-    scene.hold(Shape::Sphere { radius: 0.008 }, 0.0, |frame| {
+    scene.add_tool(Shape::Sphere { radius: 0.008 }, 0.0, |frame| {
         at(top(0.0) + Vec3::Y * (0.008 - 0.006 * ramp(frame, 20.0)))
     })
 }
@@ -252,7 +262,7 @@ fn needle(scene: &mut Scene) -> Result<(), Error> {
         radius: 0.0005,
         half_length: 0.03,
     };
-    scene.hold(shape, 0.2, |frame| {
+    scene.add_tool(shape, 0.2, |frame| {
         at(top(0.0) + Vec3::Y * (0.0305 - 0.004 * ramp(frame, 20.0)))
     })
 }
@@ -272,7 +282,7 @@ fn ten_balls(scene: &mut Scene) -> Result<(), Error> {
     ];
     POSES
         .into_iter()
-        .try_for_each(|pose| scene.hold(Shape::Sphere { radius: 0.006 }, 0.2, pose))
+        .try_for_each(|pose| scene.add_tool(Shape::Sphere { radius: 0.006 }, 0.2, pose))
 }
 
 fn pressing(index: usize, frame: usize) -> Pose {
@@ -280,7 +290,7 @@ fn pressing(index: usize, frame: usize) -> Pose {
     at(top(along) + Vec3::Y * (0.006 - 0.004 * ramp(frame, 20.0)))
 }
 
-/// The jaw of a forceps, 5 mm deep; a block of its size where its file is missing.
+/// The jaw of a forceps, 5 mm deep; a block of its size if the file is missing.
 fn jaw(scene: &mut Scene) -> Result<(), Error> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes/forceps_jaw_left.stl");
     let mesh = match load(&path, MeshFormat::Auto, 1e-3) {
@@ -295,17 +305,17 @@ fn jaw(scene: &mut Scene) -> Result<(), Error> {
     let (low, high) = mesh
         .positions
         .iter()
-        .fold((Vec3::MAX, Vec3::MIN), |(low, high), place| {
-            (low.min(*place), high.max(*place))
+        .fold((Vec3::MAX, Vec3::MIN), |(low, high), position| {
+            (low.min(*position), high.max(*position))
         });
     let middle = (0.5 * (low + high)).with_y(low.y);
     let longest = (high - low).max_element();
     let positions: Vec<Vec3> = mesh
         .positions
         .iter()
-        .map(|place| (*place - middle) * (0.02 / longest))
+        .map(|position| (*position - middle) * (0.02 / longest))
         .collect();
-    scene.hold(
+    scene.add_tool(
         Shape::Mesh {
             positions: &positions,
             triangles: &triangles,

@@ -1,4 +1,4 @@
-//! Tissue against tissue, and with itself: the same bodies with contact and without.
+//! Tissue against tissue, and self-contact: the same bodies with contact and without.
 
 use std::fmt::Write;
 
@@ -13,8 +13,8 @@ use crate::Frames;
 use crate::clock;
 use crate::scene::{FRAME, Scene};
 
-/// A scene with contact or without, the first frame that is timed, and how many frames there are.
-type Row = (&'static str, fn(bool) -> Result<Crowd, Error>, usize, usize);
+/// A scene with or without contact, the first timed frame, and the number of frames.
+type Row = (&'static str, fn(bool) -> Result<Bodies, Error>, usize, usize);
 
 const SCENES: [Row; 15] = [
     (
@@ -55,23 +55,23 @@ const SCENES: [Row; 15] = [
 ];
 
 /// Bodies in a world.
-struct Crowd {
+struct Bodies {
     world: World,
     bodies: Vec<BodyId>,
 }
 
-/// What a run with contact showed.
+/// The results of a run with contact.
 #[derive(Default)]
-struct Shown {
+struct ContactResult {
     crossings: u32,
-    /// J, above the energy at the start; and the most kinetic and elastic energy there was.
+    /// Largest energy above that at the start, and largest kinetic and elastic energy [J].
     gain: f64,
     most: f64,
-    /// m
+    /// Deepest penetration [m].
     depth: f32,
 }
 
-impl Crowd {
+impl Bodies {
     fn new(gravity: f32) -> Result<Self, Error> {
         Ok(Self {
             world: Scene::world(gravity)?,
@@ -79,9 +79,9 @@ impl Crowd {
         })
     }
 
-    /// A body of a mesh moved to a place.
-    fn add(&mut self, mesh: &Mesh, place: Vec3, definition: &BodyDefinition) -> Result<BodyId, Error> {
-        let positions: Vec<Vec3> = mesh.positions.iter().map(|corner| *corner + place).collect();
+    /// Adds a body of a mesh at an offset.
+    fn add(&mut self, mesh: &Mesh, offset: Vec3, definition: &BodyDefinition) -> Result<BodyId, Error> {
+        let positions: Vec<Vec3> = mesh.positions.iter().map(|position| *position + offset).collect();
         let body = self.world.create_body(&BodyDefinition {
             positions: &positions,
             triangles: if mesh.tetrahedra.is_empty() && mesh.cells.is_empty() {
@@ -105,24 +105,24 @@ impl Crowd {
         Ok(())
     }
 
-    fn pin_where(&mut self, body: BodyId, is_held: impl Fn(Vec3) -> bool) -> Result<(), Error> {
+    fn pin_where(&mut self, body: BodyId, is_pinned: impl Fn(Vec3) -> bool) -> Result<(), Error> {
         let positions: Vec<Vec3> = self.world.body(body)?.positions().to_vec();
-        for (node, _) in (0..).zip(positions).filter(|&(_, place)| is_held(place)) {
+        for (node, _) in (0..).zip(positions).filter(|&(_, position)| is_pinned(position)) {
             self.world.body_mut(body)?.pin(node)?;
         }
         Ok(())
     }
 
-    /// Kinetic and elastic energy, and that with the gravitational, J.
+    /// Kinetic and elastic energy, and the total with gravitational energy [J].
     fn energy(&self) -> [f64; 2] {
         let energies = self.world.bodies().map(|body| body.energy(self.world.gravity()));
         energies.fold([0.0; 2], |[inner, all], energy| {
-            let own = energy.kinetic + energy.elastic;
-            [inner + own, all + own + energy.gravitational]
+            let internal = energy.kinetic + energy.elastic;
+            [inner + internal, all + internal + energy.gravitational]
         })
     }
 
-    /// How deep any surface node is within another closed body, m.
+    /// The largest depth of a surface node in another closed body [m].
     fn deepest(&self) -> Result<f32, Error> {
         let bodies: Result<Vec<_>, Error> = self.bodies.iter().map(|&id| self.world.body(id)).collect();
         let solids = bodies?.into_iter().filter(|body| body.is_closed());
@@ -140,9 +140,9 @@ impl Crowd {
             {
                 let within = positions
                     .iter()
-                    .filter(|place| place.cmpgt(*low).all() && place.cmplt(*high).all());
-                for &place in within {
-                    deepest = deepest.max(depth(place, corners, triangles));
+                    .filter(|position| position.cmpgt(*low).all() && position.cmplt(*high).all());
+                for &position in within {
+                    deepest = deepest.max(depth(position, corners, triangles));
                 }
             }
         }
@@ -150,7 +150,8 @@ impl Crowd {
     }
 }
 
-/// How deep a point is within a closed surface, m; 0 outside. By the solid angle of its triangles (van Oosterom, Strackee 1983).
+/// The depth of a point in a closed surface [m]; 0 outside. Uses the solid angle of its triangles (van Oosterom,
+/// Strackee 1983).
 fn depth(point: Vec3, corners: &[Vec3], triangles: &[[u32; 3]]) -> f32 {
     let (mut angle, mut nearest) = (0.0_f32, f32::INFINITY);
     for triangle in triangles {
@@ -170,7 +171,7 @@ fn depth(point: Vec3, corners: &[Vec3], triangles: &[[u32; 3]]) -> f32 {
     }
 }
 
-/// How far a triangle is from the origin.
+/// The distance of a triangle from the origin.
 fn distance(a: Vec3, b: Vec3, c: Vec3) -> f32 {
     let normal = (b - a).cross(c - a);
     let is_inside = |from: Vec3, to: Vec3| (to - from).cross(-from).dot(normal) >= 0.0;
@@ -179,61 +180,61 @@ fn distance(a: Vec3, b: Vec3, c: Vec3) -> f32 {
     }
     let to_edge = |from: Vec3, to: Vec3| {
         let edge = to - from;
-        let part = (-from.dot(edge) / edge.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (from + part * edge).length()
+        let fraction = (-from.dot(edge) / edge.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (from + fraction * edge).length()
     };
     to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
 }
 
-/// Steps a scene: times of its frames from one on, and what it showed.
-fn run(mut crowd: Crowd, frames: usize, from: usize) -> Result<(Frames, Shown), Error> {
-    let (mut times, mut shown) = (Vec::new(), Shown::default());
-    let start = crowd.energy()[1];
+/// Steps a scene. Returns the frame times from frame `from` on, and the results.
+fn run(mut bodies: Bodies, frames: usize, from: usize) -> Result<(Frames, ContactResult), Error> {
+    let (mut times, mut outcome) = (Vec::new(), ContactResult::default());
+    let start = bodies.energy()[1];
     for frame in 0..frames {
         let mut result = Ok(0);
-        let elapsed = clock::time(|| result = crowd.world.step(FRAME).map(|report| report.crossings));
-        shown.crossings = shown.crossings.max(result?);
-        let [inner, all] = crowd.energy();
-        shown.most = shown.most.max(inner);
-        shown.gain = shown.gain.max(all - start);
+        let elapsed = clock::time(|| result = bodies.world.step(FRAME).map(|report| report.crossings));
+        outcome.crossings = outcome.crossings.max(result?);
+        let [inner, all] = bodies.energy();
+        outcome.most = outcome.most.max(inner);
+        outcome.gain = outcome.gain.max(all - start);
         if frame >= from {
             times.push(1e3 * elapsed.processor);
         }
         if frame % 10 == 9 {
-            shown.depth = shown.depth.max(crowd.deepest()?);
+            outcome.depth = outcome.depth.max(bodies.deepest()?);
         }
     }
-    Ok((Frames::new(times), shown))
+    Ok((Frames::new(times), outcome))
 }
 
 /// Adds the rows to the report.
 pub fn report(report: &mut String, only: &str, is_quick: bool) {
     report.push_str(
-        "\n# Contact: tissue against tissue\n\nThe same bodies with `meets_bodies` or `meets_itself` and without. Energy gain: the largest rise of all energy over \
-         that at the start, and as a part of the most kinetic and elastic energy. Depth: of nodes within other closed bodies, every tenth frame.\n\n\
+        "\n# Contact: tissue against tissue\n\nThe same bodies with `meets_bodies` or `meets_itself` and without. Energy gain: the largest rise of the total energy over \
+         that at the start, and relative to the largest kinetic and elastic energy. Depth: of nodes within other closed bodies, every tenth frame.\n\n\
          | scene | without, ms | with contact, ms | ratio | slowest, ms | crossings | energy gain, mJ | gain, % | depth, mm |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     for (name, make, from, frames) in SCENES.iter().filter(|row| row.0.contains(only)) {
-        // What is at rest has to come to rest.
+        // Bodies that are timed at rest must first come to rest.
         let frames = if is_quick && *from < 100 {
             from + (frames - from) / 4
         } else {
             *frames
         };
         let row = (|| {
-            // What rests is compared with what moves.
+            // The frame times of resting bodies are compared with those of moving ones.
             let (without, _) = run(make(false)?, frames.min(120), *from.min(&20))?;
-            let (with, shown) = run(make(true)?, frames, *from)?;
+            let (with, outcome) = run(make(true)?, frames, *from)?;
             Ok::<_, Error>(format!(
                 "| {name} | {:.3} | {:.3} | {:.2} | {:.3} | {} | {:.4} | {:.4} | {:.3} |",
                 without.median(),
                 with.median(),
                 with.median() / without.median(),
                 with.slowest(),
-                shown.crossings,
-                1e3 * shown.gain,
-                100.0 * shown.gain / shown.most.max(f64::MIN_POSITIVE),
-                1e3 * shown.depth,
+                outcome.crossings,
+                1e3 * outcome.gain,
+                100.0 * outcome.gain / outcome.most.max(f64::MIN_POSITIVE),
+                1e3 * outcome.depth,
             ))
         })();
         let row = row.unwrap_or_else(|error| format!("| {name} | refused: {error} |"));
@@ -242,7 +243,7 @@ pub fn report(report: &mut String, only: &str, is_quick: bool) {
     }
 }
 
-fn meeting(with: bool, thickness: f32) -> BodyContact {
+fn contact(with: bool, thickness: f32) -> BodyContact {
     BodyContact {
         thickness,
         friction: 0.5,
@@ -261,32 +262,32 @@ fn soft(model: Model) -> Option<Material> {
     })
 }
 
-/// Blocks of 0.1 m one upon the other, 1 mm apart, on the ground; without contact they all stand on it.
-fn stacked(count: usize, solver: Solver, with: bool) -> Result<Crowd, Error> {
-    let mut crowd = Crowd::new(9.81)?;
+/// Blocks of 0.1 m stacked on the ground, 1 mm apart; without contact all of them rest on the ground.
+fn stacked(count: usize, solver: Solver, with: bool) -> Result<Bodies, Error> {
+    let mut bodies = Bodies::new(9.81)?;
     let mesh = Mesh::block([0.1; 3], [if count == 2 { 8 } else { 4 }; 3])?;
     let definition = BodyDefinition {
         material: soft(Model::Tetrahedra),
         node_dampings: Values::Uniform(2e-3),
-        contact: meeting(with, 1e-3),
+        contact: contact(with, 1e-3),
         solver,
         ..Default::default()
     };
-    crowd.ground()?;
-    for place in 0..count {
-        crowd.add(&mesh, Vec3::Y * (0.052 + 0.103 * place as f32), &definition)?;
+    bodies.ground()?;
+    for index in 0..count {
+        bodies.add(&mesh, Vec3::Y * (0.052 + 0.103 * index as f32), &definition)?;
     }
-    Ok(crowd)
+    Ok(bodies)
 }
 
 /// Blocks of 27 nodes and 40 mm fall into a bowl of four walls.
-fn heap(count: usize, with: bool) -> Result<Crowd, Error> {
-    let mut crowd = Crowd::new(9.81)?;
+fn heap(count: usize, with: bool) -> Result<Bodies, Error> {
+    let mut bodies = Bodies::new(9.81)?;
     let mesh = Mesh::block([0.04; 3], [2; 3])?;
     let definition = BodyDefinition {
         material: soft(Model::Tetrahedra),
         node_dampings: Values::Uniform(1e-2),
-        contact: meeting(with, 1e-3),
+        contact: contact(with, 1e-3),
         sleep: Sleep {
             speed: if with { 0.02 } else { 0.0 },
             time: 0.5,
@@ -294,7 +295,7 @@ fn heap(count: usize, with: bool) -> Result<Crowd, Error> {
         mass_scaling: 1e-3,
         ..Default::default()
     };
-    crowd.ground()?;
+    bodies.ground()?;
     let side = (count as f32 / 3.0).sqrt().ceil() as usize;
     let half = 0.025 * side as f32 + 0.02;
     for wall in [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z] {
@@ -303,54 +304,54 @@ fn heap(count: usize, with: bool) -> Result<Crowd, Error> {
         };
         let mut definition = ToolDefinition::new(shape);
         definition.pose.position = wall * (half + 0.02) + Vec3::Y * 0.5;
-        crowd.world.create_tool(&definition)?;
+        bodies.world.create_tool(&definition)?;
     }
     for index in 0..count {
-        let [x, z] = [index % side, index / side % side].map(|place| 0.05 * (place as f32 - 0.5 * (side as f32 - 1.0)));
+        let [x, z] = [index % side, index / side % side].map(|cell| 0.05 * (cell as f32 - 0.5 * (side as f32 - 1.0)));
         let layer = (index / side / side) as f32;
-        // Each layer stands askew on the one below.
+        // Each layer is offset against the one below.
         let askew = 0.008 * if (layer as usize).is_multiple_of(2) { 1.0 } else { -1.0 };
-        crowd.add(&mesh, Vec3::new(x + askew, 0.03 + 0.05 * layer, z - askew), &definition)?;
+        bodies.add(&mesh, Vec3::new(x + askew, 0.03 + 0.05 * layer, z - askew), &definition)?;
     }
-    Ok(crowd)
+    Ok(bodies)
 }
 
 /// Lattices of 27 nodes and 0.2 m, 0.1 m apart, all with one velocity.
-fn far(count: usize, speed: f32, with: bool) -> Result<Crowd, Error> {
-    let mut crowd = Crowd::new(0.0)?;
+fn far(count: usize, speed: f32, with: bool) -> Result<Bodies, Error> {
+    let mut bodies = Bodies::new(0.0)?;
     let mesh = Mesh::lattice(0.1, [2; 3])?;
     let side = (count as f32).cbrt().ceil() as usize;
     for index in 0..count {
         let cell = [index % side, index / side / side, index / side % side];
-        let body = crowd.add(
+        let body = bodies.add(
             &mesh,
-            0.3 * Vec3::from(cell.map(|place| place as f32)),
+            0.3 * Vec3::from(cell.map(|index| index as f32)),
             &BodyDefinition {
                 material: Some(Material {
                     young_modulus: 5e4,
                     density: 500.0,
                     ..Material::default()
                 }),
-                contact: meeting(with, 0.0),
+                contact: contact(with, 0.0),
                 ..Default::default()
             },
         )?;
-        crowd.world.body_mut(body)?.set_velocities(&[Vec3::X * speed; 27])?;
+        bodies.world.body_mut(body)?.set_velocities(&[Vec3::X * speed; 27])?;
     }
-    Ok(crowd)
+    Ok(bodies)
 }
 
 /// A cloth that falls upright onto the ground and crumples there.
-fn crumpling(cells: [u32; 2], with: bool) -> Result<Crowd, Error> {
-    let mut crowd = Crowd::new(9.81)?;
+fn crumpling(cells: [u32; 2], with: bool) -> Result<Bodies, Error> {
+    let mut bodies = Bodies::new(9.81)?;
     let mut mesh = Mesh::cloth([0.2, 0.2 * cells[1] as f32 / cells[0] as f32], cells)?;
-    for place in &mut mesh.positions {
-        // Upright, in slight folds.
-        *place = Vec3::new(place.z, place.x + 0.11, 0.004 * (60.0 * place.x).sin());
+    for position in &mut mesh.positions {
+        // Upright, with slight folds.
+        *position = Vec3::new(position.z, position.x + 0.11, 0.004 * (60.0 * position.x).sin());
     }
     let mass = 0.02 / mesh.positions.len() as f32;
-    crowd.ground()?;
-    crowd.add(
+    bodies.ground()?;
+    bodies.add(
         &mesh,
         Vec3::ZERO,
         &BodyDefinition {
@@ -359,64 +360,69 @@ fn crumpling(cells: [u32; 2], with: bool) -> Result<Crowd, Error> {
             node_dampings: Values::Uniform(2.0 * mass),
             contact: BodyContact {
                 with_itself: with,
-                ..meeting(false, 5e-4)
+                ..contact(false, 5e-4)
             },
             ..Default::default()
         },
     )?;
-    Ok(crowd)
+    Ok(bodies)
 }
 
-/// An organ of 1.3K nodes that lies on another, which is held at its end.
-fn organs(with: bool) -> Result<Crowd, Error> {
-    let mut crowd = Crowd::new(9.81)?;
+/// An organ of 1.3K nodes on top of another, which is fixed at its end.
+fn organs(with: bool) -> Result<Bodies, Error> {
+    let mut bodies = Bodies::new(9.81)?;
     let mesh = Mesh::organ(0.12, 0.0075)?;
-    let [low, high] = [f32::min, f32::max]
-        .map(|of: fn(f32, f32) -> f32| mesh.positions.iter().map(|place| place.y).reduce(of).unwrap_or(0.0));
+    let [low, high] = [f32::min, f32::max].map(|extreme: fn(f32, f32) -> f32| {
+        mesh.positions
+            .iter()
+            .map(|position| position.y)
+            .reduce(extreme)
+            .unwrap_or(0.0)
+    });
     let definition = BodyDefinition {
         material: soft(Model::Springs),
         node_dampings: Values::Uniform(1e-3),
-        contact: meeting(with, 5e-4),
+        contact: contact(with, 5e-4),
         mass_scaling: 1e-3,
         ..Default::default()
     };
-    let below = crowd.add(&mesh, Vec3::ZERO, &definition)?;
-    crowd.pin_where(below, |place| place.y < low + 0.3 * (high - low))?;
-    crowd.add(&mesh, Vec3::Y * (high - low + 0.002), &definition)?;
-    Ok(crowd)
+    let below = bodies.add(&mesh, Vec3::ZERO, &definition)?;
+    bodies.pin_where(below, |position| position.y < low + 0.3 * (high - low))?;
+    bodies.add(&mesh, Vec3::Y * (high - low + 0.002), &definition)?;
+    Ok(bodies)
 }
 
-/// Two flaps of 475 nodes side by side, held at their far ends, whose edges five sutures draw together.
-fn wound(with: bool) -> Result<Crowd, Error> {
-    let mut crowd = Crowd::new(0.0)?;
+/// Two flaps of 475 nodes side by side, fixed at their far ends. Five sutures pull their edges together.
+fn wound(with: bool) -> Result<Bodies, Error> {
+    let mut bodies = Bodies::new(0.0)?;
     let mesh = Mesh::block([0.08, 0.008, 0.048], [18, 4, 4])?;
     let mut flaps = Vec::new();
     for side in [-1.0_f32, 1.0] {
-        let flap = crowd.add(
+        let flap = bodies.add(
             &mesh,
             Vec3::X * (side * 0.042),
             &BodyDefinition {
                 material: soft(Model::Tetrahedra),
                 node_dampings: Values::Uniform(1e-3),
-                contact: meeting(with, 5e-4),
+                contact: contact(with, 5e-4),
                 mass_scaling: 1e-3,
                 ..Default::default()
             },
         )?;
-        crowd.pin_where(flap, |place| place.x.abs() > 0.081)?;
+        bodies.pin_where(flap, |position| position.x.abs() > 0.081)?;
         flaps.push(flap);
     }
     for along in -2..=2 {
         let mut anchors = Vec::new();
         for &flap in &flaps {
-            let body = crowd.world.body(flap)?;
-            let wish = Vec3::new(0.0, 0.004, 0.01 * along as f32);
+            let body = bodies.world.body(flap)?;
+            let target = Vec3::new(0.0, 0.004, 0.01 * along as f32);
             let positions = body.positions();
             let middle = |triangle: &[u32; 3]| triangle.map(|node| positions[node as usize]).iter().sum::<Vec3>() / 3.0;
             let nearest = body.surface().iter().enumerate().min_by(|(_, a), (_, b)| {
                 middle(a)
-                    .distance_squared(wish)
-                    .total_cmp(&middle(b).distance_squared(wish))
+                    .distance_squared(target)
+                    .total_cmp(&middle(b).distance_squared(target))
             });
             anchors.push(Anchor::Point(SurfacePoint {
                 triangle: nearest.map_or(0, |(index, _)| index as u32),
@@ -427,9 +433,9 @@ fn wound(with: bool) -> Result<Crowd, Error> {
             length: Some(0.001),
             ..SutureDefinition::default()
         };
-        crowd
+        bodies
             .world
             .suture(flaps[0], &anchors[0], flaps[1], &anchors[1], &thread)?;
     }
-    Ok(crowd)
+    Ok(bodies)
 }

@@ -1,4 +1,4 @@
-//! A thick-walled hollow sphere under pressure inside, against the radial solution of its law in `f64`.
+//! A thick-walled hollow sphere under internal pressure, compared with the radial solution of its law in `f64`.
 
 use std::collections::HashMap;
 
@@ -13,13 +13,13 @@ use crate::lines::Lines;
 use crate::report::{Report, Table};
 use crate::support::bodies::FREE;
 
-/// m, inside and outside.
+/// Inner and outer radius [m].
 const RADII: [f64; 2] = [0.02, 0.04];
-/// Pa.
+/// Internal pressure [Pa].
 const PRESSURE: f64 = 900.0;
 const NU: f32 = 0.45;
 
-/// A cube of so many cells, without its inner half, bent to a hollow sphere.
+/// A cube of `cells` cells per side without its inner half, mapped to a hollow sphere.
 fn hollow(cells: u32) -> Mesh {
     let block = Mesh::block([2.0; 3], [cells; 3]).expect("a block");
     let mut mesh = Mesh::default();
@@ -45,8 +45,8 @@ fn hollow(cells: u32) -> Mesh {
     mesh
 }
 
-/// How many times as wide the cavity becomes.
-fn found(law: ElementLaw, cells: u32) -> f64 {
+/// The simulated ratio of the cavity's deformed to its original width.
+fn simulated_width(law: ElementLaw, cells: u32) -> f64 {
     let mesh = hollow(cells);
     let mut world = World::new(FREE).expect("a world");
     let id = world.create_body(&BodyDefinition {
@@ -73,8 +73,8 @@ fn found(law: ElementLaw, cells: u32) -> f64 {
     (enclosed.volume / enclosed.rest_volume).cbrt()
 }
 
-/// The same by theory: equilibrium along the radius, from a guess inside to no stress outside.
-fn expected(law: ElementLaw) -> f64 {
+/// The theoretical ratio by shooting: radial equilibrium from a guess inside to zero stress outside.
+fn expected_width(law: ElementLaw) -> f64 {
     const STEPS: usize = 200;
     let nu = f64::from(NU);
     let gradient = |radial: f64, around: f64| DMat3::from_diagonal(DVec3::new(radial, around, around));
@@ -123,13 +123,13 @@ fn expected(law: ElementLaw) -> f64 {
 
 pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
     report.write(&format!(
-        "\n## Hollow sphere under pressure\n\nRadii of 20 and 40 mm, {PRESSURE} Pa inside, E = 5 kPa, nu = {NU}: how many times as wide the cavity becomes.\n",
+        "\n## Hollow sphere under pressure\n\nRadii of 20 and 40 mm, {PRESSURE} Pa inside, E = 5 kPa, nu = {NU}: the deformed width of the cavity over the original.\n",
     ));
     let meshes: &[u32] = if is_quick { &[4, 8] } else { &[4, 8, 16] };
     let mut table = Table::new(&["law", "theory", "4 cells across", "8", "16", "refined"]);
     for law in LAWS {
-        let theory = expected(law);
-        let widths: Vec<f64> = meshes.iter().map(|&cells| found(law, cells)).collect();
+        let theory = expected_width(law);
+        let widths: Vec<f64> = meshes.iter().map(|&cells| simulated_width(law, cells)).collect();
         let limit = match widths[..] {
             [coarse, middle, fine] => refined([coarse, middle, fine]).0,
             _ => f64::NAN,
@@ -144,9 +144,9 @@ pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
             format!("{limit:.4}"),
         ]);
         if !is_quick {
-            // Of how much wider it becomes.
-            let what = format!("hollow sphere, {}, refined", name(law));
-            lines.value(&what, [theory - 1.0, limit - 1.0], "of its width", 0.02, "");
+            // The error of the width increase.
+            let label = format!("hollow sphere, {}, refined", name(law));
+            lines.value(&label, [theory - 1.0, limit - 1.0], "of its width", 0.02, "");
         }
     }
     report.table(&table);

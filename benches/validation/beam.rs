@@ -1,8 +1,10 @@
-//! A silicone cantilever that swings after release, by motion capture (Zhang, Du et al. 2022; MIT licence, Soft Robotics Lab, ETH Zürich).
+//! A silicone cantilever that swings after release, against motion capture (Zhang, Du et al. 2022; MIT license, Soft
+//! Robotics Lab, ETH Zürich).
 //!
-//! Stiffness and damping are fitted to the takes under gravity alone. Those with a weight at the upper edge of the tip are predicted. A hand lets go
-//! of the beam, and the weight follows on a thread: the first way down differs even between takes of one kind. So a swing is compared from its first
-//! lowest point on, where it stands still; what an instant release would give is stated beside it.
+//! Stiffness and damping are fitted to the takes without a weight. Takes with a weight at the upper edge of the tip are
+//! predicted. The beam is released by hand, and the weight hangs on a thread, so that the first descent differs even
+//! between takes of one kind. Swings are therefore compared from the first lowest point on, where the beam is
+//! momentarily at rest. The result for an instant release is reported separately.
 
 use std::path::{Path, PathBuf};
 
@@ -19,16 +21,16 @@ use crate::time_plot::{Curve, plot};
 
 const SIZE: [f32; 3] = [0.1, 0.03, 0.03];
 const DENSITY: f32 = 1070.0;
-/// Dragon Skin 10 has some 0.499; this is the highest that the library takes.
+/// Dragon Skin 10 has about 0.499; this is the largest value that the library supports.
 const NU: f32 = 0.49;
-/// The markers are glued on: their mean is so far above the middle of the tip, m.
+/// The mean height of the glued-on markers above the middle of the tip [m].
 const MARKERS_ABOVE: f64 = 0.007;
 const STEP: f64 = 2e-3;
-/// How long is compared after the release, s.
+/// Duration of the comparison after the release [s].
 const SPAN: f64 = 1.5;
 const TARGET: f64 = 0.05;
 
-/// Files, weights at the tip, kg, and colours of the plot.
+/// File names, weights at the tip [kg], and plot colors.
 const TAKES: [(&str, f32, &str); 4] = [
     ("beam_gravity_V2_a", 0.0, "#1f6fb4"),
     ("beam_gravity_V2_b", 0.0, "#3aa6a6"),
@@ -39,49 +41,52 @@ const TAKES: [(&str, f32, &str); 4] = [
 struct Take {
     name: &'static str,
     load: f32,
-    colour: &'static str,
-    /// How far the tip has come down at each frame, m.
+    color: &'static str,
+    /// Drop of the tip at each frame [m].
     drops: Vec<f64>,
     rate: f64,
     /// The first frame in motion.
     start: usize,
-    /// When it first turns round, s, and how far down it is there, m.
-    turn: (f64, f64),
-    /// What it comes to, m: the amplitude of the swing.
+    /// Time [s] and drop [m] of the first lowest point.
+    first_turn: (f64, f64),
+    /// The final drop [m], which is the amplitude of the swing.
     end: f64,
 }
 
 impl Take {
-    fn read(folder: &Path, (name, load, colour): (&'static str, f32, &'static str)) -> Result<Self, String> {
+    fn read(folder: &Path, (name, load, color): (&'static str, f32, &'static str)) -> Result<Self, String> {
         let capture = Capture::read(&folder.join(name).with_extension("c3d"))?;
         // Three markers at the tip; down is -x.
         let height = |frame: &Vec<DVec3>| frame[..3].iter().map(|marker| marker.x).sum::<f64>() / 3.0;
         let heights: Vec<f64> = capture.frames.iter().map(height).collect();
         let mean = |range: &[f64]| range.iter().sum::<f64>() / range.len() as f64;
-        // Before that the cameras settle, after it the beam is let go.
-        let held = mean(&heights[25..40]);
-        let drops: Vec<f64> = heights.iter().map(|height| held - height).collect();
+        // The cameras settle before these frames, and the beam is released after them.
+        let initial = mean(&heights[25..40]);
+        let drops: Vec<f64> = heights.iter().map(|height| initial - height).collect();
         let start = drops.iter().position(|&drop| drop > 5e-4).ok_or("it never moves")?;
         let end = mean(&drops[drops.len() - 50..]);
-        let turns = |&frame: &usize| drops[frame] > 1.2 * end && drops[frame + 1] < drops[frame];
-        let at = (start..drops.len() - 1).find(turns).ok_or("it never turns round")?;
-        // The top of a parabola through three frames.
+        let is_turn = |&frame: &usize| drops[frame] > 1.2 * end && drops[frame + 1] < drops[frame];
+        let at = (start..drops.len() - 1).find(is_turn).ok_or("it never turns round")?;
+        // The extremum of a parabola through three frames.
         let [before, here, after] = [at - 1, at, at + 1].map(|frame| drops[frame]);
-        let part = 0.5 * (before - after) / (before - 2.0 * here + after);
-        let turn = ((at as f64 + part) / capture.rate, here - 0.25 * (before - after) * part);
+        let offset = 0.5 * (before - after) / (before - 2.0 * here + after);
+        let first_turn = (
+            (at as f64 + offset) / capture.rate,
+            here - 0.25 * (before - after) * offset,
+        );
         Ok(Self {
             name,
             load,
-            colour,
+            color,
             drops,
             rate: capture.rate,
             start,
-            turn,
+            first_turn,
             end,
         })
     }
 
-    /// The RMS difference from a swing that was computed from an instant on, s, in m.
+    /// RMS difference [m] from a computed swing that starts at time `begin` [s].
     fn difference(&self, swing: &[f64], begin: f64) -> f64 {
         let first = (begin * self.rate).ceil().max(0.0) as usize;
         let frames = first..self.drops.len().min(first + (SPAN * self.rate) as usize);
@@ -95,7 +100,7 @@ impl Take {
         (squares.sum::<f64>() / count).sqrt()
     }
 
-    /// The same from an instant release, at the best instant.
+    /// RMS difference from a swing after an instant release, at the best release time.
     fn difference_from_release(&self, swing: &[f64]) -> f64 {
         let instants = (-80..=40).map(|step| self.start as f64 / self.rate + 1e-3 * f64::from(step));
         instants
@@ -104,7 +109,7 @@ impl Take {
     }
 }
 
-/// Young's modulus, Pa, and the times of the viscosity, s.
+/// Young's modulus [Pa], and the times of the viscosity [s].
 #[derive(Clone, Copy)]
 struct Silicone {
     young: f64,
@@ -171,7 +176,7 @@ impl Beam {
         Self { world, id, face }
     }
 
-    /// The height of the middle of the markers, m.
+    /// The height of the center of the markers [m].
     fn height(&self) -> f64 {
         let positions = self.world.body(self.id).expect("the body").positions();
         let [low, high] = self
@@ -187,14 +192,14 @@ impl Beam {
             .expect("a static equilibrium");
     }
 
-    /// How far the tip comes down in the end, m.
+    /// The final drop of the tip [m].
     fn drop_at_rest(mut self) -> f64 {
         let before = self.height();
         self.rest();
         before - self.height()
     }
 
-    /// How far the tip is down at each step, from a shape on that is at rest; before that it was straight.
+    /// The drop of the tip at each step, relative to the straight beam. It starts at rest from `shape`, or straight.
     fn swing(mut self, shape: Option<&[Vec3]>) -> Vec<f64> {
         let before = self.height();
         if let Some(shape) = shape {
@@ -212,8 +217,8 @@ impl Beam {
         drops
     }
 
-    /// How far the tip is down where a force on it, N, is in balance, and the shape then.
-    fn held(mut self, force: f64) -> (f64, Vec<Vec3>) {
+    /// The drop of the tip in equilibrium with a force on it [N], and the shape.
+    fn loaded_shape(mut self, force: f64) -> (f64, Vec<Vec3>) {
         let before = self.height();
         let nodes: Vec<u32> = self.face.iter().flatten().map(|&node| node as u32).collect();
         let forces = vec![Vec3::NEG_Y * (force / nodes.len() as f64) as f32; nodes.len()];
@@ -228,23 +233,23 @@ impl Beam {
     }
 }
 
-/// The swing of a beam that a force at the tip held this far down (secants).
+/// The swing of a beam released from this drop, found by the force at the tip (secant method).
 fn swing_from(beam: impl Fn() -> Beam, drop: f64) -> Vec<f64> {
-    let mut last = (0.0, beam().held(0.0).0);
+    let mut last = (0.0, beam().loaded_shape(0.0).0);
     let mut force = 0.1;
     for _ in 0..6 {
-        let (found, shape) = beam().held(force);
-        if (found - drop).abs() < 1e-5 {
+        let (reached, shape) = beam().loaded_shape(force);
+        if (reached - drop).abs() < 1e-5 {
             return beam().swing(Some(&shape));
         }
-        let slope = (force - last.0) / (found - last.1);
-        last = (force, found);
-        force += (drop - found) * slope;
+        let slope = (force - last.0) / (reached - last.1);
+        last = (force, reached);
+        force += (drop - reached) * slope;
     }
     panic!("no force holds the beam at {drop} m");
 }
 
-/// The folder of the takes, if it is there.
+/// The folder of the takes, if it exists.
 fn folder() -> Option<PathBuf> {
     let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
     above
@@ -252,20 +257,20 @@ fn folder() -> Option<PathBuf> {
         .find(|path| path.exists())
 }
 
-/// The lowest value of a function with one minimum (golden section).
-fn lowest([mut low, mut high]: [f64; 2], evaluations: usize, mut of: impl FnMut(f64) -> f64) -> f64 {
+/// The location of the minimum of a unimodal function (golden-section search).
+fn golden_section([mut low, mut high]: [f64; 2], evaluations: usize, mut function: impl FnMut(f64) -> f64) -> f64 {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let mut inner = [high - golden * (high - low), low + golden * (high - low)];
-    let mut values = inner.map(&mut of);
+    let mut values = inner.map(&mut function);
     for _ in 2..evaluations {
         if values[0] < values[1] {
             high = inner[1];
             inner = [high - golden * (high - low), inner[0]];
-            values = [of(inner[0]), values[0]];
+            values = [function(inner[0]), values[0]];
         } else {
             low = inner[0];
             inner = [inner[1], low + golden * (high - low)];
-            values = [values[1], of(inner[1])];
+            values = [values[1], function(inner[1])];
         }
     }
     0.5 * (low + high)
@@ -287,7 +292,7 @@ pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
     let cells = if is_quick { 3 } else { 6 };
     let (fitted, loaded): (Vec<&Take>, Vec<&Take>) = takes.iter().partition(|take| take.load == 0.0);
     let drop = fitted.iter().map(|take| take.end).sum::<f64>() / fitted.len() as f64;
-    // Times do not depend on the mesh, stiffness does.
+    // Relaxation times do not depend on the mesh; stiffness does.
     let young = |cells: u32| {
         (0..4).fold(2.6e5, |young, _| {
             let silicone = Silicone {
@@ -304,18 +309,19 @@ pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
         retardation: gain * relaxation,
         relaxation,
     };
-    let misfit = |silicone: Silicone| -> f64 {
-        let swing = |take: &&Take| swing_from(|| Beam::new(3, silicone, 0.0), take.turn.1);
+    let fit_error = |silicone: Silicone| -> f64 {
+        let swing = |take: &&Take| swing_from(|| Beam::new(3, silicone, 0.0), take.first_turn.1);
         fitted
             .iter()
-            .map(|take| take.difference(&swing(take), take.turn.0))
+            .map(|take| take.difference(&swing(take), take.first_turn.0))
             .sum()
     };
     let evaluations = if is_quick { 5 } else { 9 };
-    let best_gain = |relaxation: f64| lowest([0.0, 1.0], evaluations, |part| misfit(gain(relaxation, part)));
-    let relaxation = lowest([0.004_f64.ln(), 0.1_f64.ln()], evaluations, |logarithm| {
+    let best_gain =
+        |relaxation: f64| golden_section([0.0, 1.0], evaluations, |ratio| fit_error(gain(relaxation, ratio)));
+    let relaxation = golden_section([0.004_f64.ln(), 0.1_f64.ln()], evaluations, |logarithm| {
         let relaxation = logarithm.exp();
-        misfit(gain(relaxation, best_gain(relaxation)))
+        fit_error(gain(relaxation, best_gain(relaxation)))
     })
     .exp();
     let retardation = best_gain(relaxation) * relaxation;
@@ -326,7 +332,7 @@ pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
     };
     report.write(&format!(
         "\n## Silicone beam\n\nDragon Skin 10, 100 x 30 x 30 mm, {cells} cells across, IMPLICIT, 2 ms, nu = {NU}. Fitted to the takes under gravity \
-         alone: E = {:.1} kPa from where they come to rest, `retardation_time` = {:.2} ms and `relaxation_time` = {:.1} ms from how they swing. Weights hang at \
+         alone: E = {:.1} kPa from their rest position, `retardation_time` = {:.2} ms and `relaxation_time` = {:.1} ms from their swing. Weights hang at \
          the upper edge of the tip and move with it. RMS over {SPAN} s from the first lowest point on; in percent of the drop in the end, and of the swing \
          about it.\n",
         1e-3 * silicone.young,
@@ -346,28 +352,34 @@ pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
     let mut curves = Vec::new();
     for take in fitted.iter().chain(&loaded) {
         let beam = || Beam::new(cells, silicone, take.load);
-        let swing = swing_from(beam, take.turn.1);
-        let difference = take.difference(&swing, take.turn.0);
+        let swing = swing_from(beam, take.first_turn.1);
+        let difference = take.difference(&swing, take.first_turn.0);
         let released = take.difference_from_release(&beam().swing(None));
         let rest = beam().drop_at_rest();
-        let millimetres = |value: f64| format!("{:.2}", 1e3 * value);
-        let percent = |part: f64| format!("{:.1}", 100.0 * part);
+        let millimeters = |value: f64| format!("{:.2}", 1e3 * value);
+        let percent = |ratio: f64| format!("{:.1}", 100.0 * ratio);
         table.row(vec![
             take.name.into(),
-            millimetres(take.end),
-            millimetres(rest),
-            millimetres(take.turn.1),
-            millimetres(difference),
+            millimeters(take.end),
+            millimeters(rest),
+            millimeters(take.first_turn.1),
+            millimeters(difference),
             percent(difference / take.end),
-            percent(difference / (take.turn.1 - take.end)),
+            percent(difference / (take.first_turn.1 - take.end)),
             percent(released / take.end),
         ]);
         let kind = if take.load == 0.0 { "fitted" } else { "predicted" };
-        let what = format!("silicone beam, {}, {kind}", take.name);
-        let found = format!("RMS {} mm of {}", millimetres(difference), millimetres(take.end));
-        lines.error(&what, ["measured".into(), found], difference / take.end, TARGET, "");
+        let label = format!("silicone beam, {}, {kind}", take.name);
+        let measured_error = format!("RMS {} mm of {}", millimeters(difference), millimeters(take.end));
+        lines.error(
+            &label,
+            ["measured".into(), measured_error],
+            difference / take.end,
+            TARGET,
+            "",
+        );
         let frames =
-            (0..take.drops.len()).map(|frame| (frame as f64 / take.rate - take.turn.0, 1e3 * take.drops[frame]));
+            (0..take.drops.len()).map(|frame| (frame as f64 / take.rate - take.first_turn.0, 1e3 * take.drops[frame]));
         let measured = frames.filter(|(time, _)| (0.0..=SPAN).contains(time)).collect();
         let computed = swing
             .iter()
@@ -376,7 +388,7 @@ pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
         let computed = computed.filter(|(time, _)| *time <= SPAN).collect();
         let curve = |name: String, points: Vec<(f64, f64)>, is_dotted: bool| Curve {
             name,
-            colour: take.colour,
+            color: take.color,
             points,
             is_dotted,
         };
@@ -385,6 +397,6 @@ pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
         curves.push(curve(format!("{grams}, {kind}"), computed, false));
     }
     report.table(&table);
-    let title = "Silicone beam: how far the tip is down, from its first lowest point on";
+    let title = "Silicone beam: drop of the tip from its first lowest point on";
     report.plot("beam.svg", title, plot(title, ["s", "mm"], &curves));
 }

@@ -1,18 +1,18 @@
-//! A reader of motion capture in C3D: points alone, as 32-bit floats of this machine's byte order.
+//! A reader of C3D motion capture files: points only, as 32-bit floats in this machine's byte order.
 
 use std::path::Path;
 
 use glam::DVec3;
 
-/// Frames of points, m.
+/// Frames of points [m].
 pub struct Capture {
-    /// Hz.
+    /// Frame rate [Hz].
     pub rate: f64,
     pub frames: Vec<Vec<DVec3>>,
 }
 
 impl Capture {
-    /// Or why it cannot be read.
+    /// Reads a file, or returns the reason that it cannot be read.
     pub fn read(path: &Path) -> Result<Self, String> {
         const BLOCK: usize = 512;
         let bytes = std::fs::read(path).map_err(|error| error.to_string())?;

@@ -1,7 +1,7 @@
-//! What a user gets who gives a mesh and laboratory values and leaves everything else as it is.
+//! The accuracy of default settings for a user who only provides a mesh and material data.
 //!
-//! Each body sags from rest under its weight, and is compared with the converged motion. NEWTON with the same steps would be no reference: in long
-//! steps it is further from that motion than what is chosen.
+//! Each body sags from rest under its weight and is compared with the converged motion. NEWTON with the same steps is
+//! no reference: with long steps its error is larger than that of the default.
 
 use std::path::Path;
 
@@ -14,22 +14,22 @@ use crate::hyperelastic::name;
 use crate::lines::Lines;
 use crate::report::{Report, Table, milliseconds};
 
-/// Frames, s.
+/// Durations of steps [s].
 const STEPS: [f32; 4] = [1.0 / 30.0, 1.0 / 60.0, 1.0 / 120.0, 1e-3];
 
 const REFERENCE_STEP: f32 = 5e-5;
-/// When states are compared, and how long a body is stepped in all, s.
+/// The time at which states are compared, and the total simulated time [s].
 const COMPARED: f32 = 0.1;
-const LOOKED_AT: f32 = 0.5;
+const TIMED: f32 = 0.5;
 
 struct Subject {
     name: String,
     mesh: Mesh,
-    held: Vec<u32>,
+    pinned: Vec<u32>,
     materials: Vec<(String, Material, ElementLaw)>,
 }
 
-/// Liver (PMC6925591), and a cloth of cotton's weight.
+/// Liver (PMC6925591), and a cloth with the weight of cotton.
 const TISSUE: Material = Material {
     model: Model::Springs,
     young_modulus: 5400.0,
@@ -46,13 +46,13 @@ const CLOTH: Material = Material {
 };
 
 impl Subject {
-    /// Held at its upper end: the last tenth along its longest axis.
+    /// A solid fixed at its upper end: the last tenth along its longest axis.
     fn solid(name: &str, mesh: Mesh) -> Self {
         let low = mesh.positions.iter().fold(Vec3::INFINITY, |low, p| low.min(*p));
         let high = mesh.positions.iter().fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
         let extent = high - low;
         let long = (0..3).fold(0, |long, axis| if extent[axis] > extent[long] { axis } else { long });
-        let is_held = |p: &Vec3| p[long] > high[long] - 0.1 * extent[long];
+        let is_pinned = |p: &Vec3| p[long] > high[long] - 0.1 * extent[long];
         let mut materials = vec![("springs".to_owned(), TISSUE, ElementLaw::default())];
         if !mesh.tetrahedra.is_empty() {
             let elements = Material {
@@ -69,15 +69,15 @@ impl Subject {
         }
         Self {
             name: name.into(),
-            held: nodes(&mesh, is_held),
+            pinned: nodes(&mesh, is_pinned),
             mesh,
             materials,
         }
     }
 
-    /// Created with defaults, or as the reference has it: VERLET without mass scaling.
-    fn create(&self, which: usize, is_reference: bool) -> Result<(World, BodyId), sinew::Error> {
-        let (_, material, element_law) = self.materials[which];
+    /// Creates the body with defaults, or for the reference with VERLET without mass scaling.
+    fn create(&self, index: usize, is_reference: bool) -> Result<(World, BodyId), sinew::Error> {
+        let (_, material, element_law) = self.materials[index];
         let mut world = World::new(WorldDefinition::default())?;
         let is_solid = !self.mesh.tetrahedra.is_empty() || !self.mesh.cells.is_empty();
         let mut definition = BodyDefinition {
@@ -91,13 +91,13 @@ impl Subject {
             definition.mass_scaling = 0.0;
         }
         let id = world.create_body(&definition)?;
-        world.body_mut(id)?.pin_nodes(&self.held)?;
+        world.body_mut(id)?.pin_nodes(&self.pinned)?;
         Ok((world, id))
     }
 
-    /// Where nodes are after this time, s, and what a step took.
-    fn run(&self, which: usize, is_reference: bool, step: f32, span: f32) -> Result<Run, sinew::Error> {
-        let (mut world, id) = self.create(which, is_reference)?;
+    /// The positions of nodes after a time [s], and the time of a step.
+    fn run(&self, index: usize, is_reference: bool, step: f32, span: f32) -> Result<Run, sinew::Error> {
+        let (mut world, id) = self.create(index, is_reference)?;
         let choice = world.body(id)?.solver_choice();
         let count = (span / step).round() as u32;
         let mut stepped = Ok(());
@@ -117,9 +117,9 @@ struct Run {
     step: f64,
 }
 
-fn nodes(mesh: &Mesh, is_held: impl Fn(&Vec3) -> bool) -> Vec<u32> {
+fn nodes(mesh: &Mesh, is_pinned: impl Fn(&Vec3) -> bool) -> Vec<u32> {
     (0..mesh.positions.len() as u32)
-        .filter(|&node| is_held(&mesh.positions[node as usize]))
+        .filter(|&node| is_pinned(&mesh.positions[node as usize]))
         .collect()
 }
 
@@ -138,12 +138,12 @@ fn subjects(report: &mut Report, is_quick: bool) -> Vec<Subject> {
                 ("tissue_volume.msh", 0.0),
                 ("stomach.msh", 1e-3),
             ] {
-                let found = load(
+                let result = load(
                     folder.join(file),
                     MeshFormat::Auto,
                     if scale > 0.0 { scale } else { 1.0 },
                 );
-                match found {
+                match result {
                     Ok(loaded) => {
                         let mut mesh = loaded.mesh;
                         mesh.triangles.clear();
@@ -167,18 +167,18 @@ fn subjects(report: &mut Report, is_quick: bool) -> Vec<Subject> {
         Mesh::lattice(0.01, [20, 8, 8]).expect("a lattice"),
     ));
     let mesh = Mesh::cloth([0.5; 2], [40; 2]).expect("a cloth");
-    let held = vec![0, 40];
+    let pinned = vec![0, 40];
     let materials = vec![("springs".to_owned(), CLOTH, ElementLaw::default())];
     subjects.push(Subject {
         name: "cloth".into(),
         mesh,
-        held,
+        pinned,
         materials,
     });
     subjects
 }
 
-/// Files differ in their units: makes the longest extent this long, m.
+/// Scales a mesh, whose file has unknown units, to this longest extent [m].
 fn fit(mesh: &mut Mesh, length: f32) {
     let low = mesh.positions.iter().fold(Vec3::INFINITY, |low, p| low.min(*p));
     let high = mesh.positions.iter().fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
@@ -186,51 +186,51 @@ fn fit(mesh: &mut Mesh, length: f32) {
     mesh.positions.iter_mut().for_each(|p| *p = (*p - low) * scale);
 }
 
-/// RMS over the nodes of one state against another, over how far those came.
-fn error(found: &[Vec3], reference: &[Vec3], rest: &[Vec3]) -> f64 {
+/// RMS difference of two states over the RMS displacement of the reference.
+fn error(positions: &[Vec3], reference: &[Vec3], rest: &[Vec3]) -> f64 {
     let sum = |a: &[Vec3], b: &[Vec3]| {
         a.iter()
             .zip(b)
             .map(|(a, b)| f64::from(a.distance_squared(*b)))
             .sum::<f64>()
     };
-    (sum(found, reference) / sum(reference, rest)).sqrt()
+    (sum(positions, reference) / sum(reference, rest)).sqrt()
 }
 
 pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
     report.write(
-        "\n## Defaults\n\nA mesh and a material (E = 5.4 kPa, 1060 kg/m³, elements nu = 0.3; cloth 100 kPa, 1 mm), everything else left alone; held at one \
-         end, let go under gravity. *Chosen*: and how many substeps VERLET would take in 1/60 s. *Time*: of the processor for a step, mean over half a second. \
-         *Error*: after 0.1 s against VERLET without mass scaling in steps of 50 us, RMS over how far nodes came.\n",
+        "\n## Defaults\n\nA mesh and a material (E = 5.4 kPa, 1060 kg/m³, elements nu = 0.3; cloth 100 kPa, 1 mm), everything else at its default; fixed at one \
+         end, released under gravity. *Chosen*: the solver, and the number of substeps of VERLET in 1/60 s. *Time*: processor time of a step, mean over half a second. \
+         *Error*: after 0.1 s against VERLET without mass scaling in steps of 50 us, RMS over the RMS displacement of nodes.\n",
     );
     let mut table = Table::new(&[
         "body", "nodes", "material", "step, ms", "chosen", "time, ms", "error, %",
     ]);
     let (mut refused, mut count) = (Vec::new(), 0);
     for subject in subjects(report, is_quick) {
-        for which in 0..subject.materials.len() {
-            let material = &subject.materials[which].0;
+        for index in 0..subject.materials.len() {
+            let material = &subject.materials[index].0;
             report.progress(&format!("defaults: {}, {material}", subject.name));
-            let reference = subject.run(which, true, REFERENCE_STEP, COMPARED);
+            let reference = subject.run(index, true, REFERENCE_STEP, COMPARED);
             for step in STEPS {
                 count += 1;
-                let found = subject.run(which, false, step, COMPARED);
+                let result = subject.run(index, false, step, COMPARED);
                 let long = if is_quick {
                     Ok(None)
                 } else {
-                    subject.run(which, false, step, LOOKED_AT).map(Some)
+                    subject.run(index, false, step, TIMED).map(Some)
                 };
-                let cells = match (found, long) {
-                    (Ok(found), Ok(long)) => {
-                        let off = match &reference {
+                let cells = match (result, long) {
+                    (Ok(result), Ok(long)) => {
+                        let error_text = match &reference {
                             Ok(reference) => {
-                                let off = error(&found.positions, &reference.positions, &subject.mesh.positions);
-                                format!("{:.2}", 100.0 * off)
+                                let ratio = error(&result.positions, &reference.positions, &subject.mesh.positions);
+                                format!("{:.2}", 100.0 * ratio)
                             }
                             Err(error) => format!("no reference: {error}"),
                         };
-                        let time = long.map_or(found.step, |long| long.step);
-                        [found.solver, milliseconds(time), off]
+                        let time = long.map_or(result.step, |long| long.step);
+                        [result.solver, milliseconds(time), error_text]
                     }
                     (Err(error), _) | (_, Err(error)) => {
                         refused.push(format!("{}, {material}, {:.2} ms", subject.name, 1e3 * step));
@@ -249,7 +249,7 @@ pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
         }
     }
     report.table(&table);
-    let found = if refused.is_empty() {
+    let result = if refused.is_empty() {
         "none".to_owned()
     } else {
         refused.join("; ")
@@ -257,7 +257,7 @@ pub fn run(report: &mut Report, lines: &mut Lines, is_quick: bool) {
     let share = refused.len() as f64 / f64::from(count);
     lines.error(
         "defaults that are refused",
-        ["none".into(), format!("{found} of {count}")],
+        ["none".into(), format!("{result} of {count}")],
         share,
         0.0,
         "",

@@ -1,4 +1,4 @@
-//! Bars and sheared blocks of each hyperelastic law against its energy, differentiated in `f64`.
+//! Bars and sheared blocks of each hyperelastic law, compared with the derivative of its energy in `f64`.
 
 use glam::{DMat3, DVec3, Vec3};
 use sinew::{ElementLaw, Solver};
@@ -8,7 +8,7 @@ use crate::lines::Lines;
 use crate::report::{Report, Table};
 use crate::support::bodies::FREE;
 
-/// What the curves are within in the tests.
+/// The tolerance of the curves in the tests.
 const TARGET: f64 = 1e-4;
 
 pub fn name(law: ElementLaw) -> String {
@@ -37,9 +37,9 @@ pub fn run(report: &mut Report, lines: &mut Lines, _is_quick: bool) {
     for law in LAWS {
         let mut cells = vec![name(law)];
         let mut worst = 0.0_f64;
-        let mut compare = |[expected, found]: [f64; 2], size: f64| {
-            worst = worst.max((found - expected).abs() / size.abs());
-            cells.push(format!("{expected:.1} / {found:.1}"));
+        let mut compare = |[expected, result]: [f64; 2], size: f64| {
+            worst = worst.max((result - expected).abs() / size.abs());
+            cells.push(format!("{expected:.1} / {result:.1}"));
         };
         for (stretch, is_biaxial) in [(0.7_f32, false), (1.3, false), (1.8, false), (1.3, true)] {
             let x = f64::from(stretch);
@@ -47,15 +47,15 @@ pub fn run(report: &mut Report, lines: &mut Lines, _is_quick: bool) {
             let free = free_stretch(|free| stress(law, f64::from(nu), shape(free), 2, 2));
             let expected = stress(law, f64::from(nu), shape(free), 0, 0);
             let second = is_biaxial.then_some(stretch);
-            let found = pull(&mesh, &stretched(&mesh, law, nu, [Some(stretch), second, None]), 0, 0);
-            compare([expected, found], expected);
+            let result = pull(&mesh, &stretched(&mesh, law, nu, [Some(stretch), second, None]), 0, 0);
+            compare([expected, result], expected);
         }
         let shear = 0.5_f32;
         let mut scene = scene(&mesh, FREE, law, nu, Solver::Newton);
-        let places: Vec<Vec3> = mesh.positions.iter().map(|p| *p + Vec3::X * p.y * shear).collect();
+        let positions: Vec<Vec3> = mesh.positions.iter().map(|p| *p + Vec3::X * p.y * shear).collect();
         let body = scene.body_mut();
-        (0..places.len() as u32).for_each(|node| body.pin(node).expect("a node"));
-        body.set_positions(&places).expect("places");
+        (0..positions.len() as u32).for_each(|node| body.pin(node).expect("a node"));
+        body.set_positions(&positions).expect("positions");
         scene.step(1e-3);
         let gradient = DMat3::from_cols(DVec3::X, DVec3::new(f64::from(shear), 1.0, 0.0), DVec3::Z);
         let along = stress(law, f64::from(nu), gradient, 1, 0);
@@ -69,8 +69,8 @@ pub fn run(report: &mut Report, lines: &mut Lines, _is_quick: bool) {
             );
         }
         table.row(cells);
-        let what = format!("bar and shear, {}", name(law));
-        lines.error(&what, ["theory".into(), "the worst of six".into()], worst, TARGET, "");
+        let label = format!("bar and shear, {}", name(law));
+        lines.error(&label, ["theory".into(), "the worst of six".into()], worst, TARGET, "");
     }
     report.table(&table);
 }

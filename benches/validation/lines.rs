@@ -6,36 +6,43 @@ use crate::report::{Report, Table};
 pub struct Lines(Vec<Line>);
 
 struct Line {
-    what: String,
+    label: String,
     expected: String,
-    found: String,
+    result: String,
     error: f64,
     target: f64,
-    /// Why it misses its target, where that is known: such a line does not fail the bench.
+    /// The known reason for a missed target; a line with a reason does not fail the bench.
     reason: &'static str,
 }
 
 impl Lines {
-    /// A value and what it should be, in a unit; the error is a part of what was expected.
-    pub fn value(&mut self, what: &str, [expected, found]: [f64; 2], unit: &str, target: f64, reason: &'static str) {
+    /// Adds a value with a unit and its expected value; the error is relative to the expected value.
+    pub fn value(&mut self, label: &str, [expected, result]: [f64; 2], unit: &str, target: f64, reason: &'static str) {
         let text = |value: f64| format!("{value:.4} {unit}").trim_end().to_owned();
-        let error = (found / expected - 1.0).abs();
-        self.error(what, [text(expected), text(found)], error, target, reason);
+        let error = (result / expected - 1.0).abs();
+        self.error(label, [text(expected), text(result)], error, target, reason);
     }
 
-    /// An error that is known as a part of what it should be compared with.
-    pub fn error(&mut self, what: &str, [expected, found]: [String; 2], error: f64, target: f64, reason: &'static str) {
+    /// Adds a relative error.
+    pub fn error(
+        &mut self,
+        label: &str,
+        [expected, result]: [String; 2],
+        error: f64,
+        target: f64,
+        reason: &'static str,
+    ) {
         self.0.push(Line {
-            what: what.to_owned(),
+            label: label.to_owned(),
             expected,
-            found,
+            result,
             error,
             target,
             reason,
         });
     }
 
-    /// Lines that miss their target without a known reason.
+    /// The number of lines that miss their target without a known reason.
     pub fn missed(&self) -> usize {
         self.0
             .iter()
@@ -53,9 +60,9 @@ impl Lines {
                 format!("**no** {}", line.reason)
             };
             table.row(vec![
-                line.what.clone(),
+                line.label.clone(),
                 line.expected.clone(),
-                line.found.clone(),
+                line.result.clone(),
                 format!("{:.3}", 100.0 * line.error),
                 format!("{}", 100.0 * line.target),
                 verdict.trim_end().into(),
@@ -66,7 +73,7 @@ impl Lines {
 }
 
 impl Line {
-    /// Not where the error is no number.
+    /// False if the error is NaN.
     fn passes(&self) -> bool {
         self.error <= self.target
     }

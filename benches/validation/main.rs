@@ -1,7 +1,9 @@
-//! The library against published benchmarks, measurements and theory: what was expected, what was found, and whether that is within its target.
+//! Compares the library with published benchmarks, measurements and theory, and checks whether results are within their
+//! targets.
 //!
-//! `cargo bench --bench validation [-- --quick] [--only NAME]` writes `target/report/validation.md` and plots beside it. What misses its target
-//! is in the table as plainly as what meets it; only a line that met its target when its figures were published fails the bench.
+//! `cargo bench --bench validation [-- --quick] [--only NAME]` writes `target/report/validation.md` and plots. The
+//! table lists missed and met targets alike. The bench fails only if a line misses a target that it met when its
+//! figures were published.
 #![allow(clippy::print_stderr)]
 
 #[path = "../../tests/accuracy/mod.rs"]
@@ -36,11 +38,11 @@ use std::process::ExitCode;
 use lines::Lines;
 use report::Report;
 
-/// What a part does: it writes to the report and adds lines to the table of results. The flag asks for small meshes.
-type Part = fn(&mut Report, &mut Lines, bool);
+/// Writes a section of the report and adds lines to the table of results. The flag selects small meshes.
+type Section = fn(&mut Report, &mut Lines, bool);
 
-/// By their names.
-const PARTS: [(&str, Part); 6] = [
+/// The sections by name.
+const PARTS: [(&str, Section); 6] = [
     ("csm", csm::run),
     ("beam", beam::run),
     ("hertz", hertz::run),
@@ -54,7 +56,7 @@ fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
-            // Given by cargo itself.
+            // Passed by cargo.
             "--bench" => {}
             "--quick" => is_quick = true,
             "--only" => only = Some(arguments.next().unwrap_or_default()),
@@ -64,8 +66,8 @@ fn main() -> ExitCode {
             }
         }
     }
-    let is_asked = |name: &str| only.as_ref().is_none_or(|only| only == name);
-    if !PARTS.iter().any(|(name, _)| is_asked(name)) {
+    let is_selected = |name: &str| only.as_ref().is_none_or(|only| only == name);
+    if !PARTS.iter().any(|(name, _)| is_selected(name)) {
         eprintln!("--only: must be one of {:?}", PARTS.map(|(name, _)| name));
         return ExitCode::FAILURE;
     }
@@ -74,7 +76,7 @@ fn main() -> ExitCode {
     report.write(&machine::description());
     let mut lines = Lines::default();
     for (name, run) in PARTS {
-        if is_asked(name) {
+        if is_selected(name) {
             report.progress(name);
             run(&mut report, &mut lines, is_quick);
         }

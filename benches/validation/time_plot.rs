@@ -1,10 +1,10 @@
-//! A plot over time with even axes: what was measured as dots, what was computed as lines.
+//! A plot over time with linear axes: measurements as dots, simulations as lines.
 
 use std::fmt::Write;
 
 pub struct Curve {
     pub name: String,
-    pub colour: &'static str,
+    pub color: &'static str,
     pub points: Vec<(f64, f64)>,
     pub is_dotted: bool,
 }
@@ -27,7 +27,7 @@ pub fn plot(title: &str, [x_label, y_label]: [&str; 2], curves: &[Curve]) -> Str
          fill=\"#222\">\n<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n<text x=\"{left}\" y=\"28\" font-size=\"17\" \
          font-weight=\"bold\">{title}</text>\n"
     );
-    // Five marks an axis, at whole tenths of the time and whole units of the other.
+    // At most about five marks per axis, at whole tenths of the time and whole units of the other axis.
     let step = (high / 5.0).ceil().max(1.0);
     for mark in (0..).map(|index| index as f64 * step).take_while(|&mark| mark <= high) {
         let at = y(mark);
@@ -52,31 +52,31 @@ pub fn plot(title: &str, [x_label, y_label]: [&str; 2], curves: &[Curve]) -> Str
     }
     for (index, curve) in curves.iter().enumerate() {
         let legend = top + 12.0 + 22.0 * index as f64;
-        let places = curve.points.iter().map(|&(at, value)| (x(at), y(value)));
+        let pixels = curve.points.iter().map(|&(at, value)| (x(at), y(value)));
         if curve.is_dotted {
-            for (at, value) in places {
+            for (at, value) in pixels {
                 let _ = writeln!(
                     svg,
                     "<circle cx=\"{at:.1}\" cy=\"{value:.1}\" r=\"1.8\" fill=\"{}\"/>",
-                    curve.colour
+                    curve.color
                 );
             }
             let _ = writeln!(
                 svg,
                 "<circle cx=\"{}\" cy=\"{legend}\" r=\"3\" fill=\"{}\"/>",
                 right + 29.0,
-                curve.colour
+                curve.color
             );
         } else {
-            let line: Vec<String> = places.map(|(at, value)| format!("{at:.1},{value:.1}")).collect();
+            let line: Vec<String> = pixels.map(|(at, value)| format!("{at:.1},{value:.1}")).collect();
             let _ = writeln!(
                 svg,
                 "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/><path d=\"M{} {legend}h26\" stroke=\"{}\" \
                  stroke-width=\"2.4\"/>",
                 line.join(" "),
-                curve.colour,
+                curve.color,
                 right + 16.0,
-                curve.colour
+                curve.color
             );
         }
         let _ = writeln!(

@@ -1,18 +1,18 @@
-//! An order of nodes by nested dissection (George 1973), from coordinates: halves first, what separates them last. Little
-//! fills in when a matrix is factored in this order, and neighbours lie near each other in memory.
+//! Nested dissection ordering of nodes (George 1973) from coordinates: halves first, separators last. A factor in this
+//! order has little fill-in, and neighbors are close in memory.
 
 use glam::Vec3;
 
 use crate::scene::Scene;
 
-/// So few nodes are not divided.
+/// Sets of at most this many nodes are not divided.
 const LEAF: usize = 24;
 
 /// The nodes in their new order, pinned ones last.
 pub fn order(scene: &Scene) -> Vec<u32> {
     let mut dissection = Dissection {
         positions: &scene.positions,
-        neighbours: neighbours(scene),
+        neighbors: neighbors(scene),
         second_half: vec![false; scene.node_count()],
         order: Vec::new(),
     };
@@ -24,28 +24,28 @@ pub fn order(scene: &Scene) -> Vec<u32> {
     order
 }
 
-/// For each node, its place in the order.
-pub fn places(order: &[u32]) -> Vec<u32> {
-    let mut places = vec![0; order.len()];
-    for (place, &node) in (0..).zip(order) {
-        places[node as usize] = place;
+/// The rank of each node in the order (the inverse permutation).
+pub fn ranks(order: &[u32]) -> Vec<u32> {
+    let mut ranks = vec![0; order.len()];
+    for (rank, &node) in (0..).zip(order) {
+        ranks[node as usize] = rank;
     }
-    places
+    ranks
 }
 
-/// The nodes that springs join each node to.
-pub fn neighbours(scene: &Scene) -> Vec<Vec<u32>> {
-    let mut neighbours = vec![Vec::new(); scene.node_count()];
+/// The nodes that springs join to each node.
+pub fn neighbors(scene: &Scene) -> Vec<Vec<u32>> {
+    let mut neighbors = vec![Vec::new(); scene.node_count()];
     for &[a, b] in &scene.springs {
-        neighbours[a as usize].push(b);
-        neighbours[b as usize].push(a);
+        neighbors[a as usize].push(b);
+        neighbors[b as usize].push(a);
     }
-    neighbours
+    neighbors
 }
 
 struct Dissection<'a> {
     positions: &'a [Vec3],
-    neighbours: Vec<Vec<u32>>,
+    neighbors: Vec<Vec<u32>>,
     second_half: Vec<bool>,
     order: Vec<u32>,
 }
@@ -67,10 +67,11 @@ impl Dissection<'_> {
         self.order.extend(between);
     }
 
-    /// Two halves along an axis, and the nodes of the first that touch the second, taken out of it.
+    /// Splits nodes into two halves along an axis, and the separator: nodes of the first half with neighbors in the
+    /// second.
     fn cut(&mut self, nodes: &[u32], axis: usize) -> [Vec<u32>; 3] {
         let mut sorted = nodes.to_vec();
-        // Nodes at one height are told apart by their other coordinates, so that grids are cut straight.
+        // Ties are broken by the other coordinates, so that grids are cut straight.
         let key = |node: u32| {
             let position = self.positions[node as usize];
             [0, 1, 2].map(|next| position[(axis + next) % 3])
@@ -81,7 +82,7 @@ impl Dissection<'_> {
             self.second_half[node as usize] = true;
         }
         let touches = |node: &u32| {
-            self.neighbours[*node as usize]
+            self.neighbors[*node as usize]
                 .iter()
                 .any(|&near| self.second_half[near as usize])
         };

@@ -1,4 +1,4 @@
-//! Whether the baselines are what they claim: at fine steps they come close to the reference, and closer than at coarse ones.
+//! Checks the convergence of the baselines: fine steps are close to the reference, and closer than coarse ones.
 
 use crate::contender::{Method, Setup};
 use crate::exact::Exact;
@@ -7,10 +7,10 @@ use crate::reference::Reference;
 use crate::report::Report;
 use crate::scene::{SPAN, Scene};
 
-/// An error that fine steps must not leave.
+/// The largest allowed error at fine steps.
 const CLOSE: f64 = 0.02;
 
-/// What a baseline failed in.
+/// Checks the baselines and returns the first failure.
 pub fn run(report: &Report, scene: &Scene, reference: &Reference) -> Result<(), String> {
     let exact = Exact::new(scene);
     let effort = Effort {

@@ -1,43 +1,43 @@
-//! A sparse Cholesky factor, by supernodes: factored in `f64` by the multifrontal method (Duff and Reid 1983; Liu 1992), for
+//! A sparse supernodal Cholesky factor, computed in `f64` by the multifrontal method (Duff and Reid 1983; Liu 1992). It
 //! solves in `f32` with three right-hand sides at once.
 //!
-//! Of a supernode of columns the factor keeps `P = [D^-1; B D^-1]`, D being its own triangle and B what is below. Then
-//! both passes of a solve are products with one dense matrix: forwards `y = D^-1 x` and `x_below -= B D^-1 x`, backwards
-//! `x = P^T [y; -x_below]`.
+//! For a supernode the factor stores `P = [D^-1; B D^-1]`, where D is its triangle and B the rows below. Both passes of
+//! a solve are then products with one dense matrix. The forward pass is `y = D^-1 x` and `x_below -= B D^-1 x`, the
+//! backward pass `x = P^T [y; -x_below]`.
 
 use crate::simd::{self, Kernel, Proof, Record, Vector, lanes};
 
-/// A supernode has no more columns.
+/// The maximum number of columns of a supernode.
 const WIDEST: usize = 96;
-/// Columns are put together while no more of a supernode is zero.
+/// Supernodes are merged while the fraction of explicit zeros stays below this.
 const MOST_ZEROS: f64 = 0.25;
 
-/// A symmetric matrix by columns: the diagonal, and what is below it.
+/// A symmetric matrix by columns: the diagonal and the entries below it.
 pub struct Matrix {
     pub diagonal: Vec<f64>,
-    /// Row and value.
+    /// Row and value of each entry.
     pub below: Vec<Vec<(u32, f64)>>,
 }
 
 pub struct Factor {
     supernodes: Vec<Supernode>,
-    /// Rows of all supernodes below their own columns.
+    /// Row indices of all supernodes below their own columns.
     rows: Vec<u32>,
-    /// P of all supernodes: by groups of as many rows as a vector has records, in them by columns.
+    /// P of all supernodes, in groups of as many rows as a vector has records, column by column in each group.
     panels: Vec<f32>,
-    /// What a solve works with.
+    /// Work space of a solve.
     inputs: Vec<Record>,
     sums: Vec<Record>,
 }
 
-/// Columns that have the same rows below them.
+/// Columns with the same row structure.
 #[derive(Clone, Copy, Debug)]
 struct Supernode {
     first: usize,
     columns: usize,
-    /// Where its rows begin, and how many they are.
+    /// Start and number of its rows.
     rows: (usize, usize),
-    /// Where its panel begins.
+    /// Start of its panel.
     panel: usize,
 }
 
@@ -86,7 +86,7 @@ impl Factor {
     }
 }
 
-/// Which columns are worked on together, and the rows below them.
+/// Finds the supernodes and the rows below their columns.
 fn supernodes(matrix: &Matrix) -> (Vec<Supernode>, Vec<u32>) {
     let count = matrix.diagonal.len();
     let mut patterns: Vec<Vec<u32>> = vec![Vec::new(); count];
@@ -154,23 +154,23 @@ impl Kernel for Numeric<'_> {
         }
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); supernodes.len()];
         let mut updates: Vec<Vec<f64>> = vec![Vec::new(); supernodes.len()];
-        let mut place = vec![0; matrix.diagonal.len()];
+        let mut local_rows = vec![0; matrix.diagonal.len()];
         let mut panels = Vec::new();
         for (index, supernode) in supernodes.iter().enumerate() {
             let Supernode { first, columns, .. } = *supernode;
             let below = &rows[supernode.rows.0..][..supernode.rows.1];
             let height = columns + below.len();
             for column in 0..columns {
-                place[first + column] = column;
+                local_rows[first + column] = column;
             }
             for (row, &node) in below.iter().enumerate() {
-                place[node as usize] = columns + row;
+                local_rows[node as usize] = columns + row;
             }
             let mut front = vec![0.0; height * height];
             for column in 0..columns {
                 front[column * height + column] = matrix.diagonal[first + column];
                 for &(row, value) in &matrix.below[first + column] {
-                    front[column * height + place[row as usize]] = value;
+                    front[column * height + local_rows[row as usize]] = value;
                 }
             }
             for &child in &children[index] {
@@ -178,9 +178,9 @@ impl Kernel for Numeric<'_> {
                 let (start, size) = supernodes[child].rows;
                 let rows = &rows[start..start + size];
                 for (column, &node) in rows.iter().enumerate() {
-                    let to = place[node as usize] * height;
+                    let to = local_rows[node as usize] * height;
                     for row in column..size {
-                        front[to + place[rows[row] as usize]] += update[column * size + row];
+                        front[to + local_rows[rows[row] as usize]] += update[column * size + row];
                     }
                 }
             }
@@ -201,7 +201,7 @@ impl Kernel for Numeric<'_> {
     }
 }
 
-/// Factors the first columns of a dense matrix and takes their share off the others, four columns at a time.
+/// Factors the first columns of a dense matrix and updates the others, four columns at a time.
 #[inline(always)]
 fn eliminate(front: &mut [f64], height: usize, columns: usize) {
     const TOGETHER: usize = 4;
@@ -234,7 +234,7 @@ fn eliminate(front: &mut [f64], height: usize, columns: usize) {
     }
 }
 
-/// Takes multiples of columns off another, from row `from` on.
+/// Subtracts multiples of columns from another, from row `from` on.
 #[inline(always)]
 fn subtract<const N: usize>(to: &mut [f64], from: usize, columns: [(&[f64], f64); N]) {
     let columns = columns.map(|(column, factor)| (&column[from..], factor));
@@ -245,7 +245,7 @@ fn subtract<const N: usize>(to: &mut [f64], from: usize, columns: [(&[f64], f64)
     }
 }
 
-/// Turns columns of L into P: the triangle into its inverse, what is below into its product with that.
+/// Turns columns of L into P: inverts the triangle and multiplies the rows below by the inverse.
 #[inline(always)]
 fn invert(front: &mut [f64], height: usize, columns: usize) {
     // P = [1; B] D^-1 solves P D = [1; B]: column by column from the last.
@@ -318,7 +318,7 @@ impl Kernel for Solve<'_> {
     }
 }
 
-/// Groups of rows that are worked on together, so that sums need not wait for each other.
+/// Number of row groups that are processed together, so that sums are independent.
 const GROUPS: usize = 4;
 
 /// `sums = panel inputs`
@@ -351,7 +351,7 @@ fn multiply<V: Vector>(proof: Proof<V>, panel: &[f32], inputs: &[Record], sums: 
     }
 }
 
-/// Columns that are worked on together.
+/// Number of columns that are processed together.
 const COLUMNS: usize = 8;
 
 /// `outputs = panel^T inputs`

@@ -1,4 +1,4 @@
-//! What every solver has in common: it is started, advances by spans of time, and is read.
+//! The common interface of all solvers: restart, advance by a span, read the state.
 
 use glam::{DVec3, Vec3};
 use sinew::Solver;
@@ -13,66 +13,66 @@ use crate::xpbd::Xpbd;
 
 /// A scene in motion.
 pub trait Contender {
-    /// Goes back to the start.
+    /// Returns to the initial state.
     fn restart(&mut self);
 
-    /// Goes on by one span; or why it could not.
+    /// Advances by one span, or returns the reason of a failure.
     fn advance(&mut self) -> Result<(), String>;
 
-    /// Positions and velocities, as far as they are known at one time.
+    /// Positions and velocities, synchronized as far as the solver allows.
     fn read(&mut self) -> State;
 
-    /// How many substeps it took in the last span, where that is its own choice.
+    /// The number of substeps in the last span, if the solver chose it.
     fn substeps(&self) -> Option<u32> {
         None
     }
 
-    /// How many iterations it took in the last span, where that is its own choice.
+    /// The number of iterations in the last span, if the solver chose it.
     fn iterations(&self) -> Option<u32> {
         None
     }
 }
 
-/// Where nodes are and how fast, in the scene's order.
+/// Positions and velocities of nodes, in the scene's order.
 pub struct State {
     pub positions: Vec<DVec3>,
     pub velocities: Vec<DVec3>,
 }
 
-/// Ways to simulate a scene.
+/// Simulation methods.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
-    /// sinew, by one of its solvers.
+    /// sinew with one of its solvers.
     Sinew(Solver),
-    /// Verlet as the paper prints it.
+    /// Verlet as printed in the paper.
     Paper,
     Xpbd,
     Projective,
 }
 
-/// How a scene is simulated.
+/// The settings of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     pub method: Method,
-    /// Steps in a span.
+    /// Steps per span.
     pub steps: u32,
-    /// VERLET: substeps of a step, 0: as many as it takes.
+    /// VERLET: substeps per step; 0: automatic.
     pub substeps: u32,
-    /// Iterations of a step, where the method has a number of them; sinew: the most it may take, 0: its own choice.
+    /// Iterations per step, if the method has a fixed number. sinew: the maximum; 0: automatic.
     pub iterations: u32,
-    /// VERLET: the part of the mass that may be added.
+    /// VERLET: the fraction of the mass that may be added.
     pub mass_scaling: f32,
-    /// IMPLICIT, NEWTON: the order of the formula, 0: their own choice.
+    /// IMPLICIT, NEWTON: the order of the formula; 0: automatic.
     pub order: u32,
-    /// IMPLICIT, NEWTON: how far equations are solved, 0: their own choice.
+    /// IMPLICIT, NEWTON: the accuracy of the equation solves; 0: automatic.
     pub accuracy: f32,
-    /// s
+    /// Duration of a span [s].
     pub span: f64,
     pub threads: u32,
 }
 
 impl Setup {
-    /// A span in so many steps, everything else as it is plainest.
+    /// A span in `steps` steps, everything else at its simplest.
     pub fn new(method: Method, steps: u32, span: f64, threads: u32) -> Self {
         Self {
             method,
@@ -87,21 +87,21 @@ impl Setup {
         }
     }
 
-    /// s
+    /// Duration of a step [s].
     pub fn step(&self) -> f64 {
         self.span / f64::from(self.steps)
     }
 
-    /// In proportion to the time it takes, along a line.
+    /// A number proportional to the run time, along a line.
     pub fn work(&self) -> f64 {
         match (self.method, self.substeps) {
-            // As many substeps as it takes, however many steps they are in; fewer where mass is added.
+            // As many substeps as necessary, independent of the number of steps; fewer with added mass.
             (Method::Sinew(Solver::Verlet), 0) => 1.0,
             (_, substeps) => f64::from(self.steps * substeps.max(1)),
         }
     }
 
-    /// The time that counts, s: what one thread does by its own clock, which stands while other programs run.
+    /// The counted time [s]: processor time for one thread, which excludes other programs, and wall time for more.
     pub fn counted(&self, elapsed: Elapsed) -> f64 {
         if self.threads == 1 {
             elapsed.processor
@@ -110,7 +110,7 @@ impl Setup {
         }
     }
 
-    /// The scene at its start; or why this version does not offer it.
+    /// The scene at its start, or the reason that this version does not support it.
     pub fn start(self, scene: &Scene) -> Result<Box<dyn Contender>, String> {
         Ok(match self.method {
             Method::Sinew(solver) => Box::new(Tissue::new(scene, solver, self)?),
@@ -121,12 +121,12 @@ impl Setup {
     }
 }
 
-/// A position or a displacement as a record, with a fourth number beside it.
+/// A vector as a record, with a fourth number.
 pub fn record(vector: Vec3, beside: f32) -> Record {
     Record([vector.x, vector.y, vector.z, beside])
 }
 
-/// The vector in a record.
+/// The vector of a record.
 pub fn vector(record: &Record) -> DVec3 {
     let [x, y, z, _] = record.0;
     Vec3::new(x, y, z).as_dvec3()

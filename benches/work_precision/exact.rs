@@ -1,4 +1,4 @@
-//! Forces, energy and the stability limit of a scene in `f64`.
+//! Forces, energy and stability limit of a scene in `f64`.
 
 use glam::DVec3;
 
@@ -8,7 +8,7 @@ use crate::scene::Scene;
 /// A scene in `f64`.
 pub struct Exact {
     pub springs: Vec<Spring>,
-    /// kg; 0: pinned.
+    /// Masses [kg]; 0 is pinned.
     pub masses: Vec<f64>,
     pub gravity: DVec3,
 }
@@ -22,13 +22,13 @@ pub struct Spring {
 }
 
 impl Spring {
-    /// From `b` to `a`.
+    /// The vector from `b` to `a`.
     pub fn between(&self, vectors: &[DVec3]) -> DVec3 {
         vectors[self.a as usize] - vectors[self.b as usize]
     }
 }
 
-/// J
+/// Energies [J].
 #[derive(Clone, Copy)]
 pub struct Energy {
     pub kinetic: f64,
@@ -56,7 +56,7 @@ impl Exact {
         }
     }
 
-    /// The force on each node, N, by springs and gravity; none on those that are pinned.
+    /// Computes the force of springs and gravity on each node [N]; zero for pinned nodes.
     pub fn forces(&self, positions: &[DVec3], forces: &mut [DVec3]) {
         for (force, &mass) in forces.iter_mut().zip(&self.masses) {
             *force = mass * self.gravity;
@@ -71,22 +71,22 @@ impl Exact {
         self.hold(forces);
     }
 
-    /// What all springs together pull the pinned nodes with, N.
+    /// The total force of the springs on the pinned nodes [N].
     pub fn force_on_pins(&self, positions: &[DVec3]) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for spring in &self.springs {
-            let held = [spring.a, spring.b].map(|node| self.masses[node as usize] == 0.0);
-            if held[0] != held[1] {
+            let pinned = [spring.a, spring.b].map(|node| self.masses[node as usize] == 0.0);
+            if pinned[0] != pinned[1] {
                 let apart = spring.between(positions);
                 let length = apart.length();
                 let pull = apart * (spring.stiffness * (spring.rest_length - length) / length);
-                sum += if held[0] { pull } else { -pull };
+                sum += if pinned[0] { pull } else { -pull };
             }
         }
         sum
     }
 
-    /// Takes away what acts on pinned nodes.
+    /// Sets the entries of pinned nodes to zero.
     pub fn hold(&self, vectors: &mut [DVec3]) {
         for (vector, &mass) in vectors.iter_mut().zip(&self.masses) {
             if mass == 0.0 {
@@ -113,7 +113,7 @@ impl Exact {
         elastic + self.masses.iter().zip(positions).map(raised).sum::<f64>()
     }
 
-    /// The longest step that leapfrog stands at these positions, springs unstretched: 2 over the highest frequency, by
+    /// The longest stable leapfrog step at these positions with unstretched springs: 2 over the highest frequency, by
     /// power iteration.
     pub fn stable_step(&self, positions: &[DVec3]) -> f64 {
         let mut random = Random(1);

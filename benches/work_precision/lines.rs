@@ -1,36 +1,36 @@
-//! Which settings of which solvers are measured: a line of a diagram is a solver with its points from coarse to fine.
+//! The measured settings of each solver. A line of a diagram is a solver with its points from coarse to fine.
 
 use sinew::Solver;
 
 use crate::contender::{Method, Setup};
 use crate::scene::SPAN;
 
-/// A solver, swept over its step.
+/// A solver with a sweep over its step.
 pub struct Line {
     pub name: String,
-    /// What it is listed under where only the best of its lines counts.
+    /// The name under which only the best of several lines counts.
     pub family: &'static str,
     pub setups: Vec<Setup>,
 }
 
-/// Multiples of the steps that stability needs.
+/// Multiples of the number of steps that stability requires.
 const FINER: [f64; 4] = [1.0, 1.5, 2.0, 4.0];
-/// World steps of a span, 1/64 s each to 0.1 ms.
+/// World steps per span, of 1/64 s to 0.1 ms each.
 const WORLD_STEPS: [u32; 3] = [2, 32, 312];
-/// Parts of the mass that may be added, in frames of 1/64 s; the default is 1e-3.
+/// Fractions of the mass that may be added, in frames of 1/64 s; the default is 1e-3.
 const ADDED: [f32; 7] = [1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
-/// Steps of a span for what is stable at any step, 1/64 s to 0.49 ms.
+/// Steps per span for unconditionally stable solvers, 1/64 s to 0.49 ms.
 const STEPS: [u32; 6] = [2, 4, 8, 16, 32, 64];
-/// The same for the yardstick.
-const YARDSTICK_STEPS: [u32; 3] = [2, 8, 32];
-/// How far IMPLICIT solves its equations: its own choice, and loosely.
+/// The same for the reference solver.
+const REFERENCE_STEPS: [u32; 3] = [2, 8, 32];
+/// Accuracies of IMPLICIT's equation solves: the default and a loose one.
 const ACCURACIES: [f32; 2] = [0.01, 0.1];
-/// Substeps of a frame, 1/64 s.
+/// Substeps per frame of 1/64 s.
 const XPBD_SUBSTEPS: [u32; 6] = [8, 16, 32, 64, 128, 512];
 const PROJECTIVE_STEPS: [u32; 5] = [1, 4, 8, 32, 128];
 const PROJECTIVE_ITERATIONS: [u32; 3] = [1, 10, 30];
 
-/// All lines for a scene in which leapfrog stands steps of `stable_step`, s.
+/// All lines for a scene whose longest stable leapfrog step is `stable_step` [s].
 pub fn lines(stable_step: f64, threads: u32) -> Vec<Line> {
     let mut lines = verlet(stable_step, threads);
     lines.extend(implicit(threads));
@@ -46,7 +46,7 @@ fn line(name: impl Into<String>, family: &'static str, setups: impl IntoIterator
     }
 }
 
-/// So many times as many steps in a span as stability needs.
+/// Number of steps per span: `finer` times as many as stability requires.
 fn needed(finer: f64, stable_step: f64) -> u32 {
     (finer * SPAN / stable_step).ceil() as u32
 }
@@ -89,7 +89,7 @@ fn implicit(threads: u32) -> Vec<Line> {
         .collect();
     let euler = STEPS.map(setup(Solver::Implicit, 1, ACCURACIES[0]));
     lines.push(line("IMPLICIT, Euler", "IMPLICIT, Euler", euler));
-    let newton = YARDSTICK_STEPS.map(setup(Solver::Newton, 2, 0.0));
+    let newton = REFERENCE_STEPS.map(setup(Solver::Newton, 2, 0.0));
     lines.push(line("NEWTON", "NEWTON", newton));
     lines
 }

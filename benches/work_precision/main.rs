@@ -1,19 +1,20 @@
-//! Work-precision diagrams: error against a converged reference, and the time for it, for sinew's solvers, the paper's Verlet
-//! (Halic et al., section 3) as printed, XPBD with substeps (Macklin et al. 2019) and Projective Dynamics (Liu et al. 2013).
+//! Work-precision diagrams: error against a converged reference over run time. They compare sinew's solvers, the
+//! paper's Verlet (Halic et al., section 3) as printed, XPBD with substeps (Macklin et al. 2019) and Projective
+//! Dynamics (Liu et al. 2013).
 //!
-//! `cargo bench --bench work_precision [-- --quick] [--only <scene or settling>] [--part <part>] [--threads <n>] [--check]` writes
-//! `target/report/work_precision.md` and diagrams beside it. References are computed once and kept in
+//! `cargo bench --bench work_precision [-- --quick] [--only <scene or settling>] [--part <part>] [--threads <n>]
+//! [--check]` writes `target/report/work_precision.md` and diagrams. References are computed once and cached in
 //! `target/reference`.
 #![allow(clippy::print_stderr)]
 
 mod bisection;
+mod cache;
 mod check;
 mod cholesky;
 #[path = "../storage/clock.rs"]
 mod clock;
 mod contender;
 mod exact;
-mod kept;
 mod lines;
 #[path = "../storage/machine.rs"]
 mod machine;
@@ -50,17 +51,17 @@ use reference::Reference;
 use report::Report;
 use scene::Scene;
 
-/// What is measured of a scene.
+/// The measurements of a scene.
 const PARTS: [&str; 3] = ["motion", "rest", "tolerance"];
 
-/// What is asked for on the command line.
+/// The command-line options.
 struct Options {
     quick: bool,
     check: bool,
     scenes: Vec<&'static str>,
-    /// The one part that belongs to no scene.
+    /// Run the measurement that belongs to no scene.
     settling: bool,
-    /// What is measured of each scene.
+    /// The measurements of each scene.
     parts: Vec<&'static str>,
     threads: u32,
 }
@@ -78,7 +79,7 @@ impl Options {
         let mut arguments = std::env::args().skip(1);
         while let Some(argument) = arguments.next() {
             match argument.as_str() {
-                // Given by cargo itself.
+                // Passed by cargo.
                 "--bench" => {}
                 "--quick" => options.quick = true,
                 "--check" => options.check = true,
@@ -116,9 +117,9 @@ impl Options {
 }
 
 fn main() -> ExitCode {
-    let done =
+    let result =
         Options::from_arguments().and_then(|options| if options.check { check(&options) } else { run(&options) });
-    match done {
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
             eprintln!("{message}");
@@ -127,11 +128,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// Shows that the baselines are right.
+/// Checks that the baselines are correct.
 fn check(options: &Options) -> Result<(), String> {
     let report = Report::new("work_precision");
     for name in &options.scenes {
-        // No baseline is expected to converge at these settings where stiffness differs by a thousand or slivers snap.
+        // At these settings no baseline is expected to converge with stiffness ratios of a thousand or slivers that
+        // snap through.
         if !["contrast", "stomach"].contains(name) {
             let scene = scenes::scene(name)?;
             check::run(&report, &scene, &Reference::of(&scene, &report))?;
@@ -140,7 +142,7 @@ fn check(options: &Options) -> Result<(), String> {
     Ok(())
 }
 
-/// Measures everything.
+/// Runs all measurements.
 fn run(options: &Options) -> Result<(), String> {
     let effort = if options.quick { Effort::QUICK } else { Effort::FULL };
     let mut report = Report::new("work_precision");
@@ -156,7 +158,7 @@ fn run(options: &Options) -> Result<(), String> {
         };
         let reference = Reference::of(&scene, &report);
         report.write(&format!(
-            "\n## {name}\n\n{} {} nodes, {} springs; leapfrog stands steps of {:.4} ms. Half as many steps \
+            "\n## {name}\n\n{} {} nodes, {} springs; leapfrog is stable up to steps of {:.4} ms. Half as many steps \
              change the reference by {}.\n",
             scene.description,
             scene.node_count(),
@@ -164,16 +166,16 @@ fn run(options: &Options) -> Result<(), String> {
             1e3 * reference.stable_step,
             tables::percent(reference.uncertainty)
         ));
-        let asked = |part| options.parts.contains(&part);
-        if asked("motion") {
+        let is_selected = |part| options.parts.contains(&part);
+        if is_selected("motion") {
             let sweeps = sweeps(&scene, &reference, options.threads, effort, &mut report);
             tables::write(&mut report, &scene, &reference, &sweeps);
             overview.add(name, &reference, &sweeps);
         }
-        if asked("rest") {
+        if is_selected("rest") {
             rest::run(&mut report, &scene, options.threads, effort.patience_at_rest);
         }
-        if asked("tolerance") {
+        if is_selected("tolerance") {
             tolerance::run(
                 &mut report,
                 &scene,
@@ -215,15 +217,15 @@ fn introduction(options: &Options) -> String {
     text.push_str(
         "- Error: RMS over nodes and 8 sample times within 0.25 s of the distance to leapfrog in `f64`, over RMS of its \
          motion. Force error: of the force on all pins together, in the RMS of that force. Volume error: of the \
-         tetrahedra's volume, in that at the start. s/s: seconds per simulated second. h: what a solver takes at once, a substep where it has any. Energy \
+         tetrahedra's volume, in that at the start. s/s: seconds per simulated second. h: a solver's step, or its substep if it has any. Energy \
          drift: at the end, in the largest kinetic energies.\n\
          - Times are the best of up to two runs, in processor time of the thread. Preparing (laying out springs, \
-         colouring, factoring) is not in them and stands apart. What takes too long is stopped, or not begun, and listed as \
-         too slow, with the time it is expected to take.\n",
+         coloring, factoring) is not included and listed separately. Runs that take too long are stopped, or not started, and listed as \
+         too slow, with the expected time.\n",
     );
     if options.threads > 1 {
         text.push_str(&format!(
-            "- sinew on {} threads and all times on the wall's clock; baselines run on one thread.\n",
+            "- sinew on {} threads and all times in wall time; baselines run on one thread.\n",
             options.threads
         ));
     }

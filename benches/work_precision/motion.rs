@@ -1,4 +1,4 @@
-//! Work and precision of a motion: every point of every line is run, timed and compared with the reference.
+//! Work and precision of a motion: runs and times every point of every line, and compares it with the reference.
 
 use glam::DVec3;
 
@@ -10,18 +10,18 @@ use crate::reference::{Motion, Reference};
 use crate::report::{Report, digits};
 use crate::scene::{DURATION, SAMPLES, SPAN, Scene};
 
-/// A larger error, in RMS distances from the start, is a failure.
+/// A larger error, relative to the RMS distance from the start, is a failure.
 const FAILED: f64 = 10.0;
 
-/// How long points are measured.
+/// The measuring effort per point.
 #[derive(Clone, Copy)]
 pub struct Effort {
     pub quick: bool,
-    /// Timed runs after the first, of points that take less than a second.
+    /// Timed runs after the first, for points that take less than a second.
     pub runs: usize,
-    /// A run that takes longer, or would by the one before it, is given up, s.
+    /// A run that takes longer, or is expected to, is stopped [s].
     pub patience: f64,
-    /// Nothing is followed to its rest for longer, s.
+    /// Time limit of a run to rest [s].
     pub patience_at_rest: f64,
 }
 
@@ -40,21 +40,21 @@ impl Effort {
     };
 }
 
-/// A setting and what came of it.
+/// A setting and its result.
 pub struct Point {
     pub setup: Setup,
-    /// s, of what the solver takes at once.
+    /// The duration of a step or substep [s].
     pub step: f64,
-    /// What setting up took, s.
+    /// Time of the setup [s].
     pub preparation: f64,
     pub outcome: Result<Measured, Missing>,
 }
 
-/// Why a point has no figures.
+/// The reason for a point without figures.
 #[derive(Clone, Debug)]
 pub enum Missing {
     Failed(String),
-    /// Stopped, or not begun: it takes longer, or would, than so many seconds per simulated second.
+    /// Stopped or not started, as it takes this many seconds per simulated second.
     TooSlow(f64),
 }
 
@@ -69,29 +69,29 @@ impl std::fmt::Display for Missing {
 
 #[derive(Clone, Copy)]
 pub struct Measured {
-    /// RMS over nodes and samples, in RMS distances from the start.
+    /// RMS over nodes and samples, relative to the RMS distance from the start.
     pub error: f64,
-    /// Of the force on all pins together, RMS over samples, in the RMS of that force.
+    /// Error of the total force on the pins, RMS over samples, relative to the RMS of that force.
     pub force_error: f64,
-    /// Of the volume, RMS over samples, in the volume at the start; `None`: there are no tetrahedra.
+    /// Error of the volume, RMS over samples, relative to the volume at the start; `None` without tetrahedra.
     pub volume_error: Option<f64>,
-    /// Per simulated second.
+    /// Seconds per simulated second.
     pub seconds: f64,
-    /// Of a step, where they were the solver's choice.
+    /// Iterations per step, if the solver chose them.
     pub iterations: Option<f64>,
-    /// s, per spring and step.
+    /// Time per spring and step [s].
     pub per_spring: f64,
-    /// Energy at the end less that at the start, in the largest kinetic energies.
+    /// Energy at the end minus that at the start, relative to the largest kinetic energy.
     pub drift: f64,
 }
 
-/// A line and its points; or why it is not offered.
+/// A line and its points, or the reason that it is not supported.
 pub struct Sweep {
     pub line: Line,
     pub points: Result<Vec<Point>, String>,
 }
 
-/// Measures a line from coarse to fine, as far as patience reaches.
+/// Measures a line from coarse to fine, within the time limit.
 pub fn sweep(scene: &Scene, reference: &Reference, line: Line, effort: Effort, report: &Report) -> Sweep {
     let exact = Exact::new(scene);
     let mut points: Vec<Point> = Vec::new();
@@ -146,7 +146,7 @@ fn described(point: &Point) -> String {
     }
 }
 
-/// Runs one setting: once to compare, and again for the best time. An error is an answer: not offered.
+/// Runs one setting: once to compare, and again for the best time. An error means that the setting is not supported.
 pub fn measure(
     scene: &Scene,
     exact: &Exact,
@@ -163,7 +163,7 @@ pub fn measure(
     let mut step = setup.step() / f64::from(setup.substeps.max(1));
     let outcome = run(contender.as_mut(), setup, effort.patience).and_then(|first| {
         let error = reference.error(&first.motion, scene);
-        // A NaN is not below either.
+        // The negated comparison also rejects NaN.
         if !(error < FAILED) {
             return Err(Missing::Failed(match error.is_nan() {
                 true => "not finite".into(),
@@ -199,37 +199,37 @@ pub fn measure(
 
 /// See [`Measured`].
 fn force_error(exact: &Exact, motion: &Motion, reference: &Reference) -> f64 {
-    let mut off = 0.0;
+    let mut squared_error = 0.0;
     let mut size = 0.0;
     for (positions, reference) in motion.iter().zip(&reference.motion) {
         let force = exact.force_on_pins(reference);
-        off += exact.force_on_pins(positions).distance_squared(force);
+        squared_error += exact.force_on_pins(positions).distance_squared(force);
         size += force.length_squared();
     }
-    (off / size).sqrt()
+    (squared_error / size).sqrt()
 }
 
 /// See [`Measured`].
 fn volume_error(scene: &Scene, motion: &Motion, reference: &Reference) -> Option<f64> {
-    let off = |(positions, reference): (&Vec<DVec3>, &Vec<DVec3>)| {
+    let squared_error = |(positions, reference): (&Vec<DVec3>, &Vec<DVec3>)| {
         (scene.volume(positions) - scene.volume(reference)).powi(2)
     };
-    let squares: f64 = motion.iter().zip(&reference.motion).map(off).sum();
+    let squares: f64 = motion.iter().zip(&reference.motion).map(squared_error).sum();
     (!scene.tetrahedra.is_empty()).then(|| (squares / SAMPLES as f64).sqrt() / scene.volume(&scene.start()))
 }
 
-/// What one run showed.
+/// The result of one run.
 struct Run {
     seconds: f64,
     motion: Motion,
-    /// The end.
+    /// The final state.
     last: State,
-    /// Taken in all, where they were the solver's choice.
+    /// Totals, if the solver chose them.
     substeps: Option<u32>,
     iterations: Option<u32>,
 }
 
-/// Runs a motion from its start, unless it takes longer than `patience`, s.
+/// Runs a motion from its start, unless it takes longer than `patience` [s].
 fn run(contender: &mut dyn Contender, setup: Setup, patience: f64) -> Result<Run, Missing> {
     contender.restart();
     let mut seconds = 0.0;
@@ -238,7 +238,7 @@ fn run(contender: &mut dyn Contender, setup: Setup, patience: f64) -> Result<Run
     let mut iterations = Some(0);
     let mut last = contender.read();
     for sample in 0..SAMPLES {
-        // A fraction of the motion tells how long the whole of it takes.
+        // The total time is extrapolated from the fraction that was run.
         if seconds > patience {
             return Err(Missing::TooSlow(seconds / (sample as f64 * SPAN)));
         }
@@ -246,8 +246,8 @@ fn run(contender: &mut dyn Contender, setup: Setup, patience: f64) -> Result<Run
         let elapsed = clock::time(|| advanced = contender.advance());
         advanced.map_err(Missing::Failed)?;
         seconds += setup.counted(elapsed);
-        substeps = contender.substeps().and_then(|taken| Some(substeps? + taken));
-        iterations = contender.iterations().and_then(|taken| Some(iterations? + taken));
+        substeps = contender.substeps().and_then(|count| Some(substeps? + count));
+        iterations = contender.iterations().and_then(|count| Some(iterations? + count));
         last = contender.read();
         motion.push(last.positions.clone());
     }

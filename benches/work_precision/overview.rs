@@ -1,15 +1,15 @@
-//! One table over all scenes: what each way to simulate needs for an error. It stands in FIGURES.md.
+//! One table over all scenes: the time that each method needs for an error. FIGURES.md contains it.
 
 use crate::motion::Sweep;
 use crate::reference::Reference;
 use crate::report::{Report, Table};
 use crate::summary::{families, times};
 
-/// Grows by a column with each scene.
+/// Each scene adds a column.
 #[derive(Default)]
 pub struct Overview {
     scenes: Vec<&'static str>,
-    /// Of each family, a cell for each scene.
+    /// For each family, one cell per scene.
     rows: Vec<(&'static str, Vec<String>)>,
 }
 

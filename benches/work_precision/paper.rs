@@ -1,6 +1,7 @@
-//! Verlet as Halic et al. print it (section 3): positions alone, `x + (x - x_previous) d + a h²`.
+//! Verlet as Halic et al. print it (section 3): positions only, `x + (x - x_previous) d + a h²`.
 //!
-//! Forces and the step in one pass over memory, springs at both of their nodes, as many nodes at a time as there are lanes.
+//! Forces and the step take one pass over memory. Springs are stored at both of their nodes, and a vector processes as
+//! many nodes as it has lanes.
 
 use glam::DVec3;
 
@@ -11,39 +12,39 @@ use crate::scene::Scene;
 use crate::simd::{self, Kernel, Proof, Record, Vector};
 
 pub struct Paper {
-    places: Vec<u32>,
+    ranks: Vec<u32>,
     rows: Rows,
     start: Vec<Record>,
     positions: Vec<Record>,
     previous: Vec<Record>,
-    /// h² over the mass, for each lane; 0: pinned.
+    /// h² over the mass, for each lane; 0 is pinned.
     push: Vec<f32>,
-    /// h² for each lane, 0: pinned.
+    /// h² for each lane; 0 is pinned.
     fall: Vec<f32>,
     gravity: [f32; 3],
-    /// What is left of a velocity after a step.
+    /// The factor of velocities per step.
     damping: f32,
     steps: u32,
-    /// s
+    /// Duration of a step [s].
     step: f64,
 }
 
 impl Paper {
     pub fn new(scene: &Scene, setup: Setup) -> Self {
         let order = bisection::order(scene);
-        let places = bisection::places(&order);
-        let rows = Rows::new(scene, &places, 1.0);
+        let ranks = bisection::ranks(&order);
+        let rows = Rows::new(scene, &ranks, 1.0);
         let square = (setup.step() * setup.step()) as f32;
-        let mass = |place: u32| scene.masses[order[place as usize] as usize];
-        let of_free = |place: u32, value: f32| if mass(place) > 0.0 { value } else { 0.0 };
+        let mass = |rank: u32| scene.masses[order[rank as usize] as usize];
+        let if_free = |rank: u32, value: f32| if mass(rank) > 0.0 { value } else { 0.0 };
         let mut start: Vec<Record> = (order.iter())
             .map(|&node| record(scene.positions[node as usize], 0.0))
             .collect();
         start.push(Record::default());
         let mut paper = Self {
-            push: rows.per_lane(|place| of_free(place, square / mass(place))),
-            fall: rows.per_lane(|place| of_free(place, square)),
-            places,
+            push: rows.per_lane(|rank| if_free(rank, square / mass(rank))),
+            fall: rows.per_lane(|rank| if_free(rank, square)),
+            ranks,
             rows,
             positions: start.clone(),
             previous: start.clone(),
@@ -65,7 +66,7 @@ impl Paper {
 
 impl Contender for Paper {
     fn restart(&mut self) {
-        // At rest is where it would be as far from the start a step before as a step after: x - x_previous = -a h² / 2.
+        // Starting at rest means equal distances one step before and after the start: x - x_previous = -a h² / 2.
         self.positions.clone_from(&self.start);
         self.previous.clone_from(&self.start);
         self.step();
@@ -83,24 +84,24 @@ impl Contender for Paper {
     }
 
     fn read(&mut self) -> State {
-        let kept = [self.positions.clone(), self.previous.clone()];
+        let saved = [self.positions.clone(), self.previous.clone()];
         self.step();
-        let velocity = |place: u32| {
-            let moved: DVec3 = vector(&self.positions[place as usize]) - vector(&kept[1][place as usize]);
-            moved / (2.0 * self.step)
+        let velocity = |rank: u32| {
+            let displacement: DVec3 = vector(&self.positions[rank as usize]) - vector(&saved[1][rank as usize]);
+            displacement / (2.0 * self.step)
         };
         let state = State {
-            positions: (self.places.iter())
-                .map(|&place| vector(&kept[0][place as usize]))
+            positions: (self.ranks.iter())
+                .map(|&rank| vector(&saved[0][rank as usize]))
                 .collect(),
-            velocities: self.places.iter().map(|&place| velocity(place)).collect(),
+            velocities: self.ranks.iter().map(|&rank| velocity(rank)).collect(),
         };
-        [self.positions, self.previous] = kept;
+        [self.positions, self.previous] = saved;
         state
     }
 }
 
-/// Puts the next positions in the place of the previous ones.
+/// Overwrites the previous positions with the next ones.
 struct Step<'a>(&'a mut Paper);
 
 impl Kernel for Step<'_> {
@@ -120,8 +121,8 @@ impl Kernel for Step<'_> {
             let fall = V::load(proof, &paper.fall[at..]);
             let position = [x, y, z];
             let next = |axis: usize| {
-                let moved = (position[axis] - previous[axis]) * damping;
-                position[axis] + forces[axis].mul_add(push, gravity[axis].mul_add(fall, moved))
+                let displacement = (position[axis] - previous[axis]) * damping;
+                position[axis] + forces[axis].mul_add(push, gravity[axis].mul_add(fall, displacement))
             };
             let next = [next(0), next(1), next(2), beside];
             V::store_records(next, &mut paper.previous, &paper.rows.nodes, at, 0);

@@ -1,8 +1,9 @@
-//! Fast simulation of mass-spring systems (Liu et al. 2013): block coordinate descent on implicit Euler's energy. Springs
-//! choose their directions, then all nodes move together by a system that never changes, `M + h² L`, factored beforehand.
+//! Fast simulation of mass-spring systems (Liu et al. 2013): block coordinate descent on the energy of implicit Euler.
+//! The local step sets the directions of springs. The global step moves all nodes by solving the constant system `M +
+//! h² L`, which is factored in advance.
 //!
-//! Solved for the change of the displacement, `(M + h² L) du = M (s - u) + h² f(x + u)`: the same iterates, without the
-//! rounding of positions in them.
+//! It is solved for the change of the displacement, `(M + h² L) du = M (s - u) + h² f(x + u)`. The iterates are the
+//! same, without the rounding of positions.
 
 use crate::bisection;
 use crate::cholesky::{Factor, Matrix};
@@ -12,58 +13,58 @@ use crate::scene::Scene;
 use crate::simd::{self, Kernel, Proof, Record, Vector};
 
 pub struct Projective {
-    places: Vec<u32>,
-    /// Stiffnesses times h².
+    ranks: Vec<u32>,
+    /// Springs, with stiffnesses times h².
     rows: Rows,
     factor: Factor,
-    /// kg for each lane; 0: pinned.
+    /// Masses for each lane [kg]; 0 is pinned.
     masses: Vec<f32>,
-    /// For each lane 1; 0: pinned.
+    /// 1 for each lane of a free node; 0 is pinned.
     free: Vec<f32>,
     start: Vec<Record>,
-    /// Where nodes were when the step began, and 1 beside it; 0: pinned.
-    begun: Vec<Record>,
-    /// Where they are.
+    /// Positions at the start of the step, with 1 as the fourth number; 0 is pinned.
+    step_start: Vec<Record>,
+    /// Current positions.
     positions: Vec<Record>,
-    /// How far they have moved in the step.
-    moved: Vec<Record>,
-    /// How far they would without springs.
-    inert: Vec<Record>,
+    /// Displacements in the step.
+    displacement: Vec<Record>,
+    /// Displacements without springs.
+    inertial: Vec<Record>,
     residual: Vec<Record>,
     fall: Record,
     damping: f32,
     steps: u32,
     iterations: u32,
-    /// s
+    /// Duration of a step [s].
     step: f64,
 }
 
 impl Projective {
     pub fn new(scene: &Scene, setup: Setup) -> Self {
         let order = bisection::order(scene);
-        let places = bisection::places(&order);
+        let ranks = bisection::ranks(&order);
         let h = setup.step();
         let square = h * h;
-        let rows = Rows::new(scene, &places, square as f32);
-        let mass = |place: u32| scene.masses[order[place as usize] as usize];
-        let free = |place: u32| f32::from(mass(place) > 0.0);
+        let rows = Rows::new(scene, &ranks, square as f32);
+        let mass = |rank: u32| scene.masses[order[rank as usize] as usize];
+        let free = |rank: u32| f32::from(mass(rank) > 0.0);
         let mut start: Vec<Record> = (0..order.len() as u32)
-            .map(|place| record(scene.positions[order[place as usize] as usize], free(place)))
+            .map(|rank| record(scene.positions[order[rank as usize] as usize], free(rank)))
             .collect();
         start.push(Record::default());
-        let nothing = vec![Record::default(); start.len()];
+        let zeros = vec![Record::default(); start.len()];
         Self {
-            factor: Factor::new(&system(scene, &places, square)),
+            factor: Factor::new(&system(scene, &ranks, square)),
             masses: rows.per_lane(mass),
             free: rows.per_lane(free),
-            places,
+            ranks,
             rows,
-            begun: start.clone(),
+            step_start: start.clone(),
             positions: start.clone(),
             start,
-            moved: nothing.clone(),
-            inert: nothing.clone(),
-            residual: nothing,
+            displacement: zeros.clone(),
+            inertial: zeros.clone(),
+            residual: zeros,
             fall: record(scene.gravity * square as f32, 0.0),
             damping: (-f64::from(scene.damping_rate) * h).exp() as f32,
             steps: setup.steps,
@@ -76,7 +77,7 @@ impl Projective {
         simd::run(Begin(self));
         for _ in 0..self.iterations {
             simd::run(Residual(self));
-            let nodes = self.places.len();
+            let nodes = self.ranks.len();
             self.factor.solve(&mut self.residual[..nodes]);
             simd::run(Move(self));
         }
@@ -85,9 +86,9 @@ impl Projective {
 
 impl Contender for Projective {
     fn restart(&mut self) {
-        self.begun.clone_from(&self.start);
+        self.step_start.clone_from(&self.start);
         self.positions.clone_from(&self.start);
-        self.moved.fill(Record::default());
+        self.displacement.fill(Record::default());
     }
 
     fn advance(&mut self) -> Result<(), String> {
@@ -98,26 +99,25 @@ impl Contender for Projective {
     }
 
     fn read(&mut self) -> State {
-        let exact = |records: &[Record]| -> Vec<_> {
-            self.places
-                .iter()
-                .map(|&place| vector(&records[place as usize]))
-                .collect()
-        };
-        let moved = exact(&self.moved);
+        let exact =
+            |records: &[Record]| -> Vec<_> { self.ranks.iter().map(|&rank| vector(&records[rank as usize])).collect() };
+        let displacement = exact(&self.displacement);
         State {
-            positions: exact(&self.begun)
+            positions: exact(&self.step_start)
                 .into_iter()
-                .zip(&moved)
-                .map(|(at, moved)| at + *moved)
+                .zip(&displacement)
+                .map(|(at, displacement)| at + *displacement)
                 .collect(),
-            velocities: moved.iter().map(|moved| *moved / self.step).collect(),
+            velocities: displacement
+                .iter()
+                .map(|displacement| *displacement / self.step)
+                .collect(),
         }
     }
 }
 
-/// `M + h² L` without the nodes that are pinned, of which the diagonal alone is left.
-pub fn system(scene: &Scene, places: &[u32], square: f64) -> Matrix {
+/// `M + h² L` without pinned nodes, of which only the diagonal remains.
+pub fn system(scene: &Scene, ranks: &[u32], square: f64) -> Matrix {
     let count = scene.node_count();
     let mut matrix = Matrix {
         diagonal: vec![1.0; count],
@@ -125,16 +125,16 @@ pub fn system(scene: &Scene, places: &[u32], square: f64) -> Matrix {
     };
     for (node, &mass) in scene.masses.iter().enumerate() {
         if mass > 0.0 {
-            matrix.diagonal[places[node] as usize] = f64::from(mass);
+            matrix.diagonal[ranks[node] as usize] = f64::from(mass);
         }
     }
     for (&[a, b], &stiffness) in scene.springs.iter().zip(&scene.stiffnesses) {
         let weight = square * f64::from(stiffness);
         let free = [a, b].map(|node| !scene.is_pinned(node as usize));
-        let [a, b] = [a, b].map(|node| places[node as usize]);
-        for (place, free) in [a, b].into_iter().zip(free) {
+        let [a, b] = [a, b].map(|node| ranks[node as usize]);
+        for (rank, free) in [a, b].into_iter().zip(free) {
             if free {
-                matrix.diagonal[place as usize] += weight;
+                matrix.diagonal[rank as usize] += weight;
             }
         }
         if free == [true, true] {
@@ -144,7 +144,7 @@ pub fn system(scene: &Scene, places: &[u32], square: f64) -> Matrix {
     matrix
 }
 
-/// Ends a step and begins the next, from where inertia leads.
+/// Ends a step and begins the next at the inertial prediction.
 struct Begin<'a>(&'a mut Projective);
 
 impl Kernel for Begin<'_> {
@@ -153,20 +153,26 @@ impl Kernel for Begin<'_> {
     #[inline(always)]
     fn run<V: Vector>(self, _: Proof<V>) {
         let Projective {
-            begun,
+            step_start,
             positions,
-            moved,
-            inert,
+            displacement,
+            inertial,
             fall,
             damping,
             ..
         } = self.0;
-        for (((begun, position), moved), inert) in begun.iter_mut().zip(positions).zip(moved).zip(inert) {
-            *begun = begun.zip(*moved, |begun, moved| begun + moved);
-            let led = moved.zip(*fall, |moved, fall| moved * *damping + fall);
-            *inert = if begun.0[3] > 0.0 { led } else { Record::default() };
-            *moved = *inert;
-            *position = begun.zip(*moved, |begun, moved| begun + moved);
+        for (((step_start, position), displacement), inertial) in
+            step_start.iter_mut().zip(positions).zip(displacement).zip(inertial)
+        {
+            *step_start = step_start.zip(*displacement, |step_start, displacement| step_start + displacement);
+            let predicted = displacement.zip(*fall, |displacement, fall| displacement * *damping + fall);
+            *inertial = if step_start.0[3] > 0.0 {
+                predicted
+            } else {
+                Record::default()
+            };
+            *displacement = *inertial;
+            *position = step_start.zip(*displacement, |step_start, displacement| step_start + displacement);
         }
     }
 }
@@ -184,27 +190,27 @@ impl Kernel for Residual<'_> {
             masses,
             free,
             positions,
-            moved,
-            inert,
+            displacement,
+            inertial,
             residual,
             ..
         } = self.0;
         for block in 0..rows.block_count() {
             let at = block * V::COUNT;
             let [x, y, z, _] = V::load_records(proof, positions, &rows.nodes, at, 0);
-            let moved = V::load_records(proof, moved, &rows.nodes, at, 0);
-            let inert = V::load_records(proof, inert, &rows.nodes, at, 0);
+            let displacement = V::load_records(proof, displacement, &rows.nodes, at, 0);
+            let inertial = V::load_records(proof, inertial, &rows.nodes, at, 0);
             let forces = rows.forces(proof, block, positions, [x, y, z]);
             let mass = V::load(proof, &masses[at..]);
             let free = V::load(proof, &free[at..]);
-            let of = |axis: usize| (inert[axis] - moved[axis]).mul_add(mass, forces[axis] * free);
-            let sum = [of(0), of(1), of(2), V::splat(proof, 0.0)];
+            let component = |axis: usize| (inertial[axis] - displacement[axis]).mul_add(mass, forces[axis] * free);
+            let sum = [component(0), component(1), component(2), V::splat(proof, 0.0)];
             V::store_records(sum, residual, &rows.nodes, at, 0);
         }
     }
 }
 
-/// Moves the nodes by the solution.
+/// Adds the solution to the displacements.
 struct Move<'a>(&'a mut Projective);
 
 impl Kernel for Move<'_> {
@@ -213,15 +219,17 @@ impl Kernel for Move<'_> {
     #[inline(always)]
     fn run<V: Vector>(self, _: Proof<V>) {
         let Projective {
-            begun,
+            step_start,
             positions,
-            moved,
+            displacement,
             residual,
             ..
         } = self.0;
-        for (((begun, position), moved), change) in begun.iter().zip(positions).zip(moved).zip(residual) {
-            *moved = moved.zip(*change, |moved, change| moved + change);
-            *position = begun.zip(*moved, |begun, moved| begun + moved);
+        for (((step_start, position), displacement), change) in
+            step_start.iter().zip(positions).zip(displacement).zip(residual)
+        {
+            *displacement = displacement.zip(*change, |displacement, change| displacement + change);
+            *position = step_start.zip(*displacement, |step_start, displacement| step_start + displacement);
         }
     }
 }

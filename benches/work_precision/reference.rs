@@ -1,37 +1,37 @@
-//! The true motion of a scene: leapfrog in `f64` at steps so short that half as many make no difference. Kept in
-//! `target/reference`, since it takes a while.
+//! The reference motion of a scene: leapfrog in `f64` with steps so short that halving their number makes no
+//! difference. It is cached in `target/reference`, since it takes long.
 
 use glam::DVec3;
 
+use crate::cache::cached;
 use crate::exact::Exact;
-use crate::kept::kept;
 use crate::report::Report;
 use crate::scene::{DURATION, SAMPLES, SPAN, Scene};
 
-/// So many times as many steps as stability needs, at least.
+/// The minimum number of steps, relative to the number that stability requires.
 const FINER: f64 = 8.0;
-/// Steps, at least.
+/// The minimum number of steps.
 const FEWEST: f64 = 25_000.0;
 
-/// Positions at each sample's time, m.
+/// Positions at the time of each sample [m].
 pub type Motion = Vec<Vec<DVec3>>;
 
 pub struct Reference {
     pub motion: Motion,
-    /// The longest step that leapfrog stands at the start, s.
+    /// The longest stable leapfrog step at the start [s].
     pub stable_step: f64,
-    /// How far the motion in half as many steps is from this one, in the measure used for all errors. Where it is not
-    /// tiny, elements snap through on the way and the motion depends on all that is rounded: no error below is told.
+    /// The difference from the motion in half as many steps, in the measure of all errors. If it is not tiny, elements
+    /// snap through and the motion depends on rounding; errors below it are not reported.
     pub uncertainty: f64,
-    /// The largest at the samples' times, J.
+    /// The largest kinetic energy at the sample times [J].
     pub kinetic_energy: f64,
 }
 
 impl Reference {
-    /// As it was kept, or computed now.
+    /// The cached reference, or a newly computed one.
     pub fn of(scene: &Scene, report: &Report) -> Self {
         let size = 3 * SAMPLES * scene.node_count();
-        let numbers = kept(scene, "motion", 3 + size, report, || {
+        let numbers = cached(scene, "motion", 3 + size, report, || {
             Some(Self::compute(scene, report).numbers())
         });
         Self::from_numbers(&numbers.expect("a motion can always be computed"), scene)
@@ -79,25 +79,25 @@ impl Reference {
         }
     }
 
-    /// RMS distance from this motion over nodes and samples, in RMS distances from the start.
+    /// RMS distance from this motion over nodes and samples, relative to the RMS distance from the start.
     pub fn error(&self, motion: &Motion, scene: &Scene) -> f64 {
         relative_error(motion, &self.motion, &scene.start())
     }
 }
 
 fn relative_error(motion: &Motion, reference: &Motion, start: &[DVec3]) -> f64 {
-    let mut off = 0.0;
+    let mut squared_error = 0.0;
     let mut moved = 0.0;
     for (positions, reference) in motion.iter().zip(reference) {
         for ((position, reference), start) in positions.iter().zip(reference).zip(start) {
-            off += position.distance_squared(*reference);
+            squared_error += position.distance_squared(*reference);
             moved += reference.distance_squared(*start);
         }
     }
-    (off / moved).sqrt()
+    (squared_error / moved).sqrt()
 }
 
-/// The motion in so many steps from one sample to the next, and its largest kinetic energy.
+/// The motion with this number of steps between samples, and its largest kinetic energy.
 fn motion(scene: &Scene, exact: &Exact, steps_per_span: usize) -> (Motion, f64) {
     let step = SPAN / steps_per_span as f64;
     let mut positions = scene.start();
@@ -112,7 +112,7 @@ fn motion(scene: &Scene, exact: &Exact, steps_per_span: usize) -> (Motion, f64) 
     (motion, kinetic)
 }
 
-/// Takes so many steps of leapfrog.
+/// Takes `count` leapfrog steps.
 pub fn leapfrog(exact: &Exact, positions: &mut [DVec3], velocities: &mut [DVec3], step: f64, count: usize) {
     let half_kicks: Vec<f64> = (exact.masses.iter())
         .map(|&mass| if mass > 0.0 { 0.5 * step / mass } else { 0.0 })

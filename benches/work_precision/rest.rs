@@ -1,5 +1,4 @@
-//! How close each solver comes to the true rest shape, in frames of 1/60 s with damping against the world, and what a frame
-//! takes.
+//! The distance of each solver from the exact rest shape in damped frames of 1/60 s, and the time of a frame.
 
 use glam::DVec3;
 use sinew::{RestStateReport, Solver};
@@ -11,38 +10,38 @@ use crate::scene::Scene;
 use crate::tables::{iterations, percent};
 use crate::tissue::Tissue;
 
-/// 1/s, about as much as brings the slowest modes of the scenes to rest soonest.
+/// Damping rate against the world [1/s], near-critical for the slowest modes of the scenes.
 const DAMPING: f32 = 20.0;
 const FRAME: f64 = 1.0 / 60.0;
-/// Looked at every so many frames, up to so many.
-const LOOK: usize = 15;
+/// The distance is checked after every `LOOK` frames, for at most `MOST_FRAMES`.
+const CHECK_INTERVAL: usize = 15;
 const MOST_FRAMES: usize = 240;
-/// Nothing is at rest before.
+/// No scene is at rest earlier.
 const FEWEST_FRAMES: usize = 90;
 
 pub fn run(report: &mut Report, scene: &Scene, threads: u32, patience: f64) {
     let scene = scene.settling(DAMPING, scene.gravity_at_rest);
-    let found = match rest_shape(&scene) {
-        Ok(found) => found,
+    let shape = match rest_shape(&scene) {
+        Ok(shape) => shape,
         Err(reason) => {
             report.not_offered(&format!("{} at rest", scene.name), &reason);
             return;
         }
     };
-    let rest = found.positions;
+    let rest = shape.positions;
     let size = distance(&rest, &scene.start());
     report.write(&format!(
         "\n### {}: at rest, {:.2} m/s²\n\nFrames of 1/60 s, damping of {DAMPING} /s, until the distance to the rest shape \
-         falls no further. `rest_state` found it in {:.2} s and {} solutions; it is {:.1} mm from the start (RMS), and the \
+         no longer decreases. `rest_state` found it in {:.2} s and {} solutions; it is {:.1} mm from the start (RMS), and the \
          largest force left in it is {:.0e} N, {:.0e} of the body's weight. Distances are RMS, in those of the rest shape from \
          the start.\n",
         scene.name,
         scene.gravity.length(),
-        found.seconds,
-        found.report.iterations,
+        shape.seconds,
+        shape.report.iterations,
         1e3 * size,
-        found.report.residual,
-        found.report.residual / weight(&scene),
+        shape.report.residual,
+        shape.report.residual / weight(&scene),
     ));
     let mut table = Table::new(&[
         "solver",
@@ -78,7 +77,7 @@ pub fn run(report: &mut Report, scene: &Scene, threads: u32, patience: f64) {
     report.table(&table);
 }
 
-/// Products that IMPLICIT may take in a frame; 0: its own choice.
+/// Maximum matrix-vector products of IMPLICIT per frame; 0: automatic.
 const BUDGETS: [u32; 5] = [0, 3, 4, 6, 8];
 
 fn setups(threads: u32) -> Vec<(&'static str, Setup)> {
@@ -110,14 +109,14 @@ fn setups(threads: u32) -> Vec<(&'static str, Setup)> {
     setups
 }
 
-/// What `rest_state` says of a scene.
-struct Found {
+/// The result of `rest_state` for a scene.
+struct RestShape {
     positions: Vec<DVec3>,
     report: RestStateReport,
     seconds: f64,
 }
 
-fn rest_shape(scene: &Scene) -> Result<Found, String> {
+fn rest_shape(scene: &Scene) -> Result<RestShape, String> {
     let mut tissue = Tissue::new(
         scene,
         Solver::Newton,
@@ -125,14 +124,14 @@ fn rest_shape(scene: &Scene) -> Result<Found, String> {
     )?;
     let mut report = Err(String::new());
     let seconds = clock::time(|| report = tissue.rest()).processor;
-    Ok(Found {
+    Ok(RestShape {
         report: report?,
         positions: tissue.read().positions,
         seconds,
     })
 }
 
-/// Of the whole scene, N.
+/// Weight of the whole scene [N].
 fn weight(scene: &Scene) -> f64 {
     let mass: f64 = scene.masses.iter().map(|&mass| f64::from(mass)).sum();
     mass * f64::from(scene.gravity.length())
@@ -140,18 +139,19 @@ fn weight(scene: &Scene) -> f64 {
 
 struct Settled {
     distance: f64,
-    /// Of all frames, and of the last that were looked at together, s.
+    /// Mean time of all frames, and of the frames since the last check [s].
     per_frame: f64,
     last_frames: f64,
-    /// s
+    /// Duration of a step [s].
     step: f64,
     frames: usize,
-    /// Of the last frame, where they were the solver's choice.
+    /// Iterations of the last frame, if the solver chose them.
     iterations: Option<f64>,
     status: String,
 }
 
-/// Runs until the distance falls no further, or patience ends; or says why it is not offered.
+/// Runs until the distance no longer decreases or the time limit ends, or returns the reason that the setup is not
+/// supported.
 fn settle(scene: &Scene, setup: Setup, rest: &[DVec3], size: f64, patience: f64) -> Result<Settled, String> {
     let mut contender = setup.start(scene).map_err(|_| "not offered".to_owned())?;
     contender.restart();
@@ -178,10 +178,10 @@ fn settle(scene: &Scene, setup: Setup, rest: &[DVec3], size: f64, patience: f64)
         let out_of_time = seconds > patience || settled.frames >= MOST_FRAMES;
         if let Err(reason) = advanced {
             settled.status = format!("failed: {reason}");
-        } else if settled.frames.is_multiple_of(LOOK) || out_of_time {
+        } else if settled.frames.is_multiple_of(CHECK_INTERVAL) || out_of_time {
             let before = settled.distance;
-            let looked_at = (settled.frames - 1) % LOOK + 1;
-            settled.last_frames = (seconds - seconds_before) / looked_at as f64;
+            let frames_since_check = (settled.frames - 1) % CHECK_INTERVAL + 1;
+            settled.last_frames = (seconds - seconds_before) / frames_since_check as f64;
             seconds_before = seconds;
             settled.distance = distance(&contender.read().positions, rest) / size;
             if !settled.distance.is_finite() {
@@ -196,7 +196,7 @@ fn settle(scene: &Scene, setup: Setup, rest: &[DVec3], size: f64, patience: f64)
     Ok(settled)
 }
 
-/// RMS, m.
+/// RMS distance [m].
 fn distance(positions: &[DVec3], others: &[DVec3]) -> f64 {
     let squares: f64 = positions.iter().zip(others).map(|(a, b)| a.distance_squared(*b)).sum();
     (squares / positions.len() as f64).sqrt()

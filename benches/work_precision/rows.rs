@@ -1,37 +1,37 @@
-//! Springs kept at each of their nodes, as many nodes side by side as there are lanes: what the paper's Verlet and
-//! Projective Dynamics sum their forces with.
+//! Springs stored at each of their nodes, with one node per vector lane. The paper's Verlet and Projective Dynamics sum
+//! their forces with them.
 //!
-//! Kept once each, in colours, springs need stores to both ends: the pass of `xpbd.rs` is of that kind and takes 6.4 ns per
-//! spring of the organ where this one takes 4.2.
+//! Springs stored once, in colors, need stores to both ends: `xpbd.rs` does so and takes 6.4 ns per spring of the
+//! organ, where this pass takes 4.2.
 
 use crate::scene::Scene;
-use crate::simd::{Places, Proof, Record, Vector, lanes};
+use crate::simd::{IndexList, Proof, Record, Vector, lanes};
 
-/// Nodes are sorted by how many springs they have within windows of so many.
+/// Nodes are sorted by their number of springs within windows of this many nodes.
 const WINDOW: usize = 512;
-/// Squared lengths are no smaller, m², so that coincident nodes give no force.
+/// Lower bound of squared lengths [m²], so that coincident nodes give no force.
 const LEAST: f32 = 1e-30;
 
 /// The springs of blocks of nodes.
 pub struct Rows {
-    /// Which node stands in which lane; what is left in the last block is the place after all nodes.
-    pub nodes: Places,
+    /// The node of each lane. Surplus lanes of the last block hold the index after the last node.
+    pub nodes: IndexList,
     node_count: usize,
-    /// Where the columns of each block begin.
+    /// Start of the columns of each block.
     first: Vec<usize>,
-    neighbours: Places,
+    neighbors: IndexList,
     stiffnesses: Vec<f32>,
     /// Stiffness times rest length.
     tensions: Vec<f32>,
 }
 
 impl Rows {
-    /// The scene's springs with nodes renumbered by `places`, their stiffnesses times `scale`.
-    pub fn new(scene: &Scene, places: &[u32], scale: f32) -> Self {
+    /// The scene's springs with nodes renumbered by `ranks` and stiffnesses times `scale`.
+    pub fn new(scene: &Scene, ranks: &[u32], scale: f32) -> Self {
         let count = scene.node_count();
         let mut links = vec![Vec::new(); count + 1];
         for (spring, pair) in scene.springs.iter().enumerate() {
-            let [a, b] = pair.map(|node| places[node as usize]);
+            let [a, b] = pair.map(|node| ranks[node as usize]);
             let stiffness = scale * scene.stiffnesses[spring];
             let tension = stiffness * scene.rest_lengths[spring];
             links[a as usize].push((b, stiffness, tension));
@@ -45,27 +45,27 @@ impl Rows {
         let width = lanes();
         nodes.resize(count.next_multiple_of(width), count as u32);
         let mut first = vec![0];
-        let mut neighbours = Vec::new();
+        let mut neighbors = Vec::new();
         let mut stiffnesses = Vec::new();
         let mut tensions = Vec::new();
         for block in nodes.chunks(width) {
             let longest = block.iter().map(|&node| links[node as usize].len()).max().unwrap_or(0);
             for column in 0..longest {
                 for &node in block {
-                    // A node that has no more springs is joined to itself by one without stiffness.
+                    // A node without further springs is joined to itself by a spring without stiffness.
                     let link = links[node as usize].get(column).copied().unwrap_or((node, 0.0, 0.0));
-                    neighbours.push(link.0);
+                    neighbors.push(link.0);
                     stiffnesses.push(link.1);
                     tensions.push(link.2);
                 }
             }
-            first.push(neighbours.len());
+            first.push(neighbors.len());
         }
         Self {
-            nodes: Places::new(nodes),
+            nodes: IndexList::new(nodes),
             node_count: count,
             first,
-            neighbours: Places::new(neighbours),
+            neighbors: IndexList::new(neighbors),
             stiffnesses,
             tensions,
         }
@@ -75,7 +75,7 @@ impl Rows {
         self.first.len() - 1
     }
 
-    /// For each lane of each block, what `value` says of its node; 0 beyond the last.
+    /// The value of each lane's node; 0 for surplus lanes.
     pub fn per_lane(&self, value: impl Fn(u32) -> f32) -> Vec<f32> {
         let lane = |&node: &u32| {
             if node as usize == self.node_count {
@@ -87,22 +87,25 @@ impl Rows {
         self.nodes.as_slice().iter().map(lane).collect()
     }
 
-    /// The forces of the springs on the nodes of a block that are at `own`.
+    /// The spring forces on the nodes of a block at these positions.
     #[inline(always)]
     pub fn forces<V: Vector>(&self, proof: Proof<V>, block: usize, positions: &[Record], [x, y, z]: [V; 3]) -> [V; 3] {
         let least = V::splat(proof, LEAST);
         let mut sums = [V::splat(proof, 0.0); 3];
         let mut at = self.first[block];
         while at < self.first[block + 1] {
-            let [other_x, other_y, other_z, _] = V::load_records(proof, positions, &self.neighbours, at, 0);
-            let apart = [other_x - x, other_y - y, other_z - z];
-            let square = apart[0].mul_add(apart[0], apart[1].mul_add(apart[1], apart[2] * apart[2]));
+            let [other_x, other_y, other_z, _] = V::load_records(proof, positions, &self.neighbors, at, 0);
+            let separation = [other_x - x, other_y - y, other_z - z];
+            let square = separation[0].mul_add(
+                separation[0],
+                separation[1].mul_add(separation[1], separation[2] * separation[2]),
+            );
             let stiffness = V::load(proof, &self.stiffnesses[at..]);
             let tension = V::load(proof, &self.tensions[at..]);
             // k (L - L0) / L
             let pull = stiffness - tension * square.max(least).inverse_root();
             for axis in 0..3 {
-                sums[axis] = apart[axis].mul_add(pull, sums[axis]);
+                sums[axis] = separation[axis].mul_add(pull, sums[axis]);
             }
             at += V::COUNT;
         }

@@ -1,51 +1,51 @@
-//! What is simulated: nodes and springs as plain numbers, so that every solver is given the same.
+//! A simulated scene: nodes and springs as plain numbers, so that every solver gets the same input.
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 
-/// How long a motion lasts, s.
+/// Duration of a motion [s].
 pub const DURATION: f64 = 0.25;
-/// At how many times, evenly spread up to the end, positions are compared.
+/// Number of evenly spaced times, up to the end, at which positions are compared.
 pub const SAMPLES: usize = 8;
-/// From one of these times to the next, s: two frames of 1/64 s.
+/// Time between two samples [s]: two frames of 1/64 s.
 pub const SPAN: f64 = DURATION / SAMPLES as f64;
 
-/// Nodes joined by undamped springs, at rest when they start.
+/// Nodes joined by undamped springs, at rest at the start.
 #[derive(Clone)]
 pub struct Scene {
     pub name: &'static str,
-    /// In a sentence or two.
+    /// A description of one or two sentences.
     pub description: String,
-    /// Where nodes start, m.
+    /// Initial positions [m].
     pub positions: Vec<Vec3>,
-    /// kg; 0: pinned.
+    /// Masses [kg]; 0 is pinned.
     pub masses: Vec<f32>,
     pub springs: Vec<[u32; 2]>,
-    /// Whose volume is compared; empty where there are none.
+    /// The tetrahedra whose volume is compared; may be empty.
     pub tetrahedra: Vec<[u32; 4]>,
-    /// N/m
+    /// Stiffnesses [N/m].
     pub stiffnesses: Vec<f32>,
-    /// m
+    /// Rest lengths [m].
     pub rest_lengths: Vec<f32>,
-    /// m/s²
+    /// Gravity [m/s²].
     pub gravity: Vec3,
-    /// As it comes to rest, m/s²: another where that has no single rest shape.
+    /// Gravity of the measurement at rest [m/s²]; it differs from `gravity` if that has no unique rest shape.
     pub gravity_at_rest: Vec3,
-    /// What damping against the world takes off velocities, 1/s.
+    /// Damping rate of velocities against the world [1/s].
     pub damping_rate: f32,
 }
 
 impl Scene {
-    /// The edges of tetrahedra as springs, with the stiffness that Van Gelder (1998) gives for the modulus `young`, Pa, and
-    /// the mass of the tetrahedra, in kg/m³ `density`, shared out among their corners. What lies within the first
-    /// `held` of the extent along `up` is pinned; gravity points the other way.
+    /// Creates springs along the edges of tetrahedra, with stiffnesses by Van Gelder (1998) for Young's modulus `young`
+    /// [Pa]. The mass of the tetrahedra, with `density` [kg/m³], is distributed to their corners. The upper
+    /// `pinned_fraction` of the extent along `up` is pinned; gravity acts in the opposite direction.
     pub fn of_tetrahedra(
         name: &'static str,
         description: String,
         mesh: &Mesh,
         [young, density]: [f64; 2],
         up: DVec3,
-        held: f64,
+        pinned_fraction: f64,
     ) -> Self {
         let at = |node: u32| mesh.positions[node as usize].as_dvec3();
         let springs = mesh.edges().expect("memory for the edges");
@@ -67,8 +67,8 @@ impl Scene {
         let top = heights().fold(f64::NEG_INFINITY, f64::max);
         let bottom = heights().fold(f64::INFINITY, f64::min);
         for (mass, height) in masses.iter_mut().zip(heights()) {
-            // A node of no tetrahedron has no mass, and so no motion to be compared.
-            if height > top - held * (top - bottom) {
+            // A node without tetrahedra has no mass, and therefore no motion to compare.
+            if height > top - pinned_fraction * (top - bottom) {
                 *mass = 0.0;
             }
         }
@@ -80,7 +80,7 @@ impl Scene {
             tetrahedra: mesh
                 .tetrahedra
                 .iter()
-                .map(|&tetrahedron| turned_out(tetrahedron, &at))
+                .map(|&tetrahedron| oriented(tetrahedron, &at))
                 .collect(),
             masses: masses.into_iter().map(|mass| mass as f32).collect(),
             springs,
@@ -91,7 +91,7 @@ impl Scene {
         }
     }
 
-    /// The same with damping against the world, 1/s, and this gravity.
+    /// A copy with damping against the world [1/s] and this gravity.
     pub fn settling(&self, rate: f32, gravity: Vec3) -> Self {
         Self {
             damping_rate: rate,
@@ -104,7 +104,7 @@ impl Scene {
         self.positions.len()
     }
 
-    /// What the tetrahedra enclose, those turned inside out subtracted, m³.
+    /// The signed volume of the tetrahedra, inverted ones negative [m³].
     pub fn volume(&self, positions: &[DVec3]) -> f64 {
         let at = |node: u32| positions[node as usize];
         let volume = |&[a, b, c, d]: &[u32; 4]| (at(b) - at(a)).dot((at(c) - at(a)).cross(at(d) - at(a))) / 6.0;
@@ -115,14 +115,14 @@ impl Scene {
         self.masses[node] == 0.0
     }
 
-    /// Where nodes start, m.
+    /// Initial positions [m].
     pub fn start(&self) -> Vec<DVec3> {
         self.positions.iter().map(|position| position.as_dvec3()).collect()
     }
 }
 
-/// The tetrahedron, its corners in an order in which its volume is not negative.
-fn turned_out([a, b, c, d]: [u32; 4], at: &impl Fn(u32) -> DVec3) -> [u32; 4] {
+/// The tetrahedron with its corners in an order of non-negative volume.
+fn oriented([a, b, c, d]: [u32; 4], at: &impl Fn(u32) -> DVec3) -> [u32; 4] {
     let volume = (at(b) - at(a)).dot((at(c) - at(a)).cross(at(d) - at(a)));
     if volume < 0.0 { [a, b, d, c] } else { [a, b, c, d] }
 }

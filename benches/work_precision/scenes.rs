@@ -1,4 +1,4 @@
-//! The scenes: an organ of even and of uneven stiffness, a real organ with slivers, a cloth, a cantilever.
+//! The scenes: an organ of uniform and of varying stiffness, a real organ with slivers, a cloth, a cantilever.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::scene::Scene;
 
 pub const NAMES: [&str; 5] = ["organ", "stomach", "contrast", "cloth", "cantilever"];
 
-/// What CASES asks for and cannot be built yet; why.
+/// Planned scenes that are not possible yet, and the reasons.
 pub const PENDING: [(&str, &str); 2] = [
     (
         "liver under gravity with a pressing sphere",
@@ -19,7 +19,7 @@ pub const PENDING: [(&str, &str); 2] = [
     ("nearly incompressible block", "bodies have no volume term yet"),
 ];
 
-/// The scene of this name; or why it is not there.
+/// The scene of this name, or the reason that it is not available.
 pub fn scene(name: &str) -> Result<Scene, String> {
     match name {
         "organ" => Ok(organ()),
@@ -30,16 +30,16 @@ pub fn scene(name: &str) -> Result<Scene, String> {
     }
 }
 
-/// kg/m³, of most soft tissue.
+/// Density of most soft tissue [kg/m³].
 const DENSITY: f64 = 1060.0;
 
-/// A body of well-shaped tetrahedra, as many as the stomach has.
+/// A body of well-shaped tetrahedra, about as many as the stomach has.
 fn organ() -> Scene {
     let mesh = Mesh::organ(0.133, 0.0037).expect("an organ of this spacing");
     hung("organ", "a body shaped like a liver, without slivers", &mesh)
 }
 
-/// A real mesh, with slivers.
+/// A real mesh with slivers.
 fn stomach() -> Result<Scene, String> {
     const FILE: &str = "shared/meshes/stomach.msh";
     let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().skip(1);
@@ -48,26 +48,33 @@ fn stomach() -> Result<Scene, String> {
         .find(|file| file.exists())
         .ok_or_else(|| format!("there is no {FILE}"))?;
     let loaded = load(&file, MeshFormat::Auto, 1e-3).map_err(|error| error.to_string())?;
-    let mut scene = hung("stomach", "a stomach, with slivers", &centred(loaded.mesh));
-    // Under its whole weight slivers snap through, each time in another way.
+    let mut scene = hung("stomach", "a stomach, with slivers", &centered(loaded.mesh));
+    // Under its whole weight slivers snap through, differently each time.
     scene.gravity_at_rest = 2.0 * scene.gravity.normalize();
     Ok(scene)
 }
 
-/// A body hung up by one end of its longest axis, which starts to sag under its own weight.
-fn hung(name: &'static str, what: &str, mesh: &Mesh) -> Scene {
+/// A body fixed at one end of its longest axis, which starts to sag under its own weight.
+fn hung(name: &'static str, body: &str, mesh: &Mesh) -> Scene {
     const YOUNG: f64 = 5e3;
-    const HELD: f64 = 0.03;
+    const PINNED_FRACTION: f64 = 0.03;
     let low = mesh.positions.iter().fold(Vec3::INFINITY, |low, p| low.min(*p));
     let high = mesh.positions.iter().fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
     let extent = high - low;
     let long = (0..3).fold(0, |long, axis| if extent[axis] > extent[long] { axis } else { long });
     let description = format!(
-        "The tetrahedra of {what}, {:.0} mm long, E = 5 kPa by Van Gelder's springs, held by the upper 3 % and let go at \
+        "The tetrahedra of {body}, {:.0} mm long, E = 5 kPa by Van Gelder's springs, fixed in the upper 3 % and released from \
          its rest shape.",
         1e3 * extent[long]
     );
-    Scene::of_tetrahedra(name, description, mesh, [YOUNG, DENSITY], DVec3::AXES[long], HELD)
+    Scene::of_tetrahedra(
+        name,
+        description,
+        mesh,
+        [YOUNG, DENSITY],
+        DVec3::AXES[long],
+        PINNED_FRACTION,
+    )
 }
 
 /// The organ with one spring in five a thousand times as stiff.
@@ -84,12 +91,12 @@ fn contrast() -> Scene {
     scene
 }
 
-/// A sheet, flat at first, that swings down from two of its corners.
+/// A sheet, initially flat, that swings down from two of its corners.
 fn cloth() -> Scene {
     const SIDE: u32 = 100;
-    /// kg/m²
+    /// Surface density [kg/m²].
     const SURFACE_DENSITY: f32 = 0.2;
-    /// N/m
+    /// Stiffness [N/m].
     const STIFFNESS: f32 = 100.0;
     let spacing = 1.0 / (SIDE - 1) as f32;
     let diagonal = std::f32::consts::SQRT_2 * spacing;
@@ -123,7 +130,7 @@ fn cloth() -> Scene {
     Scene {
         name: "cloth",
         description: "100 x 100 nodes, 1 m, 0.2 kg/m², springs of 100 N/m along the axes and both diagonals, flat at \
-                      first, held at two corners."
+                      first, pinned at two corners."
             .into(),
         positions,
         masses,
@@ -132,28 +139,28 @@ fn cloth() -> Scene {
         tetrahedra: Vec::new(),
         rest_lengths,
         gravity: Vec3::new(0.0, -9.81, 0.0),
-        // Swung down it wrinkles, each time in another way; in its plane there is one rest shape.
+        // A hanging cloth wrinkles differently each time; in its plane it has one rest shape.
         gravity_at_rest: Vec3::new(0.0, 0.0, 9.81),
         damping_rate: 0.0,
     }
 }
 
-/// A beam of cubes, held at one end, that starts to bend under its own weight.
+/// A beam of cubes, fixed at one end, that starts to bend under its own weight.
 fn cantilever() -> Scene {
     /// Cells along x, y and z.
     const CELLS: [usize; 3] = [40, 10, 10];
-    /// m
+    /// Size of a cell [m].
     const CELL: f64 = 5e-3;
-    /// Pa
+    /// Young's modulus [Pa].
     const YOUNG: f64 = 100e3;
     let nodes = CELLS.map(|cells| cells + 1);
     let number = |[x, y, z]: [usize; 3]| (x + nodes[0] * (y + nodes[1] * z)) as u32;
-    // Where the block ends along an axis, half of a cell's share is left.
-    let share = |place: usize, axis: usize| if place == 0 || place == CELLS[axis] { 0.5 } else { 1.0 };
+    // At an end of the block along an axis, a node has half of a cell's share.
+    let share = |index: usize, axis: usize| if index == 0 || index == CELLS[axis] { 0.5 } else { 1.0 };
     let mut scene = Scene {
         name: "cantilever",
         description:
-            "40 x 10 x 10 cubes of 5 mm, E = 100 kPa by axis and face-diagonal springs of 0.4 E a, held at one \
+            "40 x 10 x 10 cubes of 5 mm, E = 100 kPa by axis and face-diagonal springs of 0.4 E a, fixed at one \
                       end."
                 .into(),
         positions: Vec::new(),
@@ -169,20 +176,20 @@ fn cantilever() -> Scene {
     for z in 0..nodes[2] {
         for y in 0..nodes[1] {
             for x in 0..nodes[0] {
-                let place = [x, y, z];
-                let centred =
+                let index = [x, y, z];
+                let centered =
                     DVec3::new(x as f64, y as f64, z as f64) - DVec3::from_array(CELLS.map(|c| c as f64 / 2.0));
-                scene.positions.push((CELL * centred).as_vec3());
-                let volume: f64 = (0..3).map(|axis| CELL * share(place[axis], axis)).product();
+                scene.positions.push((CELL * centered).as_vec3());
+                let volume: f64 = (0..3).map(|axis| CELL * share(index[axis], axis)).product();
                 scene.masses.push(if x == 0 { 0.0 } else { (DENSITY * volume) as f32 });
                 for (step, length) in AXES_AND_DIAGONALS {
-                    let Some(to) = moved(place, step, &nodes) else {
+                    let Some(to) = neighbor(index, step, &nodes) else {
                         continue;
                     };
-                    // Across the axes that the spring does not run along, it belongs to the cells on both sides.
+                    // Along the axes perpendicular to the spring, it belongs to the cells on both sides.
                     let across = (0..3).filter(|&axis| step[axis] == 0);
-                    let shares: f64 = across.map(|axis| share(place[axis], axis)).product();
-                    scene.springs.push([number(place), number(to)]);
+                    let shares: f64 = across.map(|axis| share(index[axis], axis)).product();
+                    scene.springs.push([number(index), number(to)]);
                     scene.stiffnesses.push((0.4 * YOUNG * CELL * shares) as f32);
                     scene.rest_lengths.push((CELL * length) as f32);
                 }
@@ -192,7 +199,7 @@ fn cantilever() -> Scene {
     scene
 }
 
-/// Half of a node's neighbours in a lattice, and how far they are in cells.
+/// Half of a node's lattice neighbors, and their distances in cells.
 const AXES_AND_DIAGONALS: [([isize; 3], f64); 9] = [
     ([1, 0, 0], 1.0),
     ([0, 1, 0], 1.0),
@@ -205,19 +212,19 @@ const AXES_AND_DIAGONALS: [([isize; 3], f64); 9] = [
     ([0, -1, 1], std::f64::consts::SQRT_2),
 ];
 
-/// The place so many steps away, where there is one.
-fn moved(place: [usize; 3], step: [isize; 3], nodes: &[usize; 3]) -> Option<[usize; 3]> {
-    let mut to = place;
+/// The lattice index offset by `step`, if it exists.
+fn neighbor(index: [usize; 3], step: [isize; 3], nodes: &[usize; 3]) -> Option<[usize; 3]> {
+    let mut to = index;
     for axis in 0..3 {
-        to[axis] = place[axis]
+        to[axis] = index[axis]
             .checked_add_signed(step[axis])
             .filter(|&at| at < nodes[axis])?;
     }
     Some(to)
 }
 
-/// The mesh about the origin, where `f32` is finest.
-fn centred(mut mesh: Mesh) -> Mesh {
+/// Centers the mesh at the origin, where `f32` is most accurate.
+fn centered(mut mesh: Mesh) -> Mesh {
     let low = mesh.positions.iter().fold(Vec3::INFINITY, |low, p| low.min(*p));
     let high = mesh.positions.iter().fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
     for position in &mut mesh.positions {

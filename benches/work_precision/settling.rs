@@ -1,4 +1,4 @@
-//! What a step costs once velocities have decayed to denormal numbers, which processors may take long to add.
+//! The cost of a step once velocities have decayed to denormal numbers, which are slow on some processors.
 
 use glam::Vec3;
 use sinew::{BodyDefinition, BodyId, Solver, Storage, Values, World, WorldDefinition};
@@ -8,23 +8,23 @@ use crate::report::{Report, Table, digits};
 
 /// Nodes along each side of the sheet.
 const SIDE: u32 = 24;
-/// 1/s, which takes half of it off amplitudes: from 1 mm to denormal numbers in 8 s.
+/// Damping rate [1/s]. Amplitudes decay at half of it: from 1 mm to denormal numbers in 8 s.
 const DAMPING: f32 = 20.0;
-/// kg
+/// Mass of a node [kg].
 const MASS: f32 = 1e-4;
-/// m
+/// Distance of neighboring nodes [m].
 const SPACING: f32 = 1.0 / 64.0;
 const FRAME: f32 = 1.0 / 60.0;
-/// Of 10 s.
+/// Frames of 10 s.
 const FRAMES: usize = 600;
-/// The first 10 s, 10 s between, the last 10 s.
-const PARTS: usize = 3;
-/// For each part, s.
+/// Number of measured intervals: the first, the second and the last 10 s.
+const INTERVALS: usize = 3;
+/// Time limit of each interval [s].
 const PATIENCE: f64 = 4.0;
 
 pub fn run(report: &mut Report) {
     report.write(&format!(
-        "\n## Settling into denormal numbers\n\nA sheet of {SIDE} x {SIDE} nodes, stretched and held at its rim, that is \
+        "\n## Settling into denormal numbers\n\nA sheet of {SIDE} x {SIDE} nodes, stretched and fixed at its border, that is \
          struck across its plane, without gravity, damping of {DAMPING} /s, 30 s in frames of 1/60 s. The last 10 s must cost no more than 1.05 times the first.\n"
     ));
     let mut table = Table::new(&[
@@ -65,16 +65,16 @@ pub fn run(report: &mut Report) {
 }
 
 struct Settled {
-    /// Of each 10 s.
-    seconds: [f64; PARTS],
-    /// The part of the free nodes whose velocities are denormal numbers when it ends.
+    /// Time of each 10 s [s].
+    seconds: [f64; INTERVALS],
+    /// The fraction of free nodes with denormal velocities at the end.
     denormal: f64,
 }
 
-/// Runs the three parts; or says why not.
+/// Runs the three intervals, or returns the reason of a failure.
 fn settle(solver: Solver, storage: Storage) -> Result<Settled, String> {
     let (mut world, body) = sheet(solver, storage);
-    let mut seconds = [0.0; PARTS];
+    let mut seconds = [0.0; INTERVALS];
     for part in &mut seconds {
         for frame in 0..FRAMES {
             if *part > PATIENCE {
@@ -99,11 +99,11 @@ fn sheet(solver: Solver, storage: Storage) -> (World, BodyId) {
     let on_rim = |node: u32| {
         [node % SIDE, node / SIDE]
             .iter()
-            .any(|&place| place == 0 || place == SIDE - 1)
+            .any(|&index| index == 0 || index == SIDE - 1)
     };
-    let place = |node: u32| SPACING * Vec3::new((node % SIDE) as f32, 0.0, (node / SIDE) as f32);
+    let position = |node: u32| SPACING * Vec3::new((node % SIDE) as f32, 0.0, (node / SIDE) as f32);
     let nodes = || 0..SIDE * SIDE;
-    let positions: Vec<Vec3> = nodes().map(place).collect();
+    let positions: Vec<Vec3> = nodes().map(position).collect();
     let masses: Vec<f32> = nodes().map(|node| if on_rim(node) { 0.0 } else { MASS }).collect();
     let right = nodes()
         .filter(|node| node % SIDE + 1 < SIDE)

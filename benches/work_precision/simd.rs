@@ -1,12 +1,12 @@
-//! Lanes of floats for the baselines: AVX-512, AVX2 or plain Rust, whichever the processor has. The only unsafe code of this
-//! bench; what is built on it is safe, since a [`Vector`] is only made with a [`Proof`] that its instructions are there, and
-//! records are only fetched from [`Places`] that were checked.
+//! Vectors of floats for the baselines: AVX-512, AVX2 or plain Rust, depending on the processor. This is the only
+//! unsafe code of this bench. Code built on it is safe: a [`Vector`] is only made with a [`Proof`] that its
+//! instructions are available, and records are only accessed through checked [`IndexList`]s.
 #![allow(unsafe_code)]
 
 use std::marker::PhantomData;
 use std::ops::{Add, Mul, Sub};
 
-/// Numbers that lie together, 16 bytes: x, y, z and one more.
+/// Four adjacent numbers, 16 bytes: x, y, z and one more.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C, align(16))]
 pub struct Record(pub [f32; 4]);
@@ -20,59 +20,60 @@ impl Record {
 
 /// Indices of records, each below `bound`.
 #[derive(Clone, Debug)]
-pub struct Places {
-    places: Vec<u32>,
+pub struct IndexList {
+    indices: Vec<u32>,
     bound: usize,
 }
 
-impl Places {
-    pub fn new(places: Vec<u32>) -> Self {
-        let bound = places.iter().max().map_or(0, |&place| place as usize + 1);
-        Self { places, bound }
+impl IndexList {
+    pub fn new(indices: Vec<u32>) -> Self {
+        let bound = indices.iter().max().map_or(0, |&index| index as usize + 1);
+        Self { indices, bound }
     }
 
     pub fn as_slice(&self) -> &[u32] {
-        &self.places
+        &self.indices
     }
 
-    /// `count` places from number `at` on, for records of which there are so many beyond the offset.
+    /// `count` indices from `at` on, for this many records after the offset.
     #[inline(always)]
     fn checked(&self, at: usize, count: usize, records: usize) -> *const u32 {
-        assert!(self.bound <= records, "a place for each record");
-        self.places[at..at + count].as_ptr()
+        assert!(self.bound <= records, "an index below the number of records");
+        self.indices[at..at + count].as_ptr()
     }
 }
 
-/// That a vector's instructions are there.
+/// Proof that a vector's instructions are available.
 #[derive(Clone, Copy)]
 pub struct Proof<V>(PhantomData<V>);
 
-/// Several floats that are worked on together.
+/// Several floats that are processed together.
 pub trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     const COUNT: usize;
 
     fn splat(proof: Proof<Self>, value: f32) -> Self;
-    /// The first [`Self::COUNT`].
+    /// Loads the first [`Self::COUNT`] numbers.
     fn load(proof: Proof<Self>, from: &[f32]) -> Self;
     /// `self * factor + term`
     fn mul_add(self, factor: Self, term: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn divided_by(self, divisor: Self) -> Self;
-    /// 1 over the root, to the last place or two.
+    /// 1 over the square root, to within one or two units in the last place.
     fn inverse_root(self) -> Self;
 
-    /// Component by component, what lies at [`Self::COUNT`] places from number `at` on, of the records from `offset` on.
-    fn load_records(proof: Proof<Self>, records: &[Record], places: &Places, at: usize, offset: usize) -> [Self; 4];
-    /// The reverse.
-    fn store_records(components: [Self; 4], records: &mut [Record], places: &Places, at: usize, offset: usize);
+    /// Gathers records at [`Self::COUNT`] indices from `at` on, relative to `offset`, as vectors of components.
+    fn load_records(proof: Proof<Self>, records: &[Record], indices: &IndexList, at: usize, offset: usize)
+    -> [Self; 4];
+    /// Scatters components to records, the inverse of `load_records`.
+    fn store_records(components: [Self; 4], records: &mut [Record], indices: &IndexList, at: usize, offset: usize);
 
     /// The first `COUNT / 4` numbers, each four times.
     fn spread(proof: Proof<Self>, from: &[f32]) -> Self;
     /// The record, `COUNT / 4` times.
     fn repeat(proof: Proof<Self>, record: &Record) -> Self;
-    /// The first `COUNT / 4` records as they lie.
+    /// The first `COUNT / 4` records in their order.
     fn load_adjacent(proof: Proof<Self>, from: &[Record]) -> Self;
-    /// As `COUNT / 4` records.
+    /// Stores `COUNT / 4` records.
     fn store_adjacent(self, to: &mut [Record]);
     /// The sum of its `COUNT / 4` records.
     fn folded(self) -> Record;
@@ -84,23 +85,23 @@ pub trait Kernel {
     fn run<V: Vector>(self, proof: Proof<V>) -> Self::Output;
 }
 
-/// Does the work with the widest vectors there are.
+/// Runs a kernel with the widest available vectors.
 pub fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     {
         if x86::has_avx512() {
-            // SAFETY: the instructions are there.
+            // SAFETY: the instructions are available.
             return unsafe { x86::with_avx512(kernel) };
         }
         if x86::has_avx2() {
-            // SAFETY: the instructions are there.
+            // SAFETY: the instructions are available.
             return unsafe { x86::with_avx2(kernel) };
         }
     }
     kernel.run(Proof::<Plain>(PhantomData))
 }
 
-/// How many floats [`run`] works on together.
+/// The number of floats that [`run`] processes together.
 pub fn lanes() -> usize {
     struct Count;
     impl Kernel for Count {
@@ -175,15 +176,15 @@ impl Vector for Plain {
         Self(self.0.map(|value| 1.0 / value.sqrt()))
     }
     #[inline(always)]
-    fn load_records(_: Proof<Self>, records: &[Record], places: &Places, at: usize, offset: usize) -> [Self; 4] {
-        let found: [Record; 8] = std::array::from_fn(|lane| records[offset + places.places[at + lane] as usize]);
-        std::array::from_fn(|component| Self(std::array::from_fn(|lane| found[lane].0[component])))
+    fn load_records(_: Proof<Self>, records: &[Record], indices: &IndexList, at: usize, offset: usize) -> [Self; 4] {
+        let gathered: [Record; 8] = std::array::from_fn(|lane| records[offset + indices.indices[at + lane] as usize]);
+        std::array::from_fn(|component| Self(std::array::from_fn(|lane| gathered[lane].0[component])))
     }
     #[inline(always)]
-    fn store_records(components: [Self; 4], records: &mut [Record], places: &Places, at: usize, offset: usize) {
+    fn store_records(components: [Self; 4], records: &mut [Record], indices: &IndexList, at: usize, offset: usize) {
         for lane in 0..8 {
             let record = std::array::from_fn(|component| components[component].0[lane]);
-            records[offset + places.places[at + lane] as usize] = Record(record);
+            records[offset + indices.indices[at + lane] as usize] = Record(record);
         }
     }
     #[inline(always)]
@@ -218,7 +219,7 @@ mod x86 {
     use std::marker::PhantomData;
     use std::ops::{Add, Mul, Sub};
 
-    use super::{Kernel, Places, Proof, Record, Vector};
+    use super::{IndexList, Kernel, Proof, Record, Vector};
 
     pub fn has_avx512() -> bool {
         is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") && has_avx2()
@@ -246,14 +247,14 @@ mod x86 {
     #[derive(Clone, Copy)]
     pub struct Eight(__m256);
 
-    /// `$with` on what two vectors hold.
+    /// Defines an operator by `$with` on the contents of two vectors.
     macro_rules! arithmetic {
         ($vector:ident, $trait:ident, $name:ident, $with:ident) => {
             impl $trait for $vector {
                 type Output = Self;
                 #[inline(always)]
                 fn $name(self, other: Self) -> Self {
-                    // SAFETY: a vector is only made with the proof that its instructions are there.
+                    // SAFETY: a vector is only made with the proof that its instructions are available.
                     Self(unsafe { $with(self.0, other.0) })
                 }
             }
@@ -266,8 +267,9 @@ mod x86 {
     arithmetic!(Eight, Sub, sub, _mm256_sub_ps);
     arithmetic!(Eight, Mul, mul, _mm256_mul_ps);
 
-    // SAFETY of every block: a vector or a proof shows that the instructions are there; slices are as long as what is read or
-    // written, places were checked; no load or store here asks for more than the alignment of its numbers.
+    // SAFETY of every block: a vector or a proof shows that the instructions are available. Slices are as long as the
+    // read or written range, and indices were checked. No load or store requires more than the alignment of its
+    // numbers.
     #[allow(clippy::undocumented_unsafe_blocks)]
     impl Vector for Sixteen {
         const COUNT: usize = 16;
@@ -302,12 +304,18 @@ mod x86 {
             }
         }
         #[inline(always)]
-        fn load_records(_: Proof<Self>, records: &[Record], places: &Places, at: usize, offset: usize) -> [Self; 4] {
+        fn load_records(
+            _: Proof<Self>,
+            records: &[Record],
+            indices: &IndexList,
+            at: usize,
+            offset: usize,
+        ) -> [Self; 4] {
             unsafe {
-                let places = places.checked(at, 16, records.len() - offset);
+                let indices = indices.checked(at, 16, records.len() - offset);
                 let record =
-                    |lane: usize| _mm_load_ps(records.as_ptr().add(offset + *places.add(lane) as usize).cast());
-                // Row r holds records r, 4 + r, 8 + r and 12 + r: once each quarter is transposed, lanes are in order.
+                    |lane: usize| _mm_load_ps(records.as_ptr().add(offset + *indices.add(lane) as usize).cast());
+                // Row r holds records r, 4 + r, 8 + r and 12 + r; after transposing each quarter, lanes are in order.
                 let row = |r: usize| {
                     let low = _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(record(r)), record(4 + r));
                     let high = _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(record(8 + r)), record(12 + r));
@@ -317,13 +325,13 @@ mod x86 {
             }
         }
         #[inline(always)]
-        fn store_records(components: [Self; 4], records: &mut [Record], places: &Places, at: usize, offset: usize) {
+        fn store_records(components: [Self; 4], records: &mut [Record], indices: &IndexList, at: usize, offset: usize) {
             unsafe {
-                let places = places.checked(at, 16, records.len() - offset);
+                let indices = indices.checked(at, 16, records.len() - offset);
                 let base = records.as_mut_ptr().add(offset);
                 let rows = transposed(components.map(|component| component.0));
                 for (r, row) in rows.into_iter().enumerate() {
-                    let to = |lane: usize| base.add(*places.add(lane) as usize).cast();
+                    let to = |lane: usize| base.add(*indices.add(lane) as usize).cast();
                     _mm_store_ps(to(r), _mm512_castps512_ps128(row));
                     _mm_store_ps(to(4 + r), _mm512_extractf32x4_ps::<1>(row));
                     _mm_store_ps(to(8 + r), _mm512_extractf32x4_ps::<2>(row));
@@ -363,7 +371,7 @@ mod x86 {
         }
     }
 
-    // SAFETY of every block: as above.
+    // SAFETY of every block: as in `Vector for Sixteen`.
     #[allow(clippy::undocumented_unsafe_blocks)]
     impl Vector for Eight {
         const COUNT: usize = 8;
@@ -398,23 +406,29 @@ mod x86 {
             }
         }
         #[inline(always)]
-        fn load_records(_: Proof<Self>, records: &[Record], places: &Places, at: usize, offset: usize) -> [Self; 4] {
+        fn load_records(
+            _: Proof<Self>,
+            records: &[Record],
+            indices: &IndexList,
+            at: usize,
+            offset: usize,
+        ) -> [Self; 4] {
             unsafe {
-                let places = places.checked(at, 8, records.len() - offset);
+                let indices = indices.checked(at, 8, records.len() - offset);
                 let record =
-                    |lane: usize| _mm_load_ps(records.as_ptr().add(offset + *places.add(lane) as usize).cast());
+                    |lane: usize| _mm_load_ps(records.as_ptr().add(offset + *indices.add(lane) as usize).cast());
                 let row = |r: usize| _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(record(r)), record(4 + r));
                 transposed_halves(from_fn(row)).map(Self)
             }
         }
         #[inline(always)]
-        fn store_records(components: [Self; 4], records: &mut [Record], places: &Places, at: usize, offset: usize) {
+        fn store_records(components: [Self; 4], records: &mut [Record], indices: &IndexList, at: usize, offset: usize) {
             unsafe {
-                let places = places.checked(at, 8, records.len() - offset);
+                let indices = indices.checked(at, 8, records.len() - offset);
                 let base = records.as_mut_ptr().add(offset);
                 let rows = transposed_halves(components.map(|component| component.0));
                 for (r, row) in rows.into_iter().enumerate() {
-                    let to = |lane: usize| base.add(*places.add(lane) as usize).cast();
+                    let to = |lane: usize| base.add(*indices.add(lane) as usize).cast();
                     _mm_store_ps(to(r), _mm256_castps256_ps128(row));
                     _mm_store_ps(to(4 + r), _mm256_extractf128_ps::<1>(row));
                 }
@@ -451,7 +465,7 @@ mod x86 {
         }
     }
 
-    /// Four by four numbers in each quarter, transposed.
+    /// Transposes four by four numbers in each quarter.
     #[inline]
     #[target_feature(enable = "avx512f")]
     fn transposed([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
@@ -465,7 +479,7 @@ mod x86 {
         ]
     }
 
-    /// Four by four numbers in each half, transposed.
+    /// Transposes four by four numbers in each half.
     #[inline]
     #[target_feature(enable = "avx")]
     fn transposed_halves([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {

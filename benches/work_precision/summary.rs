@@ -1,10 +1,10 @@
-//! What a sweep says at a glance: the time for an error, and the error in a time, between points on logarithmic axes.
+//! Summary figures of a sweep: the time for an error, and the error in a time, interpolated on logarithmic axes.
 
 use crate::motion::{Measured, Missing, Point, Sweep};
 use crate::reference::Reference;
 use crate::report::digits;
 
-/// The least seconds per simulated second for so small an error.
+/// The least time for this error, in seconds per simulated second.
 pub fn time_for(sweeps: &[&Sweep], error: f64) -> Option<f64> {
     best(sweeps, |point| (point.error, point.seconds), error)
 }
@@ -17,7 +17,7 @@ pub fn families(sweeps: &[Sweep]) -> Vec<(&'static str, Vec<&Sweep>)> {
     names.into_iter().map(|name| (name, lines(name))).collect()
 }
 
-/// What a family needs for 10 %, 1 % and 0.1 %, in words where there is no such figure.
+/// A family's times for errors of 10 %, 1 % and 0.1 %, or words if there is no figure.
 pub fn times(reference: &Reference, lines: &[&Sweep]) -> [String; 3] {
     let too_slow = |line: &&Sweep| {
         let points = line.points.as_deref().unwrap_or_default();
@@ -33,12 +33,12 @@ pub fn times(reference: &Reference, lines: &[&Sweep]) -> [String; 3] {
     })
 }
 
-/// The least error in so many seconds per simulated second.
+/// The least error within this time, in seconds per simulated second.
 pub fn error_in(sweeps: &[&Sweep], seconds: f64) -> Option<f64> {
     best(sweeps, |point| (point.seconds, point.error), seconds)
 }
 
-/// The least second figure where the first is no larger than `limit`, at points and where lines pass the limit.
+/// The smallest second figure whose first is at most `limit`, at points and where lines cross the limit.
 fn best(sweeps: &[&Sweep], figures: impl Fn(&Measured) -> (f64, f64), limit: f64) -> Option<f64> {
     let mut least: Option<f64> = None;
     let mut take = |value: f64| least = Some(least.map_or(value, |least| least.min(value)));

@@ -13,7 +13,7 @@ use crate::svg::{Series, plot};
 /// Frames per second.
 const FRAMES: f64 = 60.0;
 
-/// Errors of the two diagrams of a scene; they overlap, so that lines can be followed.
+/// Error ranges of the two diagrams of a scene; they overlap, so that lines can be followed.
 const RANGES: [(&str, &str, [f64; 2]); 2] = [("", "loose", [5e-3, 2.0]), ("_tight", "tight", [0.0, 2e-2])];
 
 pub fn write(report: &mut Report, scene: &Scene, reference: &Reference, sweeps: &[Sweep]) {
@@ -32,8 +32,8 @@ pub fn write(report: &mut Report, scene: &Scene, reference: &Reference, sweeps: 
     report.table(&points(sweeps));
 }
 
-/// The points of a line with errors in this range. What failed and what took too long is said in the name; a line of which
-/// all that was measured lies elsewhere is left out.
+/// The points of a line with errors in this range. The name states failed and too slow points. Lines without points in
+/// the range are omitted.
 fn series(sweep: &Sweep, [low, high]: [f64; 2]) -> Option<Series> {
     let no_points = Vec::new();
     let all = sweep.points.as_ref().unwrap_or(&no_points);
@@ -45,28 +45,28 @@ fn series(sweep: &Sweep, [low, high]: [f64; 2]) -> Option<Series> {
         .iter()
         .filter(|point| matches!(point.outcome, Err(Missing::TooSlow(_))))
         .count();
-    let shown: Vec<(f64, f64)> = (all.iter().filter_map(measured))
+    let visible: Vec<(f64, f64)> = (all.iter().filter_map(measured))
         .filter(|point| (low..=high).contains(&point.error))
         .map(|point| (point.error, point.seconds))
         .collect();
-    if shown.is_empty() && all.iter().any(|point| point.outcome.is_ok()) {
+    if visible.is_empty() && all.iter().any(|point| point.outcome.is_ok()) {
         return None;
     }
     let name = &sweep.line.name;
     let name = match (&sweep.points, failed, slow) {
         (Err(_), ..) => format!("{name} (not offered)"),
-        (_, 0, _) if !shown.is_empty() => name.clone(),
+        (_, 0, _) if !visible.is_empty() => name.clone(),
         (_, 0, slow) => format!("{name} ({slow} too slow)"),
         (_, failed, _) => format!("{name} ({failed} failed)"),
     };
     Some(Series {
         name,
-        points: shown,
+        points: visible,
         dashed: matches!(sweep.line.setups.first(), Some(setup) if !matches!(setup.method, Method::Sinew(_))),
     })
 }
 
-/// What each family of lines needs and leaves.
+/// The time of each family of lines for an error, and its error in a time.
 fn summary(reference: &Reference, sweeps: &[Sweep]) -> Table {
     let mut table = Table::new(&[
         "solver, at its best",
@@ -124,8 +124,8 @@ fn row(name: &str, point: &Point) -> Vec<String> {
         0.0 => name.to_owned(),
         part => format!("{name}, {part:e}"),
     };
-    let taken = point.outcome.as_ref().ok().and_then(|measured| measured.iterations);
-    let mut row = vec![name, milliseconds(point.step), iterations(&point.setup, taken)];
+    let counted = point.outcome.as_ref().ok().and_then(|measured| measured.iterations);
+    let mut row = vec![name, milliseconds(point.step), iterations(&point.setup, counted)];
     match &point.outcome {
         Ok(measured) => row.extend([
             percent(measured.error),
@@ -146,18 +146,18 @@ fn row(name: &str, point: &Point) -> Vec<String> {
     row
 }
 
-/// Of a step: as they were taken on average, or as they were set.
-pub fn iterations(setup: &Setup, taken: Option<f64>) -> String {
-    match (taken, setup.iterations, setup.method) {
-        (Some(taken), 0, _) => digits(taken),
-        (Some(taken), most, _) => format!("{} of {most}", digits(taken)),
+/// Iterations per step: the average count, or the setting.
+pub fn iterations(setup: &Setup, counted: Option<f64>) -> String {
+    match (counted, setup.iterations, setup.method) {
+        (Some(counted), 0, _) => digits(counted),
+        (Some(counted), most, _) => format!("{} of {most}", digits(counted)),
         (None, 0, Method::Sinew(Solver::Implicit | Solver::Newton)) => "-".into(),
         (None, 0, _) => "1".into(),
         (None, iterations, _) => iterations.to_string(),
     }
 }
 
-/// An error, three digits.
+/// An error in percent, three digits.
 pub fn percent(error: f64) -> String {
     match 100.0 * error {
         percent if percent < 0.01 => format!("{percent:.1e} %"),

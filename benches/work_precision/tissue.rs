@@ -1,4 +1,4 @@
-//! sinew, through its public interface. The one place where a [`Setup`] becomes a definition.
+//! sinew through its public interface. Only this module turns a [`Setup`] into a definition.
 
 use sinew::{
     BodyDefinition, BodyId, Error, RestStateDefinition, RestStateReport, Solver, Values, World, WorldDefinition,
@@ -12,13 +12,13 @@ pub struct Tissue {
     body: BodyId,
     start: Vec<glam::Vec3>,
     steps: u32,
-    /// s
+    /// Duration of a step [s].
     step: f32,
-    /// Taken in the last span.
+    /// Substeps in the last span.
     substeps: u32,
-    /// Taken in the last span.
+    /// Iterations in the last span.
     iterations: u32,
-    /// m
+    /// Error estimate [m].
     estimate: f32,
 }
 
@@ -27,7 +27,7 @@ impl Tissue {
         Self::with_tolerance(scene, solver, setup, 0.0)
     }
 
-    /// In a world that keeps the error of each step below `tolerance`, m; 0: off.
+    /// In a world with a `tolerance` for the error of each step [m]; 0 is off.
     pub fn with_tolerance(scene: &Scene, solver: Solver, setup: Setup, tolerance: f32) -> Result<Self, String> {
         let mut world = offered(World::new(WorldDefinition {
             gravity: scene.gravity,
@@ -65,12 +65,12 @@ impl Tissue {
         })
     }
 
-    /// The largest of the errors that steps of the last span said they may have, m; 0 without a tolerance.
+    /// The largest error estimate of the last span's steps [m]; 0 without a tolerance.
     pub fn estimate(&self) -> f32 {
         self.estimate
     }
 
-    /// Moves the body to rest; or why that was not found.
+    /// Solves for static equilibrium, or returns the reason of a failure.
     pub fn rest(&mut self) -> Result<RestStateReport, String> {
         self.world
             .rest_state(self.body, &RestStateDefinition::default())
@@ -124,7 +124,7 @@ impl Contender for Tissue {
     }
 }
 
-/// What is not offered is an answer; whatever else fails is a mistake of this bench or of the library.
+/// An unsupported feature is a valid result; any other failure is a bug of this bench or of the library.
 fn offered<T>(result: sinew::Result<T>) -> Result<T, String> {
     match result {
         Ok(value) => Ok(value),

@@ -1,5 +1,5 @@
-//! Whether the world's tolerance holds: steps of a frame compared with the same steps taken finely, in `f64`, from the same
-//! state; and what error of the whole motion it leaves.
+//! Checks the world's tolerance: frames are compared with the same frames in fine `f64` steps from the same state. It
+//! also measures the error of the whole motion.
 
 use glam::DVec3;
 use sinew::Solver;
@@ -13,19 +13,19 @@ use crate::scene::{DURATION, SAMPLES, Scene};
 use crate::tables::percent;
 use crate::tissue::Tissue;
 
-/// mm
+/// Tolerances [mm].
 const TOLERANCES: [f64; 3] = [1.0, 0.1, 0.01];
 /// Steps of the motion, a frame of 1/64 s each.
 const FRAMES: usize = 2 * SAMPLES;
-/// Every so many frames one is compared.
+/// Every `COMPARED`th frame is compared.
 const COMPARED: usize = 5;
-/// Fine steps are so much shorter than stability needs.
+/// Fine steps are shorter than stability requires by this factor.
 const FINER: f64 = 8.0;
 
 pub fn run(report: &mut Report, scene: &Scene, reference: &Reference, threads: u32, patience: f64) {
     report.write(&format!(
-        "\n### {}: tolerance\n\nFrames of 1/64 s under the world's `tolerance`. Error of a step: the furthest any node is, after a \
-         frame, from where leapfrog in `f64` takes it from the same state; the largest of every {COMPARED}th frame.\n",
+        "\n### {}: tolerance\n\nFrames of 1/64 s under the world's `tolerance`. Error of a step: the largest distance of a node, after a \
+         frame, from its position by leapfrog in `f64` from the same state; the largest of every {COMPARED}th frame.\n",
         scene.name
     ));
     let mut table = Table::new(&[
@@ -42,13 +42,13 @@ pub fn run(report: &mut Report, scene: &Scene, reference: &Reference, threads: u
         for tolerance in TOLERANCES {
             let mut row = vec![name.to_owned(), tolerance.to_string()];
             match measure(scene, reference, solver, threads, (1e-3 * tolerance) as f32, patience) {
-                Ok(kept) => row.extend([
-                    format!("{:.1e}", 1e3 * kept.step_error),
-                    digits(1e3 * kept.step_error / tolerance),
-                    format!("{:.1e}", 1e3 * kept.estimate),
-                    percent(kept.error),
-                    digits(kept.seconds),
-                    if 1e3 * kept.step_error < tolerance {
+                Ok(result) => row.extend([
+                    format!("{:.1e}", 1e3 * result.step_error),
+                    digits(1e3 * result.step_error / tolerance),
+                    format!("{:.1e}", 1e3 * result.estimate),
+                    percent(result.error),
+                    digits(result.seconds),
+                    if 1e3 * result.step_error < tolerance {
                         "kept"
                     } else {
                         "NOT KEPT"
@@ -67,14 +67,14 @@ pub fn run(report: &mut Report, scene: &Scene, reference: &Reference, threads: u
     report.table(&table);
 }
 
-struct Kept {
-    /// The largest, m.
+struct ToleranceRun {
+    /// The largest error of a step [m].
     step_error: f64,
-    /// The largest, m.
+    /// The largest estimate [m].
     estimate: f32,
-    /// Of the motion, in the measure used for all errors.
+    /// Error of the motion, in the measure of all errors.
     error: f64,
-    /// Per simulated second.
+    /// Seconds per simulated second.
     seconds: f64,
 }
 
@@ -85,11 +85,11 @@ fn measure(
     threads: u32,
     tolerance: f32,
     patience: f64,
-) -> Result<Kept, String> {
+) -> Result<ToleranceRun, String> {
     let exact = Exact::new(scene);
     let setup = Setup::new(Method::Sinew(solver), 1, DURATION / FRAMES as f64, threads);
     let mut tissue = Tissue::with_tolerance(scene, solver, setup, tolerance)?;
-    let mut kept = Kept {
+    let mut result = ToleranceRun {
         step_error: 0.0,
         estimate: 0.0,
         error: 0.0,
@@ -107,23 +107,23 @@ fn measure(
         let elapsed = clock::time(|| advanced = tissue.advance());
         advanced?;
         spent += setup.counted(elapsed);
-        kept.estimate = kept.estimate.max(tissue.estimate());
+        result.estimate = result.estimate.max(tissue.estimate());
         let positions = tissue.read().positions;
         if let Some(before) = before {
-            let fine = finely(&exact, reference, before, setup.span);
-            kept.step_error = kept.step_error.max(furthest(&positions, &fine));
+            let fine = fine_positions(&exact, reference, before, setup.span);
+            result.step_error = result.step_error.max(furthest(&positions, &fine));
         }
         if (frame + 1).is_multiple_of(FRAMES / SAMPLES) {
             motion.push(positions);
         }
     }
-    kept.error = reference.error(&motion, scene);
-    kept.seconds = spent / DURATION;
-    Ok(kept)
+    result.error = reference.error(&motion, scene);
+    result.seconds = spent / DURATION;
+    Ok(result)
 }
 
-/// Where leapfrog takes the nodes within `duration`, s.
-fn finely(exact: &Exact, reference: &Reference, from: State, duration: f64) -> Vec<DVec3> {
+/// Final positions of leapfrog after `duration` [s].
+fn fine_positions(exact: &Exact, reference: &Reference, from: State, duration: f64) -> Vec<DVec3> {
     let steps = (FINER * duration / reference.stable_step).ceil() as usize;
     let State {
         mut positions,
@@ -133,7 +133,7 @@ fn finely(exact: &Exact, reference: &Reference, from: State, duration: f64) -> V
     positions
 }
 
-/// m
+/// The largest distance of a node [m].
 fn furthest(positions: &[DVec3], others: &[DVec3]) -> f64 {
     let distances = positions.iter().zip(others).map(|(a, b)| a.distance(*b));
     distances.fold(0.0, f64::max)

@@ -1,41 +1,41 @@
-//! XPBD with substeps of one iteration each (Macklin et al. 2019, "Small steps in physics simulation"), compliances 1 over
-//! the stiffness, in displacements: what a substep solves for is how far nodes move in it, so that the velocity, that over h,
-//! does not magnify the rounding of positions.
+//! XPBD with substeps of one iteration each (Macklin et al. 2019, "Small steps in physics simulation"), with
+//! compliances of 1 over the stiffness. A substep solves for displacements, so that velocities, displacements over h,
+//! do not magnify the rounding of positions.
 //!
-//! Springs are coloured greedily; as many of a colour as there are lanes are worked on at a time.
+//! Springs are colored greedily; a vector processes as many springs of a color as it has lanes.
 
 use crate::bisection;
 use crate::contender::{Contender, Setup, State, record, vector};
 use crate::scene::Scene;
-use crate::simd::{self, Kernel, Places, Proof, Record, Vector, lanes};
+use crate::simd::{self, IndexList, Kernel, Proof, Record, Vector, lanes};
 
-/// Squared lengths are no smaller, m².
+/// Lower bound of squared lengths [m²].
 const LEAST: f32 = 1e-30;
 
 pub struct Xpbd {
-    places: Vec<u32>,
+    ranks: Vec<u32>,
     start: Vec<Record>,
-    /// Of each node, where it was when the substep began, with the inverse mass beside it, and how far it has moved since;
-    /// next to each other, since they are always wanted together.
+    /// For each node two adjacent records: its position at the start of the substep with the inverse mass, and its
+    /// displacement since.
     records: Vec<Record>,
-    /// Of both ends of each spring, colour by colour, each colour filled up to the lanes: twice the number of the node.
-    ends: [Places; 2],
+    /// Both ends of each spring, color by color, padded to the lanes: twice the node's index.
+    ends: [IndexList; 2],
     rest_lengths: Vec<f32>,
     /// 1 / (k h²)
     compliances: Vec<f32>,
-    /// What gravity adds to a displacement in a substep, m.
+    /// The displacement by gravity in a substep [m].
     fall: Record,
-    /// What is left of a velocity after a substep.
+    /// The factor of velocities per substep.
     damping: f32,
     steps: u32,
-    /// s
+    /// Duration of a substep [s].
     step: f64,
 }
 
 impl Xpbd {
     pub fn new(scene: &Scene, setup: Setup) -> Self {
         let order = bisection::order(scene);
-        let places = bisection::places(&order);
+        let ranks = bisection::ranks(&order);
         let h = setup.step();
         let mut start = Vec::new();
         for &node in &order {
@@ -46,7 +46,7 @@ impl Xpbd {
             ));
             start.push(Record::default());
         }
-        // For what fills up colours: two nodes that never move.
+        // Padding of colors: two nodes that never move.
         let spare = scene.node_count() as u32;
         start.extend([
             Record::default(),
@@ -57,25 +57,25 @@ impl Xpbd {
         let mut ends = [Vec::new(), Vec::new()];
         let mut rest_lengths = Vec::new();
         let mut compliances = Vec::new();
-        for colour in coloured(scene, &places) {
-            for &spring in &colour {
-                let [a, b] = scene.springs[spring].map(|node| places[node as usize]);
+        for color in colored(scene, &ranks) {
+            for &spring in &color {
+                let [a, b] = scene.springs[spring].map(|node| ranks[node as usize]);
                 ends[0].push(2 * a);
                 ends[1].push(2 * b);
                 rest_lengths.push(scene.rest_lengths[spring]);
                 compliances.push((1.0 / (f64::from(scene.stiffnesses[spring]) * h * h)) as f32);
             }
-            let filled = ends[0].len().next_multiple_of(lanes());
-            ends[0].resize(filled, 2 * spare);
-            ends[1].resize(filled, 2 * (spare + 1));
-            rest_lengths.resize(filled, 1.0);
-            compliances.resize(filled, 1.0);
+            let padded = ends[0].len().next_multiple_of(lanes());
+            ends[0].resize(padded, 2 * spare);
+            ends[1].resize(padded, 2 * (spare + 1));
+            rest_lengths.resize(padded, 1.0);
+            compliances.resize(padded, 1.0);
         }
         let mut xpbd = Self {
-            places,
+            ranks,
             records: Vec::new(),
             start,
-            ends: ends.map(Places::new),
+            ends: ends.map(IndexList::new),
             rest_lengths,
             compliances,
             fall: record(scene.gravity * (h * h) as f32, 0.0),
@@ -100,8 +100,8 @@ impl Contender for Xpbd {
 
     fn read(&mut self) -> State {
         let [at, moved] = [0, 1].map(|offset| {
-            let of = |&place: &u32| vector(&self.records[2 * place as usize + offset]);
-            self.places.iter().map(of).collect::<Vec<_>>()
+            let of = |&rank: &u32| vector(&self.records[2 * rank as usize + offset]);
+            self.ranks.iter().map(of).collect::<Vec<_>>()
         });
         State {
             positions: at.iter().zip(&moved).map(|(at, moved)| *at + *moved).collect(),
@@ -125,7 +125,7 @@ impl Kernel for Substeps<'_> {
     }
 }
 
-/// Ends a substep and begins the next: nodes are where they moved to, and will move as far again and by what gravity adds.
+/// Ends a substep and begins the next: displacements are added to positions, and repeated with gravity's contribution.
 #[inline(always)]
 fn predict(xpbd: &mut Xpbd) {
     let (nodes, _) = xpbd.records.as_chunks_mut::<2>();
@@ -147,43 +147,46 @@ fn project<V: Vector>(xpbd: &mut Xpbd, proof: Proof<V>) {
         let to = V::load_records(proof, records, b, at, 0);
         let mut moved_a = V::load_records(proof, records, a, at, 1);
         let mut moved_b = V::load_records(proof, records, b, at, 1);
-        let apart: [V; 3] = std::array::from_fn(|axis| (from[axis] - to[axis]) + (moved_a[axis] - moved_b[axis]));
-        let square = apart[0]
-            .mul_add(apart[0], apart[1].mul_add(apart[1], apart[2] * apart[2]))
+        let separation: [V; 3] = std::array::from_fn(|axis| (from[axis] - to[axis]) + (moved_a[axis] - moved_b[axis]));
+        let square = separation[0]
+            .mul_add(
+                separation[0],
+                separation[1].mul_add(separation[1], separation[2] * separation[2]),
+            )
             .max(least);
         let inverse_length = square.inverse_root();
         let stretch = square * inverse_length - V::load(proof, &xpbd.rest_lengths[at..]);
-        let yielding = from[3] + to[3] + V::load(proof, &xpbd.compliances[at..]);
-        let multiplier = (stretch * inverse_length).divided_by(yielding);
+        let denominator = from[3] + to[3] + V::load(proof, &xpbd.compliances[at..]);
+        let multiplier = (stretch * inverse_length).divided_by(denominator);
         let (share_a, share_b) = (multiplier * from[3], multiplier * to[3]);
         for axis in 0..3 {
-            moved_a[axis] = moved_a[axis] - share_a * apart[axis];
-            moved_b[axis] = moved_b[axis] + share_b * apart[axis];
+            moved_a[axis] = moved_a[axis] - share_a * separation[axis];
+            moved_b[axis] = moved_b[axis] + share_b * separation[axis];
         }
         V::store_records(moved_a, records, a, at, 1);
         V::store_records(moved_b, records, b, at, 1);
     }
 }
 
-/// Springs of which no two of a colour share a node, in the order of their nodes.
-fn coloured(scene: &Scene, places: &[u32]) -> Vec<Vec<usize>> {
+/// Springs in colors, sorted by nodes; no two springs of a color share a node.
+fn colored(scene: &Scene, ranks: &[u32]) -> Vec<Vec<usize>> {
     let mut springs: Vec<usize> = (0..scene.springs.len()).collect();
     springs.sort_by_key(|&spring| {
-        let [a, b] = scene.springs[spring].map(|node| places[node as usize]);
+        let [a, b] = scene.springs[spring].map(|node| ranks[node as usize]);
         (a.min(b), a.max(b))
     });
-    let mut taken = vec![0u128; scene.node_count()];
-    let mut colours: Vec<Vec<usize>> = Vec::new();
+    let mut used_colors = vec![0u128; scene.node_count()];
+    let mut colors: Vec<Vec<usize>> = Vec::new();
     for spring in springs {
         let [a, b] = scene.springs[spring].map(|node| node as usize);
-        let colour = (taken[a] | taken[b]).trailing_ones() as usize;
-        assert!(colour < 128, "a colour left");
-        taken[a] |= 1 << colour;
-        taken[b] |= 1 << colour;
-        if colour == colours.len() {
-            colours.push(Vec::new());
+        let color = (used_colors[a] | used_colors[b]).trailing_ones() as usize;
+        assert!(color < 128, "a colour left");
+        used_colors[a] |= 1 << color;
+        used_colors[b] |= 1 << color;
+        if color == colors.len() {
+            colors.push(Vec::new());
         }
-        colours[colour].push(spring);
+        colors[color].push(spring);
     }
-    colours
+    colors
 }

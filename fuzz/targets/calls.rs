@@ -1,4 +1,4 @@
-//! Sequences of calls against a model: `model.rs`.
+//! Call sequences, checked against a model: `model.rs`.
 #![no_main]
 
 mod model;

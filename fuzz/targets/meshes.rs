@@ -1,4 +1,4 @@
-//! Files of meshes that nobody wrote: read, they are a mesh that can be used, or refused.
+//! Random mesh files: a loaded mesh must be valid, and any other file must be refused.
 #![no_main]
 
 mod planted;
@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use libfuzzer_sys::fuzz_target;
 use sinew::mesh::{MeshFormat, NO_NODE, load};
 
-/// Files of this process alone.
+/// A file path that is unique to this process.
 fn path(extension: &str) -> PathBuf {
     std::env::temp_dir().join(format!("sinew_fuzz_{}.{extension}", std::process::id()))
 }
@@ -26,7 +26,7 @@ fuzz_target!(|bytes: &[u8]| {
     ][usize::from(kind) % 5];
     let file = path("node");
     if format == MeshFormat::TetGen {
-        // Two files, with a zero between them.
+        // TetGen has two files, separated here by a zero byte.
         let cut = text.iter().position(|&byte| byte == 0).unwrap_or(text.len());
         std::fs::write(&file, &text[..cut]).expect("a folder for files");
         std::fs::write(path("ele"), text.get(cut + 1..).unwrap_or_default()).expect("a folder for files");

@@ -1,5 +1,5 @@
-//! Calls in any order with any arguments, against a simple model: what is refused changes nothing, ids that are gone stay gone, springs and pins are
-//! those that were made, and whatever is done, all that can be read is finite.
+//! Calls in any order with any arguments, checked against a simple model. Refused calls change nothing, stale ids stay
+//! stale, and springs and pins are those that were created. All readable values stay finite.
 
 use std::collections::BTreeSet;
 
@@ -12,20 +12,20 @@ use sinew::{
     ToolId, Values, World, WorldDefinition,
 };
 
-/// What is known of a body.
-struct Known {
+/// The model of a body.
+struct BodyModel {
     id: BodyId,
-    is_there: bool,
-    /// `None` from the first cut on: then springs are the library's to say.
+    exists: bool,
+    /// `None` after the first cut, since the model does not predict springs after cuts.
     springs: Option<BTreeSet<[u32; 2]>>,
     pins: BTreeSet<u32>,
 }
 
 pub struct Model {
     pub world: World,
-    /// A spring of a body with pins was removed: the fault that `calls` can plant.
+    /// A spring of a body with pins was removed: the condition of the planted fault of `calls`.
     pub has_removed: bool,
-    bodies: Vec<Known>,
+    bodies: Vec<BodyModel>,
     tools: Vec<(ToolId, bool)>,
     attachments: Vec<AttachmentId>,
 }
@@ -38,10 +38,10 @@ const STORAGES: [Storage; 5] = [
     Storage::DynamicBulk,
 ];
 
-/// Most of most steps, s.
+/// The limit of most step durations [s].
 const LONG: f32 = 0.02;
 
-/// A number as callers send them: mostly sensible, sometimes none.
+/// A number as callers pass it: mostly sensible, sometimes special or arbitrary.
 fn number(input: &mut Unstructured) -> Result<f32> {
     const ODD: [f32; 12] = [
         0.0,
@@ -68,7 +68,7 @@ fn vector(input: &mut Unstructured) -> Result<Vec3> {
     Ok(Vec3::new(number(input)?, number(input)?, number(input)?))
 }
 
-/// A number that most bodies take: above 0.
+/// A mostly valid number: above 0 and at most `most`.
 fn amount(input: &mut Unstructured, most: f32) -> Result<f32> {
     Ok(if input.ratio(1, 20)? {
         number(input)?
@@ -117,7 +117,7 @@ impl Model {
         };
         let mesh = mesh.expect("a mesh");
         let shift = if input.ratio(1, 8)? { vector(input)? } else { Vec3::ZERO };
-        let positions: Vec<Vec3> = mesh.positions.iter().map(|place| *place + shift).collect();
+        let positions: Vec<Vec3> = mesh.positions.iter().map(|position| *position + shift).collect();
         let definition = BodyDefinition {
             positions: &positions,
             triangles: &mesh.triangles,
@@ -150,9 +150,9 @@ impl Model {
                     .body(id)
                     .and_then(|body| body.spring_pairs())
                     .expect("its springs");
-                self.bodies.push(Known {
+                self.bodies.push(BodyModel {
                     id,
-                    is_there: true,
+                    exists: true,
                     springs: Some(springs.into_iter().map(ordered).collect()),
                     pins: BTreeSet::new(),
                 });
@@ -171,51 +171,51 @@ impl Model {
         let Some(chosen) = self.body(input)? else {
             return self.create_body(input);
         };
-        let (id, is_there) = (self.bodies[chosen].id, self.bodies[chosen].is_there);
+        let (id, exists) = (self.bodies[chosen].id, self.bodies[chosen].exists);
         let tool = match self.tools.len() {
             0 => None,
             count => Some(input.choose_index(count)?),
         };
         let nodes = self.world.body(id).map_or(3, |body| body.node_count()) as u32;
-        // One that there is not, now and then.
+        // Indices out of range now and then.
         let [a, b] = [input.int_in_range(0..=nodes)?, input.int_in_range(0..=nodes)?];
         let world = &mut self.world;
-        let (known, has_removed) = (&mut self.bodies[chosen], &mut self.has_removed);
-        let answer: std::result::Result<(), Error> = match kind {
-            1 if input.ratio(1, 4)? => world.destroy_body(id).inspect(|()| known.is_there = false),
+        let (model, has_removed) = (&mut self.bodies[chosen], &mut self.has_removed);
+        let result: std::result::Result<(), Error> = match kind {
+            1 if input.ratio(1, 4)? => world.destroy_body(id).inspect(|()| model.exists = false),
             1 | 2 => {
                 let (stiffness, length) = (amount(input, 100.0)?, input.ratio(1, 2)?.then_some(0.05));
                 let added = world
                     .body_mut(id)
                     .and_then(|body| body.add_spring(a, b, stiffness, length));
                 added.inspect(|()| {
-                    let is_new = known
+                    let is_new = model
                         .springs
                         .as_mut()
                         .is_none_or(|springs| springs.insert(ordered([a, b])));
-                    assert!(is_new, "a spring that there was is refused");
+                    assert!(is_new, "an existing spring is refused");
                 })
             }
             3 => {
                 let removed = world.body_mut(id).and_then(|body| body.remove_spring(a, b));
                 removed.inspect(|()| {
-                    let was_there = known
+                    let existed = model
                         .springs
                         .as_mut()
                         .is_none_or(|springs| springs.remove(&ordered([a, b])));
-                    assert!(was_there, "a spring that there was not is refused");
-                    *has_removed |= !known.pins.is_empty();
+                    assert!(existed, "a missing spring is refused");
+                    *has_removed |= !model.pins.is_empty();
                 })
             }
             4 => world.body_mut(id).and_then(|body| body.pin(a)).inspect(|()| {
-                known.pins.insert(a);
+                model.pins.insert(a);
             }),
             5 => world.body_mut(id).and_then(|body| body.unpin(a)).inspect(|()| {
-                known.pins.remove(&a);
+                model.pins.remove(&a);
             }),
             6 => {
-                let place = vector(input)?;
-                world.body_mut(id).and_then(|body| body.move_pin(a, place))
+                let position = vector(input)?;
+                world.body_mut(id).and_then(|body| body.move_pin(a, position))
             }
             7 => {
                 let force = vector(input)?;
@@ -223,10 +223,10 @@ impl Model {
             }
             8 => {
                 let change = vector(input)?;
-                let places = world.body(id).map(|body| body.positions().to_vec());
-                places.and_then(|mut places| {
-                    places[a as usize % nodes as usize] += change;
-                    world.body_mut(id)?.set_positions(&places)
+                let positions = world.body(id).map(|body| body.positions().to_vec());
+                positions.and_then(|mut positions| {
+                    positions[a as usize % nodes as usize] += change;
+                    world.body_mut(id)?.set_positions(&positions)
                 })
             }
             9 => {
@@ -240,7 +240,7 @@ impl Model {
                     start: [vector(input)?, vector(input)?],
                     end: [vector(input)?, vector(input)?],
                 };
-                known.springs = None;
+                model.springs = None;
                 world.cut(id, &sweep).map(|_| ())
             }
             12 => {
@@ -273,9 +273,9 @@ impl Model {
             }
             13 => {
                 let Some(tool) = tool else { return Ok(()) };
-                let (place, turn) = (vector(input)?, number(input)?);
-                let turn = input.ratio(1, 2)?.then(|| Quat::from_rotation_z(turn));
-                world.set_pose(self.tools[tool].0, place, turn)
+                let (position, angle) = (vector(input)?, number(input)?);
+                let orientation = input.ratio(1, 2)?.then(|| Quat::from_rotation_z(angle));
+                world.set_pose(self.tools[tool].0, position, orientation)
             }
             14 if input.ratio(1, 3)? => {
                 let Some(tool) = tool else { return Ok(()) };
@@ -299,53 +299,54 @@ impl Model {
             17 => world.set_gravity(vector(input)?),
             _ => {
                 let dt = amount(input, 0.02)?;
-                // Bodies of IMPLICIT and NEWTON take parts of a millisecond where they touch, thousands in a long step: one in many is.
+                // Near contact, IMPLICIT and NEWTON take substeps of fractions of a millisecond, thousands per long
+                // step. All but one in 64 long steps are shortened.
                 let dt = if dt > LONG && !input.ratio(1, 64)? { LONG } else { dt };
                 world.step(dt).map(|_| ())
             }
         };
-        if let Err(error) = &answer {
+        if let Err(error) = &result {
             assert_eq!(
                 self.world.state_hash(),
                 hash,
-                "refused ({error}), and something changed"
+                "a refused call ({error}) changed the state"
             );
             assert!(!error.to_string().is_empty());
         }
-        if !is_there && (1..=11).contains(&kind) {
+        if !exists && (1..=11).contains(&kind) {
             assert!(
-                matches!(answer, Err(Error::StaleId(_))),
-                "{answer:?} of a body that is gone"
+                matches!(result, Err(Error::StaleId(_))),
+                "{result:?} of a destroyed body"
             );
         }
         self.check();
         Ok(())
     }
 
-    /// All that can be read.
+    /// Checks all readable values.
     fn check(&self) {
-        for known in &self.bodies {
-            let body = self.world.body(known.id);
-            assert_eq!(body.is_ok(), known.is_there, "an id stays what it was");
+        for model in &self.bodies {
+            let body = self.world.body(model.id);
+            assert_eq!(body.is_ok(), model.exists, "an id stays valid or stale");
             let Ok(body) = body else { continue };
             assert!(
-                body.positions().iter().all(|place| place.is_finite()),
+                body.positions().iter().all(|position| position.is_finite()),
                 "a position is not finite"
             );
-            if let Some(springs) = &known.springs {
-                let found: BTreeSet<[u32; 2]> =
+            if let Some(springs) = &model.springs {
+                let actual: BTreeSet<[u32; 2]> =
                     body.spring_pairs().expect("springs").into_iter().map(ordered).collect();
-                assert_eq!(&found, springs, "springs are those that were made");
+                assert_eq!(&actual, springs, "springs are those that were created");
             }
-            for &pin in &known.pins {
-                assert!(body.pin_force(pin).expect("a pin stays one").is_finite());
+            for &pin in &model.pins {
+                assert!(body.pin_force(pin).expect("a pin remains").is_finite());
             }
             let count = body.node_count() as u32;
             assert!(body.surface().iter().flatten().all(|&node| node < count));
         }
-        for &(tool, is_there) in &self.tools {
+        for &(tool, exists) in &self.tools {
             let wrench = self.world.wrench(tool);
-            assert_eq!(wrench.is_ok(), is_there, "an id stays what it was");
+            assert_eq!(wrench.is_ok(), exists, "an id stays valid or stale");
             if let Ok((force, torque)) = wrench {
                 assert!(force.is_finite() && torque.is_finite());
             }

@@ -1,5 +1,5 @@
-//! Sequences of calls, recorded and replayed with equal state hashes. A step that is planted in the recording, longer or shorter by its last
-//! bit, is found at that step.
+//! Call sequences, recorded and replayed with equal state hashes. The planted fault changes the last bit of a recorded
+//! step duration; the replay must report that step.
 #![no_main]
 
 mod model;
@@ -12,12 +12,12 @@ use libfuzzer_sys::fuzz_target;
 use model::Model;
 use sinew::{ReplayReport, World};
 
-/// What the file holds before its first frame, and a frame of a step before and after the difference of the state, bytes.
+/// Sizes in bytes: the file header, and the parts of a step's frame before and after the state difference.
 const HEAD: usize = 12;
 const BEGIN: usize = 25;
 const END: usize = 10;
 
-/// Where the recording has the `dt` of a step.
+/// The byte offset of a step's `dt` in the recording.
 fn dt_at(bytes: &[u8], step: u64) -> usize {
     let mut at = HEAD;
     for _ in 1..step {
@@ -27,16 +27,20 @@ fn dt_at(bytes: &[u8], step: u64) -> usize {
     at + 1
 }
 
-/// Changes the step, and fails where that is found: it is what the fault was planted for.
+/// Changes the step duration, and panics if the replay finds the change, as it should.
 fn plant(path: &Path, step: u64) {
     let mut bytes = fs::read(path).expect("the file");
     let dt = dt_at(&bytes, step);
     bytes[dt] ^= 1;
     fs::write(path, bytes).expect("a file");
     let report = World::replay(path, 1).expect("a replay");
-    // What is refused, or has nothing to move, is the same with another step.
-    if let Some(found) = report.difference {
-        assert_eq!((report.steps, found.step), (step - 1, step), "found at another step");
+    // The hash stays equal if the step is refused or nothing moves.
+    if let Some(difference) = report.difference {
+        assert_eq!(
+            (report.steps, difference.step),
+            (step - 1, step),
+            "found at another step"
+        );
         panic!("the planted fault");
     }
 }

@@ -1,4 +1,4 @@
-//! Snapshots that somebody made up: read, they are refused, or a world that may be stepped without harm to anybody's memory.
+//! Forged snapshots: loading must refuse them, or return a world that steps without memory errors.
 #![no_main]
 
 mod planted;
@@ -16,7 +16,7 @@ use sinew::{
 };
 use xxhash_rust::xxh3::Xxh3Default;
 
-/// Where the header keeps the checksum, and where it ends.
+/// Byte offset of the header's checksum, and the end of the header.
 const CHECKSUM: usize = 28;
 const HEADER: usize = 36;
 
@@ -27,10 +27,11 @@ const STORAGES: [Storage; 4] = [
     Storage::DynamicBulk,
 ];
 
-/// How many substeps a caller fixed and allowed, which is their business, however many they are: where a snapshot has that.
+/// Byte offsets of the fixed and the maximum number of substeps. They are restored, since callers may choose any
+/// number.
 fn substeps() -> &'static [usize] {
-    static PLACES: OnceLock<Vec<usize>> = OnceLock::new();
-    PLACES.get_or_init(|| {
+    static OFFSETS: OnceLock<Vec<usize>> = OnceLock::new();
+    OFFSETS.get_or_init(|| {
         let saved = |substeps, max_substeps| {
             let definition = WorldDefinition {
                 substeps,
@@ -39,22 +40,22 @@ fn substeps() -> &'static [usize] {
             };
             World::new(definition).and_then(|world| world.save()).expect("bytes")
         };
-        let (some, others) = (saved(1, 1), saved(!1, !1));
-        (HEADER..some.len()).filter(|&at| some[at] != others[at]).collect()
+        let (first, second) = (saved(1, 1), saved(!1, !1));
+        (HEADER..first.len()).filter(|&at| first[at] != second[at]).collect()
     })
 }
 
-/// Small worlds, each with something of its own.
+/// Small worlds, each with other features.
 fn worlds() -> &'static [Vec<u8>] {
     static WORLDS: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
     WORLDS.get_or_init(|| {
-        // A step of a forged world may panic, and is caught.
+        // A step of a forged world may panic; the panic is caught.
         std::panic::set_hook(Box::new(|_| ()));
         (0..12).map(world).collect()
     })
 }
 
-/// A sheet or a block, with a ball that touches it, cut.
+/// A sheet or a block with a ball in contact, which is cut.
 fn world(kind: usize) -> Vec<u8> {
     let is_block = kind % 2 == 1;
     let mesh = if is_block {
@@ -68,14 +69,14 @@ fn world(kind: usize) -> Vec<u8> {
         ..WorldDefinition::default()
     })
     .expect("a world");
-    let is_of_elements = is_block && kind % 4 == 3;
+    let has_elements = is_block && kind % 4 == 3;
     let definition = BodyDefinition {
         positions: &mesh.positions,
         triangles: &mesh.triangles,
         tetrahedra: &mesh.tetrahedra,
-        masses: Values::Uniform(if is_of_elements { 0.0 } else { 1e-3 }),
-        stiffnesses: Values::Uniform(if is_of_elements { 0.0 } else { 1.0 }),
-        material: is_of_elements.then_some(Material {
+        masses: Values::Uniform(if has_elements { 0.0 } else { 1e-3 }),
+        stiffnesses: Values::Uniform(if has_elements { 0.0 } else { 1.0 }),
+        material: has_elements.then_some(Material {
             model: Model::Tetrahedra,
             young_modulus: 100.0,
             poisson_ratio: 0.3,
@@ -132,11 +133,11 @@ fuzz_target!(|input: &[u8]| {
     } else {
         bytes = worlds[usize::from(kind) % worlds.len()].clone();
         let (edits, _) = edits.as_chunks::<4>();
-        for &[low, high, what, value] in edits {
+        for &[low, high, operation, value] in edits {
             let at = HEADER
-                + (usize::from(u16::from_le_bytes([low, high])) + (usize::from(what) >> 4 << 16))
+                + (usize::from(u16::from_le_bytes([low, high])) + (usize::from(operation) >> 4 << 16))
                     % (bytes.len() - HEADER);
-            match what & 3 {
+            match operation & 3 {
                 0 => bytes[at] = value,
                 1 => bytes[at] ^= 1 << (value % 8),
                 2 => bytes[at] = bytes[at].wrapping_add(value as i8 as u8),
@@ -148,7 +149,7 @@ fuzz_target!(|input: &[u8]| {
             bytes[at] = saved[at];
         }
     }
-    // As somebody would who wants them to be believed.
+    // A valid checksum, so that the snapshot is not refused for it.
     if bytes.len() >= HEADER {
         let size = bytes.len() as u64;
         bytes[CHECKSUM - 8..CHECKSUM].copy_from_slice(&size.to_le_bytes());
@@ -162,7 +163,7 @@ fuzz_target!(|input: &[u8]| {
         std::process::abort();
     };
     if let Ok(mut world) = loaded {
-        // That takes longer than all the rest: one in four.
+        // A step takes longer than everything else, so only one in four inputs takes it.
         if kind < 64 {
             let _ = catch_unwind(AssertUnwindSafe(|| world.step(1e-3)));
         }

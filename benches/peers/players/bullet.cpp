@@ -1,4 +1,5 @@
-// Scenes in Bullet, answering as src/players/serve.rs says. Compiled by the measuring program where Bullet is installed.
+// Scenes in Bullet, with the protocol of src/players/serve.rs. The measuring program compiles it if Bullet is
+// installed.
 
 #include <cmath>
 #include <cstdio>
@@ -23,7 +24,7 @@
 
 namespace {
 
-// Newton's iterations of a step are fixed in Bullet's own.
+// Bullet's own solver fixes the number of Newton iterations per step.
 struct Solver : btDeformableBodySolver {
     explicit Solver(int iterations) {
         if (iterations > 1) m_maxNewtonIterations = iterations, m_newtonTolerance = 0;
@@ -73,20 +74,20 @@ struct Model {
     double or_else(const char *name, double value) const { return numbers.count(name) ? numbers.at(name) : value; }
     int bodies() const { return int(or_else("bodies", 1)); }
 
-    // One of several equal bodies alone.
+    // One of several equal bodies.
     Model body(int index) const {
-        Model part = *this;
+        Model single = *this;
         const int count = bodies(), size = int(positions.size()) / count;
-        part.positions.assign(positions.begin() + index * size, positions.begin() + (index + 1) * size);
-        part.masses.assign(masses.begin() + index * size, masses.begin() + (index + 1) * size);
+        single.positions.assign(positions.begin() + index * size, positions.begin() + (index + 1) * size);
+        single.masses.assign(masses.begin() + index * size, masses.begin() + (index + 1) * size);
         auto take = [&](std::vector<int> &to, const std::vector<int> &from) {
             const std::size_t width = from.size() / count;
             to.assign(from.begin() + index * width, from.begin() + (index + 1) * width);
             for (int &node : to) node -= index * size;
         };
-        take(part.tetrahedra, tetrahedra);
-        take(part.triangles, triangles);
-        return part;
+        take(single.tetrahedra, tetrahedra);
+        take(single.triangles, triangles);
+        return single;
     }
 };
 
@@ -96,9 +97,9 @@ double processor_seconds() {
     return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
 }
 
-// Each iteration takes a share of a link's stretch away. The share with which all of them together move a lone spring as an
-// implicit Euler step of the same stiffness would.
-btScalar share_per_iteration(double stiffness, double step, double mass, int iterations) {
+// Each iteration removes this fraction of a link's stretch. All iterations together then move a single spring like an
+// implicit Euler step of the same stiffness.
+btScalar fraction_per_iteration(double stiffness, double step, double mass, int iterations) {
     const double ratio = stiffness * step * step / mass;
     return btScalar(1.0 - std::pow(1.0 - ratio / (1.0 + ratio), 1.0 / iterations));
 }
@@ -107,15 +108,15 @@ btSoftBody *build(const Model &model, btSoftBodyWorldInfo &info, const std::stri
     std::vector<btScalar> masses(model.masses.begin(), model.masses.end());
     std::vector<bool> is_pinned(masses.size(), false);
     for (int node : model.pinned) {
-        masses[node] = 0;  // Bullet's way to pin.
+        masses[node] = 0;  // A mass of 0 pins a node in Bullet.
         is_pinned[node] = true;
     }
     auto *body = new btSoftBody(&info, int(masses.size()), model.positions.data(), masses.data());
     btSoftBody::Material *free_links = body->m_materials[0], *pinned_links = body->appendMaterial();
     const bool links = kind == "links";
     if (links) {
-        free_links->m_kLST = share_per_iteration(model["stiffness"], step, model.masses[0] / 2, iterations);
-        pinned_links->m_kLST = share_per_iteration(model["stiffness"], step, model.masses[0], iterations);
+        free_links->m_kLST = fraction_per_iteration(model["stiffness"], step, model.masses[0] / 2, iterations);
+        pinned_links->m_kLST = fraction_per_iteration(model["stiffness"], step, model.masses[0], iterations);
     }
     for (std::size_t spring = 0; spring < model.springs.size(); spring += 2) {
         const int a = model.springs[spring], b = model.springs[spring + 1];
@@ -215,21 +216,21 @@ int main(int count, char **arguments) {
         if (model.tetrahedra.empty()) {
             add(new btDeformableMassSpringForce(btScalar(model["stiffness"]), 0, false));
         } else {
-            // The parameters of the law that have the same moduli at small strains (Smith, de Goes, Kim 2018).
+            // Parameters of the law with the same moduli at small strains (Smith, de Goes, Kim 2018).
             const double mu = model["young"] / (2 * (1 + model["poisson"]));
             const double lambda = 2 * mu * model["poisson"] / (1 - 2 * model["poisson"]);
             add(new btDeformableNeoHookeanForce(btScalar(4.0 / 3.0 * mu), btScalar(lambda + 5.0 / 6.0 * mu), 0));
         }
         soft->setImplicit(kind == "implicit");
-        // Without it the implicit solver of version 3.24 leaves every node where it is.
+        // Without projection, the implicit solver of version 3.24 does not move any node.
         soft->setUseProjection(kind == "implicit");
     }
     btSphereShape sphere(btScalar(model.ball[3]));
     std::unique_ptr<btRigidBody> ball, ground;
     auto ball_after = [&](double frames) {
-        const double way = model.ball[4] * model["frame"] * std::fmin(frames, std::floor(2 * model["frames"] / 3));
+        const double drop = model.ball[4] * model["frame"] * std::fmin(frames, std::floor(2 * model["frames"] / 3));
         return btTransform(btQuaternion::getIdentity(),
-                           btVector3(btScalar(model.ball[0]), btScalar(model.ball[1] - way), btScalar(model.ball[2])));
+                           btVector3(btScalar(model.ball[0]), btScalar(model.ball[1] - drop), btScalar(model.ball[2])));
     };
     if (model.ball[3] > 0) {
         ball = std::make_unique<btRigidBody>(0, nullptr, &sphere);
@@ -249,8 +250,8 @@ int main(int count, char **arguments) {
     std::printf("version %d.%02d\n", btGetVersion() / 100, btGetVersion() % 100);
     std::fflush(stdout);
 
-    // The deformable bodies have no damping against the world: their velocities are scaled between steps.
-    const btScalar kept = kind == "links" ? btScalar(1) : btScalar(std::exp(-model["damping"] * step));
+    // The deformable bodies have no damping against the world: velocities are scaled between steps.
+    const btScalar damping_factor = kind == "links" ? btScalar(1) : btScalar(std::exp(-model["damping"] * step));
     std::FILE *file = std::fopen(arguments[2], "wb");
     double spent = 0;
     for (int frame = 0; frame < int(model["frames"]); ++frame) {
@@ -262,7 +263,7 @@ int main(int count, char **arguments) {
                 ball->setWorldTransform(to);
             }
             world->stepSimulation(btScalar(step), 0);
-            // What diverges takes Bullet ever longer: say so at once.
+            // Diverging bodies become ever slower in Bullet, so this is reported at once.
             for (btSoftBody *body : bodies)
                 for (int node = 0; node < body->m_nodes.size(); ++node) {
                     if (!(body->m_nodes[node].m_v.length2() < btScalar(1e6))) {
@@ -270,14 +271,14 @@ int main(int count, char **arguments) {
                         std::fflush(stdout);
                         std::_Exit(0);
                     }
-                    if (kept < 1) body->m_nodes[node].m_v *= kept;
+                    if (damping_factor < 1) body->m_nodes[node].m_v *= damping_factor;
                 }
         }
         spent += processor_seconds() - start;
         for (btSoftBody *body : bodies)
             for (int node = 0; node < body->m_nodes.size(); ++node) {
-                const btVector3 &place = body->m_nodes[node].m_x;
-                const double numbers[3] = {place.x(), place.y(), place.z()};
+                const btVector3 &position = body->m_nodes[node].m_x;
+                const double numbers[3] = {position.x(), position.y(), position.z()};
                 std::fwrite(numbers, sizeof numbers, 1, file);
             }
         std::fflush(file);

@@ -1,4 +1,4 @@
-"""MuJoCo's flexible bodies: a body with three sliding joints for each node."""
+"""MuJoCo's flexible bodies: one body with three sliding joints per node."""
 
 import math
 
@@ -51,23 +51,23 @@ except ValueError as error:
     player.refuse(f"MuJoCo does not take it: {error}")
 data = mujoco.MjData(world)
 W = mujoco.mjtWarning
-# Where it starts again from rest by itself, nothing is left to compare.
+# MuJoCo resets the scene after these warnings, so that nothing is left to compare.
 FATAL = {W.mjWARN_INERTIA: False, W.mjWARN_BADQPOS: True, W.mjWARN_BADQVEL: True, W.mjWARN_BADQACC: True}
 said = set()
 mujoco.mj_forward(world, data)
 
 
-kept = math.exp(-model.damping * model.frame / substeps)
+damping_factor = math.exp(-model.damping * model.frame / substeps)
 
 
 def frame():
-    if kept == 1:
+    if damping_factor == 1:
         mujoco.mj_step(world, data, substeps)
     else:
         # Nodes cannot be damped against the world: velocities are scaled between steps.
         for _ in range(substeps):
             mujoco.mj_step(world, data)
-            data.qvel *= kept
+            data.qvel *= damping_factor
     for kind, is_fatal in FATAL.items():
         if data.warning[kind].number and (is_fatal or kind not in said):
             said.add(kind)

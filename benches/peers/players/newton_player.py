@@ -13,14 +13,14 @@ wp.config.verify_fp = False
 kind = settings["kind"]
 iterations = int(settings.get("iterations", 1))
 step = model.frame / substeps
-kept = float(np.exp(-model.damping * step))
+damping_factor = float(np.exp(-model.damping * step))
 
 builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=(0.0, -model.gravity, 0.0))
 masses = model.masses.copy()
 masses[model.pinned] = 0
 for position, mass in zip(model.positions, masses):
     builder.add_particle(wp.vec3(*position), wp.vec3(0.0), float(mass), radius=1e-4)
-# Each solver has its law: the parameters with the same moduli at small strains.
+# The parameters of each solver's law with the same moduli at small strains.
 mu, lame_lambda = model.mu, model.lame_lambda
 if kind == "semi-implicit":
     mu, lame_lambda = 4 / 3 * mu, lame_lambda + 5 / 6 * mu
@@ -45,8 +45,8 @@ contacts = world.contacts() if len(model.ball) else None
 
 
 @wp.kernel
-def damp(v: wp.array(dtype=wp.vec3), kept: float):
-    v[wp.tid()] = v[wp.tid()] * kept
+def damp(v: wp.array(dtype=wp.vec3), damping_factor: float):
+    v[wp.tid()] = v[wp.tid()] * damping_factor
 
 
 def advance(count):
@@ -57,12 +57,12 @@ def advance(count):
             world.collide(now, contacts)
         solver.step(now, later, control, contacts, step)
         now, later = later, now
-        if kept < 1:
-            wp.launch(damp, dim=len(masses), inputs=[now.particle_qd, kept], device="cpu")
+        if damping_factor < 1:
+            wp.launch(damp, dim=len(masses), inputs=[now.particle_qd, damping_factor], device="cpu")
 
 
 def warm_up():
-    """Compiles the kernels, and starts again."""
+    """Compiles the kernels and restarts."""
     global now, later
     advance(2)
     start = world.state()

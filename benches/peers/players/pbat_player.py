@@ -17,9 +17,9 @@ count = X.shape[1]
 weight = np.zeros_like(X)
 weight[1] = -model.gravity
 weight[:, model.pinned] = 0
-# The law's own lambda has the same moduli at small strains.
+# The law's lambda for the same moduli at small strains.
 lame = np.vstack([np.full(T.shape[1], model.mu), np.full(T.shape[1], model.lame_lambda + model.mu)])
-kept = np.exp(-model.damping * step)
+damping_factor = np.exp(-model.damping * step)
 
 
 def vbd():
@@ -53,7 +53,7 @@ def xpbd():
     data = (
         sim.Data()
         .with_volume_mesh(X, T)
-        # It wants a surface, and meets nothing with it.
+        # The integrator requires a surface; this one has no contacts.
         .with_surface_mesh(np.arange(3), np.arange(3).reshape(3, 1))
         .with_velocity(np.zeros_like(X))
         .with_acceleration(np.asfortranarray(weight))
@@ -72,13 +72,13 @@ integrator = vbd() if settings["kind"] == "vbd" else xpbd()
 
 
 def frame():
-    if kept == 1:
+    if damping_factor == 1:
         integrator.step(model.frame, iterations, substeps)
         return
     # There is no damping against the world: velocities are scaled between steps.
     for _ in range(substeps):
         integrator.step(step, iterations, 1)
-        integrator.v = np.asfortranarray(integrator.v * kept)
+        integrator.v = np.asfortranarray(integrator.v * damping_factor)
 
 
 player.serve(version("pbatoolkit"), frame, lambda: np.array(integrator.x).T)

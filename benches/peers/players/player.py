@@ -1,4 +1,4 @@
-"""A player's side of src/players/serve.rs, for those written in Python."""
+"""The player's side of src/players/serve.rs in Python."""
 
 import os
 import sys
@@ -6,12 +6,12 @@ import time
 
 import numpy as np
 
-# Engines print what they like: only answers go where answers are read.
+# Engines print to standard output; answers need a separate descriptor.
 _answers = os.fdopen(os.dup(1), "w", buffering=1)
 os.dup2(2, 1)
 
 
-# Numbers in a line of each section.
+# Numbers per line of each section.
 WIDTHS = {"nodes": 4, "pinned": 1, "tetrahedra": 4, "springs": 2, "triangles": 3, "ball": 5}
 
 
@@ -55,7 +55,7 @@ def refuse(reason):
 
 
 def serve(version, frame, positions, warm_up=None):
-    """Calls `frame` for each frame, and `positions` between, which gives an array of a row per node."""
+    """Calls `frame` for each frame and then `positions`, which returns an array with one row per node."""
     if warm_up:
         warm_up()
     say("version", version)

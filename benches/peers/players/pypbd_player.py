@@ -10,7 +10,7 @@ from player import model, settings, substeps
 
 iterations = int(settings["iterations"])
 step = model.frame / substeps
-kept = float(np.exp(-model.damping * step))
+damping_factor = float(np.exp(-model.damping * step))
 
 simulation = pbd.Simulation.getCurrent()
 simulation.initDefault()
@@ -33,16 +33,16 @@ controller = simulation.getTimeStep()
 controller.setValueUInt(pbd.TimeStepController.NUM_SUB_STEPS, 1)
 controller.setValueUInt(pbd.TimeStepController.MAX_ITERATIONS, iterations)
 pbd.TimeManager.getCurrent().setTimeStepSize(step)
-# Its weight cannot be set from Python; it is that of every scene.
+# Gravity cannot be set from Python; its default is that of every scene.
 assert model.gravity == 9.81
 
 
 def frame():
     for _ in range(substeps):
         controller.step(world)
-        if kept < 1:
+        if damping_factor < 1:
             for node in range(count):
-                particles.setVelocity(node, np.array(particles.getVelocity(node)) * kept)
+                particles.setVelocity(node, np.array(particles.getVelocity(node)) * damping_factor)
 
 
 def positions():

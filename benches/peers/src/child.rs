@@ -1,4 +1,4 @@
-//! A contender's side of the [`protocol`](crate::protocol), for those written in Rust.
+//! The contender's side of the [`protocol`](crate::protocol) in Rust.
 
 use std::io::BufRead;
 use std::time::Instant;
@@ -6,15 +6,15 @@ use std::time::Instant;
 use crate::cloth::Cloth;
 use crate::protocol::{Hello, Report, Steps};
 
-/// A cloth in some engine.
+/// A cloth in one of the engines.
 pub trait Contender: Sized {
-    /// Builds it; an error says why this engine does not offer it.
+    /// Builds the cloth, or returns the reason that this engine does not support it.
     fn build(cloth: &Cloth, threads: usize) -> Result<Self, String>;
-    /// Which version of what.
+    /// Name and version of the engine.
     fn version() -> String;
-    /// One step.
+    /// Takes one step.
     fn step(&mut self);
-    /// Where a node is.
+    /// The position of a node.
     fn position(&self, node: u32) -> [f32; 3];
 }
 
@@ -24,23 +24,23 @@ pub fn serve<C: Contender>(cloth: &Cloth, threads: usize) {
     let mut contender = match C::build(cloth, threads) {
         Ok(contender) => contender,
         Err(refused) => {
-            return say(&Hello {
+            return send(&Hello {
                 version: None,
                 refused: Some(refused),
             });
         }
     };
-    say(&Hello {
+    send(&Hello {
         version: Some(C::version()),
         refused: None,
     });
     for line in std::io::stdin().lock().lines() {
         let line = line.expect("readable input");
         match line.strip_prefix("steps ") {
-            Some(count) => say(&Steps {
+            Some(count) => send(&Steps {
                 milliseconds: timed_steps(&mut contender, count.parse().expect("a number of steps")),
             }),
-            None => say(&report(&contender, cloth, before)),
+            None => send(&report(&contender, cloth, before)),
         }
     }
 }
@@ -68,11 +68,11 @@ fn report(contender: &impl Contender, cloth: &Cloth, before: Option<u64>) -> Rep
     }
 }
 
-fn say(message: &impl serde::Serialize) {
+fn send(message: &impl serde::Serialize) {
     println!("{}", serde_json::to_string(message).expect("plain data"));
 }
 
-/// A line of what Linux tells a process about itself, in bytes; `None` elsewhere.
+/// The value of a line of `/proc/self/status` [bytes]; `None` on other systems.
 fn memory(name: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix(name))?;

@@ -1,25 +1,25 @@
-//! The cloth that every contender simulates, and what is asked of it afterwards.
+//! The cloth that every contender simulates, and its evaluation.
 
-/// A square grid of nodes in the plane y = 0 with springs to all 8 neighbours, pinned along its first row, falling.
+/// A falling square grid of nodes in the plane y = 0 with springs to all 8 neighbors, pinned along its first row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cloth {
     /// Nodes along one edge.
     pub side: u32,
-    /// Metres between neighbours in a row or a column.
+    /// Distance of neighbors in a row or a column [m].
     pub spacing: f32,
-    /// Kilograms.
+    /// Mass of a node [kg].
     pub node_mass: f32,
-    /// N/m, of every spring.
+    /// Stiffness of every spring [N/m].
     pub stiffness: f32,
-    /// m/s² along -y.
+    /// Gravity along -y [m/s²].
     pub gravity: f32,
-    /// Seconds per step.
+    /// Duration of a step [s].
     pub step: f32,
 }
 
 impl Cloth {
-    /// A sheet of 2.5 kg/m² that sinew and every other explicit method steps by 1 ms at once, wherever its nodes go:
-    /// a node's 8 springs in one line would allow 1.3 ms.
+    /// A sheet of 2.5 kg/m² on which steps of 1 ms are stable for sinew and the other explicit methods at all
+    /// positions: a node with its 8 springs in one line allows 1.3 ms.
     pub fn new(side: u32) -> Self {
         Self {
             side,
@@ -31,12 +31,12 @@ impl Cloth {
         }
     }
 
-    /// The steps of one simulated second.
+    /// The number of steps in one simulated second.
     pub fn steps_per_second(&self) -> usize {
         (1.0 / self.step).round() as usize
     }
 
-    /// As arguments of a command; [`Cloth::from_arguments`] reads them.
+    /// Command-line arguments, which [`Cloth::from_arguments`] reads.
     pub fn arguments(&self) -> Vec<String> {
         let numbers = [self.spacing, self.node_mass, self.stiffness, self.gravity, self.step];
         let mut arguments = vec![self.side.to_string()];
@@ -44,7 +44,7 @@ impl Cloth {
         arguments
     }
 
-    /// What [`Cloth::arguments`] wrote.
+    /// Parses the arguments of [`Cloth::arguments`].
     pub fn from_arguments(arguments: &[String]) -> Option<Self> {
         let (side, numbers) = arguments.split_first()?;
         let mut numbers = numbers.iter().map(|number| number.parse().ok());
@@ -59,18 +59,18 @@ impl Cloth {
         })
     }
 
-    /// Where the nodes begin, row by row.
+    /// Initial positions, row by row.
     pub fn positions(&self) -> impl Iterator<Item = [f32; 3]> {
         let Self { side, spacing, .. } = *self;
         (0..side * side).map(move |node| [(node % side) as f32 * spacing, 0.0, (node / side) as f32 * spacing])
     }
 
-    /// The nodes that stay where they are.
+    /// The pinned nodes.
     pub fn pinned(&self) -> std::ops::Range<u32> {
         0..self.side
     }
 
-    /// The springs, each once: along rows and columns and both diagonals.
+    /// The springs, each once: along rows, columns and both diagonals.
     pub fn springs(&self) -> impl Iterator<Item = [u32; 2]> {
         let side = self.side;
         (0..side * side).flat_map(move |node| {
@@ -87,7 +87,7 @@ impl Cloth {
         })
     }
 
-    /// How far the springs are from their rest lengths, and how far the sheet has come.
+    /// Evaluates the stretch of the springs and the height of the sheet.
     pub fn shape(&self, position: impl Fn(u32) -> [f32; 3]) -> Shape {
         let position = |node: u32| position(node).map(f64::from);
         let spacing = f64::from(self.spacing);
@@ -112,13 +112,13 @@ impl Cloth {
     }
 }
 
-/// What [`Cloth::shape`] finds. The mean is not finite if any node is not.
+/// The result of [`Cloth::shape`]. The mean is not finite if any node is not.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     /// Mean over the springs of length / rest length - 1.
     pub mean_stretch: f64,
-    /// The largest of the same.
+    /// Largest length / rest length - 1.
     pub max_stretch: f64,
-    /// Mean over the nodes, in metres: that all fell alike.
+    /// Mean height of the nodes [m], to check that all fell equally far.
     pub mean_height: f64,
 }

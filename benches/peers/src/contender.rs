@@ -1,4 +1,4 @@
-//! The measuring process's side of the [`protocol`](crate::protocol): who there is, and how to start them.
+//! The measuring process's side of the [`protocol`](crate::protocol): the contenders and how to start them.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -26,32 +26,34 @@ pub struct Running {
     output: BufReader<ChildStdout>,
 }
 
-/// Everyone who could be there. What has to be compiled first is; the errors say who cannot be there and why.
+/// All contenders; compiles those that need it. An error is the reason that a contender is not available.
 pub fn all() -> Vec<Result<Contender, String>> {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let this = std::env::current_exe().expect("a program knows itself");
-    let in_rust = |engine: &str| vec![this.clone(), "child".into(), engine.into()];
-    let in_python = |script: &str| vec!["python3".into(), here.join(script)];
+    let crate_folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let this = std::env::current_exe().expect("the path of this program");
+    let rust_command = |engine: &str| vec![this.clone(), "child".into(), engine.into()];
+    let python_command = |script: &str| vec!["python3".into(), crate_folder.join(script)];
     let contender = |name, threads, command| Contender { name, threads, command };
     let mut contenders = Vec::new();
     for threads in [1, 2] {
-        contenders.push(Ok(contender("sinew", threads, in_rust("sinew"))));
+        contenders.push(Ok(contender("sinew", threads, rust_command("sinew"))));
     }
     for threads in [1, 2] {
-        contenders.push(Ok(contender("Taichi", threads, in_python("taichi_cloth.py"))));
+        contenders.push(Ok(contender("Taichi", threads, python_command("taichi_cloth.py"))));
     }
-    contenders.push(Ok(contender("Warp", 1, in_python("warp_cloth.py"))));
+    contenders.push(Ok(contender("Warp", 1, python_command("warp_cloth.py"))));
     for threads in [1, 2] {
-        contenders.push(Ok(contender("Rapier", threads, in_rust("rapier"))));
+        contenders.push(Ok(contender("Rapier", threads, rust_command("rapier"))));
     }
-    contenders.push(match compile_bullet(&here.join("bullet_cloth.cpp"), "bullet_cloth") {
-        Ok(program) => Ok(contender("Bullet", 1, vec![program])),
-        Err(reason) => Err(format!("Bullet: {reason}")),
-    });
+    contenders.push(
+        match compile_bullet(&crate_folder.join("bullet_cloth.cpp"), "bullet_cloth") {
+            Ok(program) => Ok(contender("Bullet", 1, vec![program])),
+            Err(reason) => Err(format!("Bullet: {reason}")),
+        },
+    );
     contenders
 }
 
-/// Everything that is written goes there.
+/// The folder of all output.
 pub fn target() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target")
 }
@@ -87,13 +89,13 @@ pub fn compile_bullet(source: &Path, name: &str) -> Result<PathBuf, String> {
 }
 
 impl Contender {
-    /// Starts a process and waits until it has built the cloth; an error says why it cannot.
+    /// Starts a process and waits until it has built the cloth, or returns the reason of a failure.
     pub fn start(&self, cloth: &Cloth) -> Result<Running, String> {
         let mut process = Command::new(&self.command[0])
             .args(&self.command[1..])
             .arg(self.threads.to_string())
             .args(cloth.arguments())
-            // Nothing is to be left beside the scripts, nor in the user's caches, nor asked of a server.
+            // No files beside the scripts or in the user's caches, and no requests to servers.
             .env("PYTHONDONTWRITEBYTECODE", "1")
             .env("XDG_CACHE_HOME", target().join("peers/cache"))
             .env("TI_SKIP_VERSION_CHECK", "ON")
@@ -121,13 +123,13 @@ impl Contender {
 }
 
 impl Running {
-    /// The milliseconds that each of so many steps took.
+    /// Takes `count` steps and returns their times [ms].
     pub fn steps(&mut self, count: usize) -> Result<Vec<f64>, String> {
         self.ask(&format!("steps {count}"))?;
         self.answer().map(|steps: Steps| steps.milliseconds)
     }
 
-    /// How the cloth is now.
+    /// The current state of the cloth.
     pub fn report(&mut self) -> Result<Report, String> {
         self.ask("report")?;
         self.answer()
@@ -149,7 +151,7 @@ impl Running {
 }
 
 impl Drop for Running {
-    /// A contender ends where its input does.
+    /// A contender exits when its input ends.
     fn drop(&mut self) {
         self.input = None;
         if let Err(error) = self.process.wait() {

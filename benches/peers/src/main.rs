@@ -1,18 +1,19 @@
-//! sinew beside other engines, in one run each: a large cloth step by step, and error against time in small scenes.
+//! Compares sinew with other engines in one run: a large cloth step by step, and error against time in small scenes.
 //!
 //! ```text
-//! cd benches/peers && cargo run --release                  # the cloth, some 20 minutes
+//! cd benches/peers && cargo run --release                  # the cloth, about 20 minutes
 //! cd benches/peers && cargo run --release -- --seconds 20  # each contender on each cloth, at most
 //! cd benches/peers && cargo run --release -- --quick       # below one minute
 //! cd benches/peers && cargo run --release -- scenes        # error against time, about an hour
 //! cd benches/peers && cargo run --release -- scenes --scene rope --engine bullet --limit 20
 //! ```
 //!
-//! The cloth: Taichi, NVIDIA Warp, Rapier's soft bodies and Bullet's; a table goes to `target/report/peers.md`, with what was
-//! asked of each engine. The scenes: Rapier, Bullet, MuJoCo, pbatoolkit, Newton and pyPBD; tables and diagrams go to
-//! `target/report/engines*`, and `--limit` is the processor time that a point may take for a simulated second.
+//! The cloth runs in Taichi, NVIDIA Warp, Rapier's soft bodies and Bullet's. The table in `target/report/peers.md`
+//! states each engine's settings. The scenes run in Rapier, Bullet, MuJoCo, pbatoolkit, Newton and pyPBD. Tables and
+//! diagrams are written to `target/report/engines*`. `--limit` is the processor time that a point may take per
+//! simulated second.
 //!
-//! What is not installed is skipped, loudly. To have all engines of the scenes:
+//! Engines that are not installed are reported and skipped. To install all engines of the scenes:
 //!
 //! ```text
 //! apt-get install g++ pkg-config libbullet-dev
@@ -35,11 +36,11 @@ use cloth::Cloth;
 use contender::{Contender, Running};
 use protocol::Report;
 
-/// How long to measure.
+/// The measuring effort.
 struct Effort {
     /// Nodes along an edge of each cloth.
     sides: &'static [u32],
-    /// Seconds that a contender may take for its simulated second; fewer steps otherwise.
+    /// Time limit of a contender for its simulated second [s]; beyond it, fewer steps are taken.
     seconds: f64,
 }
 
@@ -52,33 +53,33 @@ const QUICK: Effort = Effort {
     seconds: 1.0,
 };
 
-/// Contenders take turns this often, so that what else the machine does hits all.
+/// Number of turns of each contender, so that disturbances by other programs affect all.
 const ROUNDS: usize = 10;
 
-/// Steps before the first that is timed; a slow engine has fewer.
+/// Untimed steps at the start; a slow engine takes fewer.
 const WARM_UP: usize = 10;
 
-/// What was measured of a contender on one cloth, or why nothing was.
+/// The measurements of a contender on one cloth, or the reason that there are none.
 pub struct Row {
     pub contender: Contender,
     pub result: Result<Measured, String>,
 }
 
-/// What was measured of a contender on one cloth.
+/// The measurements of a contender on one cloth.
 pub struct Measured {
     pub version: String,
-    /// Median over the steps.
+    /// Median time of a step [ms].
     pub milliseconds: f64,
-    /// A tenth of the steps took less: what remains where something else uses the machine.
+    /// The 10th percentile of step times [ms], for a machine that also runs other programs.
     pub fast_milliseconds: f64,
-    /// Steps that were timed.
+    /// Number of timed steps.
     pub steps: usize,
-    /// Whether the report is of the end of one simulated second.
+    /// True if the report describes the end of one simulated second.
     pub whole_second: bool,
     pub report: Report,
 }
 
-/// A contender in the course of being measured.
+/// A contender that is being measured.
 struct Run {
     running: Running,
     /// Steps per round.
@@ -95,7 +96,7 @@ fn main() {
         Some("--seconds") => match arguments.get(1).and_then(|seconds| seconds.parse().ok()) {
             Some(seconds) => compare(&Effort { seconds, ..FULL }),
             None => {
-                eprintln!("--seconds: how many for each contender?");
+                eprintln!("--seconds: needs the number of seconds per contender");
                 std::process::exit(2);
             }
         },
@@ -115,7 +116,7 @@ fn main() {
     }
 }
 
-/// What `scenes` is asked for.
+/// Parses the arguments of `scenes`.
 fn request(arguments: &[String]) -> Option<precision::Request> {
     let mut request = precision::Request {
         limit: 4.0,
@@ -134,7 +135,7 @@ fn request(arguments: &[String]) -> Option<precision::Request> {
     Some(request)
 }
 
-/// Is one of the contenders.
+/// Runs as one of the contenders.
 fn serve(arguments: &[String]) {
     let cloth = arguments.get(2..).and_then(Cloth::from_arguments).expect("a cloth");
     let threads = arguments[1].parse().expect("a thread count");
@@ -168,7 +169,7 @@ fn compare(effort: &Effort) {
             }
         }
         tables.push((cloth, rows));
-        // After each size: a run that is cut short has measured something.
+        // Written after each size, so that an interrupted run has results.
         write(&report::markdown(&tables, &skipped));
     }
     println!("{}", report::markdown(&tables, &skipped));
@@ -186,7 +187,7 @@ fn write(text: &str) {
     }
 }
 
-/// Measures everyone on one cloth, in turns.
+/// Measures all contenders on one cloth, in turns.
 fn measure(cloth: &Cloth, contenders: &[Contender], seconds: f64) -> Vec<Row> {
     let mut runs: Vec<(Contender, Result<Run, String>)> = Vec::new();
     for contender in contenders {
@@ -213,7 +214,7 @@ fn measure(cloth: &Cloth, contenders: &[Contender], seconds: f64) -> Vec<Row> {
 }
 
 impl Run {
-    /// Builds the cloth and finds how many steps there is time for: those of one second, or fewer.
+    /// Builds the cloth and computes the number of affordable steps: those of one second, or fewer.
     fn start(contender: &Contender, cloth: &Cloth, seconds: f64) -> Result<Self, String> {
         let mut running = contender.start(cloth)?;
         // The first steps compile and allocate.
@@ -244,7 +245,7 @@ impl Run {
     fn finish(mut self, cloth: &Cloth) -> Result<Measured, String> {
         let done = self.warm_up + self.milliseconds.len();
         let left = cloth.steps_per_second().saturating_sub(done);
-        // What the rounds did not divide.
+        // The remainder of the division into rounds.
         let whole_second = left < ROUNDS;
         if whole_second {
             self.running.steps(left)?;

@@ -1,4 +1,4 @@
-//! The cloth in Rapier: one substep, and the 4 sweeps over the constraints that its soft bodies have by default.
+//! The cloth in Rapier: one substep, and the default of 4 sweeps over the constraints of its soft bodies.
 
 use std::f32::consts::TAU;
 
@@ -23,8 +23,8 @@ impl Contender for RapierCloth {
         parameters.dt = cloth.step;
         parameters.num_solver_iterations = 1;
         parameters.soft_bodies.max_extra_substeps = 0;
-        // A spring is an undamped implicit one of a frequency against the masses at its ends: half a node's, or a
-        // whole one where the other end is pinned.
+        // A spring is an undamped implicit one, set by a frequency for the masses at its ends: half a node's mass, or a
+        // whole one if the other end is pinned.
         let softness = |mass: f32| SpringCoefficients::new((cloth.stiffness / mass).sqrt() / TAU, 0.0);
         let edges: Vec<[u32; 2]> = cloth.springs().collect();
         let pinned = cloth.pinned();

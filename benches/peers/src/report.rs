@@ -1,4 +1,4 @@
-//! The tables, and what was asked of whom, in Markdown.
+//! The tables and the settings of each engine, in Markdown.
 
 use std::fmt::Write;
 
@@ -6,37 +6,37 @@ use crate::cloth::Cloth;
 use crate::protocol::Report;
 use crate::{Measured, Row};
 
-/// What is the same and what is not.
+/// Common and different settings.
 const SETTINGS: &str = "\
-All simulate the same cloth, in single precision, from the same start, without damping, collisions or sleep; each in a
-process of its own, taking turns. A step's time is what the engine's own step call takes, its median over the steps
-(and what a tenth of them stay below, for a machine that does other things too).
+All engines simulate the same cloth in single precision, from the same start, without damping, collisions or sleep. Each
+runs in a separate process, in turns. A step's time is that of the engine's own step call, as the median over the steps
+(and the 10th percentile, for a machine that also runs other programs).
 
-- **sinew**: VERLET, substeps chosen by itself (one, checked at every step); stability is watched and every step can be
-  refused or undone.
-- **Taichi**: symplectic Euler over the grid's 8 neighbours, as its own mass-spring example goes about it, one kernel
-  launch from Python per step; topology is compiled in, nothing watches stability.
+- **sinew**: VERLET, automatic substeps (one, checked at every step); stability is monitored and every step can be
+  refused or rolled back.
+- **Taichi**: symplectic Euler over the grid's 8 neighbors, as in its mass-spring example, one kernel launch from Python per
+  step; topology is compiled in, stability is not monitored.
 - **Warp**: the same, two kernels recorded once and launched from Python; its kernels use one thread on a processor.
 - **Rapier**: soft body of edges, one substep, its default of 4 sweeps over the constraints, frequency set from the same
   stiffness and masses, damping ratio 0; collisions off, thread pool of as many threads.
-- **Bullet**: btSoftBody of links, 4 position iterations, which together move a lone spring as an implicit step with the
-  same stiffness would; no collisions. One thread, as Debian builds it.
+- **Bullet**: btSoftBody of links, 4 position iterations, which together move a single spring like an implicit step of the
+  same stiffness; no collisions. One thread, as Debian builds it.
 
-Stretch: length / rest length - 1 over the springs after one simulated second. The explicit ones solve the same equations
-and should agree; Rapier and Bullet stop before a step has converged, which stretches the cloth or damps its motion.
-Height: mean over the nodes, for comparison that all fell alike. Body: resident memory beyond that before the cloth was
-built, after some steps; what Taichi compiles counts. Process: the most that the whole process had, Python and the
-cloth's input included.
+Stretch: length / rest length - 1 over the springs after one simulated second. The explicit engines solve the same
+equations and should agree; Rapier and Bullet stop before a step has converged, which stretches the cloth or damps its
+motion. Height: mean over the nodes, to check that all fell equally far. Body: resident memory beyond that before the cloth
+was built, after some steps, including code that Taichi compiles. Process: peak memory of the whole process, including
+Python and the cloth's input.
 ";
 
-/// The whole report.
+/// The complete report.
 pub fn markdown(tables: &[(Cloth, Vec<Row>)], skipped: &[String]) -> String {
     let mut text = String::from("# The same cloth in sinew and its peers\n\n");
     let _ = writeln!(text, "Machine: {}\n", machine());
     if let Some((cloth, _)) = tables.first() {
         let _ = writeln!(
             text,
-            "Cloth: a square grid with springs to all 8 neighbours, {} mm apart, {} g a node, {} N/m a spring, one edge \
+            "Cloth: a square grid with springs to all 8 neighbors, {} mm apart, {} g a node, {} N/m a spring, one edge \
              pinned, falling from the horizontal at {} m/s², {} ms a step.\n",
             cloth.spacing * 1e3,
             cloth.node_mass * 1e3,
@@ -131,7 +131,7 @@ fn cells(measured: &Measured) -> String {
     .join(" | ")
 }
 
-/// How many times as long the fastest of the others takes, on at most so many threads.
+/// The time of the fastest other engine over sinew's, on at most `threads` threads.
 fn ratio(rows: &[Row], threads: usize) -> Option<String> {
     let measured = |row: &Row| row.result.as_ref().ok().map(|measured| measured.milliseconds);
     let ours = rows

@@ -1,4 +1,4 @@
-//! The cloth in sinew: VERLET, as many substeps as stability asks for, which is one.
+//! The cloth in sinew: VERLET, with as many substeps as stability requires, which is one.
 
 use glam::Vec3;
 use sinew::{BodyDefinition, BodyId, Values, World, WorldDefinition};

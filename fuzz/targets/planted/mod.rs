@@ -1,13 +1,13 @@
-//! The fault that has to be found: a read beyond what was given, of which nobody but the sanitizer tells.
+//! The planted fault: a read out of bounds, which only the sanitizer detects.
 
 use std::hint::black_box;
 
-/// Does so where faults are planted and this is so.
+/// Reads out of bounds if faults are planted and the condition is met.
 pub fn fault(is_met: bool) {
     if cfg!(planted) && is_met {
         eprintln!("the planted fault");
-        let given = black_box(vec![0_u8; 8]);
-        // SAFETY: there is none.
-        black_box(unsafe { given.as_ptr().add(black_box(8)).read_volatile() });
+        let buffer = black_box(vec![0_u8; 8]);
+        // SAFETY: unsound on purpose.
+        black_box(unsafe { buffer.as_ptr().add(black_box(8)).read_volatile() });
     }
 }

@@ -1,4 +1,4 @@
-//! Bullet: its deformable bodies, explicit and implicit, and its older soft bodies of links.
+//! Bullet: deformable bodies, explicit and implicit, and the older soft bodies of links.
 
 use std::path::Path;
 
@@ -17,8 +17,8 @@ pub fn engine() -> Engine {
         },
         lines: |scene| Ok(lines(scene)),
         notes: "As Debian builds it. Deformable: neo-Hookean tetrahedra or mass-spring forces without damping, explicit or implicit \
-                Euler, the latter by conjugate gradients (`setUseProjection`), as its default solver moves nothing. Links: position constraints, whose shares per iteration together move a lone spring as an implicit step of \
-                the same stiffness would.",
+                Euler, the latter by conjugate gradients (`setUseProjection`), as its default solver does not move nodes. Links: position constraints whose iterations together move a single spring like an implicit step of \
+                the same stiffness.",
     }
 }
 

@@ -1,4 +1,4 @@
-//! The engines: how each is started, and with which settings each scene is simulated.
+//! The engines: how each is started, and its settings for each scene.
 
 mod bullet;
 mod mujoco;
@@ -17,33 +17,34 @@ use crate::precision::law::Law;
 use crate::precision::model::Model;
 use crate::scenes::Scene;
 
-pub use process::{Played, Said, play};
+pub use process::{Messages, Played, play};
 pub use serve::{Player, Settings, processor_seconds};
 pub use sinew::SinewPlayer;
 
-/// An engine, or a part of one that is set up alike.
+/// An engine, or a part of one with the same setup.
 pub struct Engine {
     pub name: &'static str,
-    /// Of its lines in pictures.
+    /// Color of its lines in diagrams.
     pub color: &'static str,
-    /// The program and its first arguments; an error says why it cannot be there. What has to be compiled first is.
+    /// Returns the program and its first arguments; compiles the program if necessary. An error is the reason that it
+    /// is not available.
     pub program: fn() -> Result<Vec<PathBuf>, String>,
-    /// What is tried; an error says why it cannot simulate this.
+    /// The lines to measure, or the reason that the engine cannot simulate the scene.
     pub lines: fn(&Scene) -> Result<Vec<Line>, String>,
-    /// What a reader should know.
+    /// Notes for readers of the report.
     pub notes: &'static str,
 }
 
-/// One way to set an engine up, from coarse to fine.
+/// One configuration of an engine, from coarse to fine.
 pub struct Line {
     pub name: String,
     pub law: Law,
-    /// Each a point: settings as `name=value`.
+    /// The points, each with settings as `name=value`.
     pub points: Vec<Vec<String>>,
 }
 
 impl Line {
-    /// A line whose frames are cut in twice as many parts from point to point.
+    /// A line that doubles the number of substeps per frame from point to point.
     pub fn doubling(name: &str, law: Law, settings: &[&str], first: u32, last: u32) -> Self {
         let counts = std::iter::successors(Some(first), |count| Some(2 * count)).take_while(|&count| count <= last);
         let point = |count| {
@@ -58,7 +59,7 @@ impl Line {
     }
 }
 
-/// Everyone.
+/// All engines.
 pub fn all() -> Vec<Engine> {
     vec![
         sinew::engine(),
@@ -71,23 +72,23 @@ pub fn all() -> Vec<Engine> {
     ]
 }
 
-/// Whether a player that knows one body beside a ball at most can have this.
+/// Refuses scenes that need more than one body beside a fixed ball.
 fn has_one_body(scene: &Scene) -> Result<(), String> {
     let Model { has_floor, ball, .. } = scene.model;
     let is_pressed = ball.is_some_and(|ball| ball.speed != 0.0);
     match has_floor || is_pressed || scene.model.body_count() > 1 {
-        true => Err("this player sets up one body and a fixed ball alone".into()),
+        true => Err("this player only supports one body and a fixed ball".into()),
         false => Ok(()),
     }
 }
 
-/// This program, as one of the engines that are built in.
+/// This program as one of the built-in engines.
 fn built_in(engine: &str) -> Result<Vec<PathBuf>, String> {
     let this = std::env::current_exe().map_err(|error| error.to_string())?;
     Ok(vec![this, "player".into(), engine.into()])
 }
 
-/// Is one of the engines that are built in: `player <engine> <model> <positions> <settings>`.
+/// Runs as one of the built-in engines: `player <engine> <model> <positions> <settings>`.
 pub fn serve(arguments: &[String]) {
     let (engine, arguments) = arguments.split_first().expect("an engine");
     match engine.as_str() {

@@ -12,7 +12,7 @@ pub fn engine() -> Engine {
         lines: |scene| super::has_one_body(scene).map(|()| lines(scene)),
         notes: "A flex of three sliding joints per node, in double precision, without contact or edge constraints. Tetrahedra are \
                 St Venant-Kirchhoff's, springs a flex of dimension 1 with the stiffness of its edges. `discrete` logs warnings that the inertia is nearly \
-                singular or that its solve did not converge: the notes of each scene have them.",
+                singular or that its solve did not converge; the notes of each scene list them.",
     }
 }
 
@@ -28,7 +28,7 @@ fn lines(scene: &Scene) -> Vec<Line> {
         line("RK4", "integrator=RK4", 8),
         line("discrete", "integrator=discrete", 1),
     ];
-    // It no longer takes tetrahedra.
+    // This integrator no longer supports tetrahedra.
     if law == Law::Springs {
         all.push(line("implicitfast", "integrator=implicitfast", 1));
     }

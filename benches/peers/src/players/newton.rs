@@ -10,7 +10,7 @@ pub fn engine() -> Engine {
         color: "#c29a00",
         program: || super::python::script("newton_player.py", "newton", "newton"),
         lines: |scene| super::has_one_body(scene).map(|()| lines(scene)),
-        notes: "On the processor, where its kernels use one thread. Compiling them is not counted. XPBD is left out where there are \
+        notes: "On the processor, where its kernels use one thread. Their compilation is not counted. XPBD is omitted for \
                 tetrahedra: its constraint on shape, the trace of F'F less 3, has no shear stiffness at small strains.",
     }
 }

@@ -1,4 +1,4 @@
-//! The measuring side: starts a player, follows its frames and ends it where it takes too long.
+//! The measuring side: starts a player, reads its frames, and stops it if it takes too long.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -11,35 +11,35 @@ use crate::precision::DIVERGES;
 use crate::precision::model::Model;
 use crate::precision::motion::Motion;
 
-/// How a run ended.
+/// The result of a run.
 pub enum Played {
-    /// All frames, with the processor's seconds of stepping.
+    /// All frames, and the processor time of stepping [s].
     Whole { motion: Motion, seconds: f64 },
-    /// Stopped, as it would have taken longer than the limit.
+    /// Stopped, since it would have exceeded the limit.
     Cut { expected: f64 },
-    /// The engine did not do it, and why.
+    /// The engine did not complete it, and the reason.
     Refused(String),
 }
 
-/// What a run said, besides how it ended.
+/// Messages of a run.
 #[derive(Default)]
-pub struct Said {
+pub struct Messages {
     pub version: Option<String>,
     pub notes: Vec<String>,
 }
 
-/// A player may take this long to start and to compile, s.
+/// Time limit for starting and compiling a player [s].
 const START: f64 = 120.0;
 
-/// Frames before an estimate of the whole is trusted.
+/// Number of frames before the estimate of the total time is used.
 const TRUSTED: usize = 4;
 
-/// Simulates `model` with `settings`, in a process of its own; `limit` is in seconds of the processor.
-pub fn play(program: &[std::path::PathBuf], model: &Model, settings: &[String], limit: f64) -> (Played, Said) {
+/// Simulates `model` with `settings` in a separate process; `limit` is processor time [s].
+pub fn play(program: &[std::path::PathBuf], model: &Model, settings: &[String], limit: f64) -> (Played, Messages) {
     let folder = target().join("peers/players");
-    let mut said = Said::default();
-    let played = run(&folder, program, model, settings, limit, &mut said);
-    (played.unwrap_or_else(Played::Refused), said)
+    let mut messages = Messages::default();
+    let played = run(&folder, program, model, settings, limit, &mut messages);
+    (played.unwrap_or_else(Played::Refused), messages)
 }
 
 fn run(
@@ -48,7 +48,7 @@ fn run(
     model: &Model,
     settings: &[String],
     limit: f64,
-    said: &mut Said,
+    messages: &mut Messages,
 ) -> Result<Played, String> {
     let failed = |error: std::io::Error| error.to_string();
     std::fs::create_dir_all(folder).map_err(failed)?;
@@ -61,7 +61,7 @@ fn run(
         .args(&program[1..])
         .args([&file, &positions])
         .args(settings)
-        // Engines leave logs and caches where they are started.
+        // Engines write logs and caches to their working directory.
         .current_dir(&folder)
         .envs([
             ("PYTHONDONTWRITEBYTECODE", "1"),
@@ -85,14 +85,14 @@ fn run(
     });
     let (mut frames, mut seconds, mut refused, mut cut) = (0, 0.0, None, None);
     loop {
-        // Other work on the machine makes a run take longer than its processor time.
+        // Other programs make a run take longer than its processor time.
         let patience = if frames == 0 { START + limit } else { 3.0 * limit };
         match receiver.recv_timeout(Duration::from_secs_f64(patience)) {
             Ok(line) => {
                 let (word, rest) = line.split_once(' ').unwrap_or((&line, ""));
                 match word {
-                    "version" => said.version = Some(rest.into()),
-                    "note" => said.notes.push(rest.into()),
+                    "version" => messages.version = Some(rest.into()),
+                    "note" => messages.notes.push(rest.into()),
                     "refused" => refused = Some(rest.to_string()),
                     "frame" => {
                         frames += 1;
@@ -120,7 +120,7 @@ fn run(
     }
     if frames < model.frames {
         return match cut {
-            // What has no numbers any more is often slow; a finer step may be faster.
+            // Diverged runs are often slow; a finer step may be faster.
             Some(_) if has_diverged(&positions, model) => Err(DIVERGES.into()),
             Some(expected) => Ok(Played::Cut { expected }),
             None => Err(format!(
@@ -136,7 +136,7 @@ fn run(
     }
 }
 
-/// Whether the last frame that was written is nowhere near the first.
+/// True if the last written frame is far from the first.
 fn has_diverged(positions: &Path, model: &Model) -> bool {
     let motion = read_motion(positions, model);
     motion.is_ok_and(|motion| {
@@ -145,7 +145,7 @@ fn has_diverged(positions: &Path, model: &Model) -> bool {
     })
 }
 
-/// The frames that a player has written.
+/// Reads the frames that a player has written.
 fn read_motion(positions: &Path, model: &Model) -> std::io::Result<Motion> {
     let bytes = std::fs::read(positions)?;
     let (chunks, _) = bytes.as_chunks::<8>();

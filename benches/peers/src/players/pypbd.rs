@@ -14,7 +14,7 @@ pub fn engine() -> Engine {
             false => Ok(lines(scene)),
         },
         notes: "Springs are extended position-based distance constraints. Its finite elements are plain position-based constraints, \
-                whose stiffness depends on step and iterations: no setting makes them the material.",
+                whose stiffness depends on step and iterations; no setting reproduces the material.",
     }
 }
 

@@ -18,9 +18,9 @@ pub fn engine() -> Engine {
         program: || super::built_in("rapier"),
         lines: |scene| Ok(lines(scene)),
         notes: "Rapier 0.36 in single precision, `fem` built in. `substeps` are its solver iterations of one step per frame. \
-                Constraints: 4 sweeps by default, and 32. A spring is a constraint of its frequency against the masses at its ends. \
+                Constraints: 4 sweeps by default, and 32. A spring is a constraint with its frequency for the masses at its ends. \
                 FEM: at most 20 iterations of its linear solver by default, and 500. \
-                Its corotational cells are left out: beside their law they keep volume by a constraint of their own.",
+                Its corotational cells are omitted, since they preserve volume by a separate constraint.",
     }
 }
 
@@ -50,15 +50,15 @@ fn lines(scene: &Scene) -> Vec<Line> {
 pub struct RapierPlayer {
     world: PhysicsWorld,
     bodies: Vec<SoftBodyHandle>,
-    /// Nodes of each.
+    /// Number of nodes per body.
     size: usize,
     ball: Option<(RigidBodyHandle, Ball)>,
     passed: usize,
     frames: usize,
 }
 
-fn place(place: [f64; 3]) -> Vector {
-    Vector::from(place.map(|x| x as f32))
+fn vector(components: [f64; 3]) -> Vector {
+    Vector::from(components.map(|x| x as f32))
 }
 
 impl Player for RapierPlayer {
@@ -70,7 +70,7 @@ impl Player for RapierPlayer {
         parameters.dt = FRAME as f32;
         parameters.num_solver_iterations = settings.number("substeps").unwrap_or(4.0) as usize;
         if !model.has_contact() {
-            // Its own measures against fast and far stretched bodies would hide what the settings do.
+            // Rapier's measures against fast and far stretched bodies would hide the effect of the settings.
             parameters.soft_bodies.max_extra_substeps = 0;
             parameters.soft_bodies.resweep_strain = f32::MAX;
         }
@@ -79,10 +79,10 @@ impl Player for RapierPlayer {
         }
         let friction = model.friction as f32;
         let mut ball = None;
-        if let Some(given) = model.ball {
-            let shape = ColliderBuilder::ball(given.radius as f32).friction(friction);
-            let body = RigidBodyBuilder::kinematic_position_based().translation(place(given.center));
-            ball = Some((world.insert(body, shape).0, given));
+        if let Some(definition) = model.ball {
+            let shape = ColliderBuilder::ball(definition.radius as f32).friction(friction);
+            let body = RigidBodyBuilder::kinematic_position_based().translation(vector(definition.center));
+            ball = Some((world.insert(body, shape).0, definition));
         }
         if model.has_floor {
             let ground = ColliderBuilder::cuboid(10.0, 1.0, 10.0).friction(friction);
@@ -111,7 +111,7 @@ impl Player for RapierPlayer {
         self.passed += 1;
         if let Some((body, ball)) = &self.ball {
             let body = self.world.bodies.get_mut(*body).expect("still there");
-            body.set_next_kinematic_translation(place(ball.center_after(self.passed, self.frames)));
+            body.set_next_kinematic_translation(vector(ball.center_after(self.passed, self.frames)));
         }
         self.world.step();
         Ok(())
@@ -128,7 +128,7 @@ impl Player for RapierPlayer {
 }
 
 fn soft_body(model: &Model, settings: &Settings) -> SoftBodyBuilder {
-    let mut builder = SoftBodyBuilder::new(model.positions.iter().copied().map(place).collect())
+    let mut builder = SoftBodyBuilder::new(model.positions.iter().copied().map(vector).collect())
         .masses(model.masses.iter().map(|&mass| mass as f32).collect())
         .pinned_particles(model.pinned.iter().map(|&node| node as u32))
         .linear_damping(model.damping as f32)
@@ -152,8 +152,8 @@ fn soft_body(model: &Model, settings: &Settings) -> SoftBodyBuilder {
     }
 }
 
-/// A spring is an undamped implicit one of a frequency against the masses at its ends: half a node's, or a whole one where
-/// the other end is pinned.
+/// A spring is an undamped implicit one, set by a frequency for the masses at its ends: half a node's mass, or a whole
+/// one if the other end is pinned.
 fn with_springs(builder: SoftBodyBuilder, model: &Model) -> SoftBodyBuilder {
     let mass = model.masses[0];
     let softness = |mass: f64| SpringCoefficients::new((model.stiffness / mass).sqrt() as f32 / TAU, 0.0);

@@ -1,23 +1,24 @@
-//! A player's side: reads a model, simulates frame by frame, writes positions to a file and times to its output.
+//! The player's side: reads a model, simulates frame by frame, and writes positions to a file and times to its output.
 //!
-//! Lines that it prints: `version <text>` and `note <text>` before the first frame, or `refused <why>`; then
-//! `frame <processor seconds of stepping so far>` after each. The file has the coordinates of all nodes as `f64`, frame after frame.
+//! It prints `version <text>` and `note <text>` before the first frame, or `refused <why>`. After each frame it prints
+//! `frame <processor seconds of stepping so far>`. The file contains the coordinates of all nodes as `f64`, frame after
+//! frame.
 
 use std::io::{BufWriter, Write};
 
 use crate::precision::model::Model;
 
-/// A model in an engine of Rust.
+/// A model in a Rust engine.
 pub trait Player: Sized {
-    /// Builds it; an error says why this engine does not offer it.
+    /// Builds the model, or returns the reason that this engine does not support it.
     fn build(model: &Model, settings: &Settings) -> Result<Self, String>;
-    /// Which version of what.
+    /// Name and version of the engine.
     fn version() -> String;
-    /// One frame; an error says why it was refused.
+    /// Simulates one frame, or returns the reason of a failure.
     fn frame(&mut self) -> Result<(), String>;
-    /// Where a node is.
+    /// The position of a node.
     fn position(&self, node: usize) -> [f32; 3];
-    /// What a reader should know after the last frame.
+    /// A note for readers after the last frame.
     fn note(&self) -> Option<String> {
         None
     }
@@ -27,7 +28,7 @@ pub trait Player: Sized {
 pub struct Settings(Vec<(String, String)>);
 
 impl Settings {
-    /// From names and values.
+    /// Creates settings from names and values.
     pub fn new<'a>(settings: impl Iterator<Item = &'a (&'a str, &'a str)>) -> Self {
         Self(
             settings
@@ -36,12 +37,12 @@ impl Settings {
         )
     }
 
-    /// The number of a name, where it is set.
+    /// The number of a setting, if it is set.
     pub fn number(&self, name: &str) -> Option<f32> {
         self.word(name).map(|word| word.parse().expect("a number"))
     }
 
-    /// The word of a name, where it is set.
+    /// The word of a setting, if it is set.
     pub fn word(&self, name: &str) -> Option<&str> {
         let is_it = |(key, _): &&(String, String)| key == name;
         self.0.iter().find(is_it).map(|(_, value)| value.as_str())
@@ -86,7 +87,7 @@ pub fn serve<P: Player>(arguments: &[String]) {
     }
 }
 
-/// What all threads of this process have used of the processor, s.
+/// Processor time of all threads of this process [s].
 pub fn processor_seconds() -> f64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
     // SAFETY: the pointer is to a timespec of this function.

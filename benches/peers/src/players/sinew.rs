@@ -18,13 +18,13 @@ pub fn engine() -> Engine {
         color: "#0b6e99",
         program: || super::built_in("sinew"),
         lines: |scene| Ok(lines(scene)),
-        notes: "VERLET chooses its substeps from stability, or takes `substeps` of them; IMPLICIT is stepped so many times a frame.",
+        notes: "VERLET chooses its substeps by stability, or takes `substeps` of them; IMPLICIT takes `substeps` steps per frame.",
     }
 }
 
 fn lines(scene: &Scene) -> Vec<Line> {
-    let is_of_springs = scene.model.has(Law::Springs);
-    let law = if is_of_springs { Law::Springs } else { Law::SignedVolume };
+    let has_springs = scene.model.has(Law::Springs);
+    let law = if has_springs { Law::Springs } else { Law::SignedVolume };
     let point = |settings: &[&str]| {
         settings
             .iter()
@@ -34,7 +34,7 @@ fn lines(scene: &Scene) -> Vec<Line> {
     let mut verlet = Line::doubling("VERLET", law, &["solver=verlet", "mass_scaling=0"], 32, 1024);
     verlet.points.insert(0, point(&["solver=verlet", "mass_scaling=0"]));
     let scaled = ["0.3", "0.1", "0.03", "0.01", "0.001"];
-    let scaled = scaled.map(|part| point(&["solver=verlet", &format!("mass_scaling={part}")]));
+    let scaled = scaled.map(|value| point(&["solver=verlet", &format!("mass_scaling={value}")]));
     let line = |name: &str, points| Line {
         name: name.into(),
         law,
@@ -68,7 +68,7 @@ fn lines(scene: &Scene) -> Vec<Line> {
         ),
         Line::doubling("IMPLICIT, `order` 1", law, &["solver=implicit", "order=1"], 1, 256),
     ];
-    if !is_of_springs {
+    if !has_springs {
         all.push(Line {
             name: "VERLET, NEO_HOOKEAN".into(),
             law: Law::NeoHookean,
@@ -90,7 +90,7 @@ pub struct SinewPlayer {
 }
 
 impl SinewPlayer {
-    /// One call of `step`.
+    /// Calls `step` once.
     pub fn step(&mut self, seconds: f32) -> Result<(), String> {
         let report = self.world.step(seconds).map_err(|error| error.to_string())?;
         self.substeps = self.substeps.max(report.substeps);
@@ -102,7 +102,7 @@ impl SinewPlayer {
     }
 }
 
-fn place([x, y, z]: [f64; 3]) -> Vec3 {
+fn vector([x, y, z]: [f64; 3]) -> Vec3 {
     Vec3::new(x as f32, y as f32, z as f32)
 }
 
@@ -110,10 +110,10 @@ fn add_body(world: &mut World, model: &Model, settings: &Settings, solver: Solve
     fn nodes<const N: usize>(elements: &[[usize; N]]) -> Vec<[u32; N]> {
         elements.iter().map(|nodes| nodes.map(|node| node as u32)).collect()
     }
-    let positions: Vec<Vec3> = model.positions.iter().copied().map(place).collect();
+    let positions: Vec<Vec3> = model.positions.iter().copied().map(vector).collect();
     let masses: Vec<f32> = model.masses.iter().map(|&mass| mass as f32).collect();
     let (springs, tetrahedra) = (nodes(&model.springs), nodes(&model.tetrahedra));
-    // A solid finds its surface itself.
+    // A solid derives its surface from its tetrahedra.
     let triangles = nodes(if tetrahedra.is_empty() { &model.triangles } else { &[] });
     let mut definition = BodyDefinition {
         positions: &positions,
@@ -135,8 +135,8 @@ fn add_body(world: &mut World, model: &Model, settings: &Settings, solver: Solve
             ..BodyContact::default()
         };
     }
-    if let Some(part) = settings.number("mass_scaling") {
-        definition.mass_scaling = part;
+    if let Some(value) = settings.number("mass_scaling") {
+        definition.mass_scaling = value;
     }
     if tetrahedra.is_empty() {
         definition.springs = Some(&springs);
@@ -184,12 +184,12 @@ fn build(model: &Model, settings: &Settings) -> sinew::Result<SinewPlayer> {
         })?;
     }
     let mut ball = None;
-    if let Some(given) = model.ball {
+    if let Some(model_ball) = model.ball {
         let mut definition = ToolDefinition::new(Shape::Sphere {
-            radius: given.radius as f32,
+            radius: model_ball.radius as f32,
         });
-        definition.pose.position = place(given.center);
-        ball = Some((world.create_tool(&definition)?, given));
+        definition.pose.position = vector(model_ball.center);
+        ball = Some((world.create_tool(&definition)?, model_ball));
     }
     Ok(SinewPlayer {
         world,
@@ -215,10 +215,10 @@ impl Player for SinewPlayer {
         let step = (FRAME / f64::from(self.steps)) as f32;
         let before = self.passed;
         self.passed += 1;
-        for part in 1..=self.steps {
+        for index in 1..=self.steps {
             if let Some((tool, ball)) = &self.ball {
-                let ends = [before, self.passed].map(|passed| place(ball.center_after(passed, self.frames)));
-                let center = ends[0].lerp(ends[1], part as f32 / self.steps as f32);
+                let ends = [before, self.passed].map(|passed| vector(ball.center_after(passed, self.frames)));
+                let center = ends[0].lerp(ends[1], index as f32 / self.steps as f32);
                 let moved = self.world.set_pose(*tool, center, None);
                 moved.map_err(|error| error.to_string())?;
             }

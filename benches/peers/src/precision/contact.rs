@@ -1,11 +1,11 @@
-//! What contact does to a motion that should have neither overlaps nor more energy than at the start.
+//! Contact errors of a motion: penetration, and energy above that at the start.
 
 use glam::{DMat3, DVec3};
 
 use super::model::{FRAME, Model};
 use super::motion::Motion;
 
-/// How deep any node is in the ball, below the ground or in another body at the end of any frame, m.
+/// The largest depth of a node in the ball, in the ground or in another body at the end of any frame [m].
 pub fn deepest(model: &Model, motion: &Motion) -> f64 {
     let mut deepest = 0.0_f64;
     for (passed, frame) in (1..).zip(&motion.frames) {
@@ -35,10 +35,10 @@ fn deepest_in_another(model: &Model, nodes: &[DVec3]) -> f64 {
         };
         let low = own.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = own.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-        for (place, &node) in nodes.iter().enumerate() {
+        for (index, &node) in nodes.iter().enumerate() {
             let is_near = node.cmpge(low).all() && node.cmple(high).all();
             if is_near
-                && place / size != body
+                && index / size != body
                 && tetrahedra
                     .iter()
                     .any(|corners| is_within(corners.map(|c| nodes[c]), node))
@@ -58,7 +58,7 @@ fn is_within([a, b, c, d]: [DVec3; 4], point: DVec3) -> bool {
     weights.min_element() >= 0.0 && weights.element_sum() <= 1.0
 }
 
-/// From a point to a triangle.
+/// The distance of a point from a triangle.
 fn distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
     let normal = (b - a).cross(c - a).normalize_or_zero();
     let sides = [(a, b), (b, c), (c, a)];
@@ -69,28 +69,28 @@ fn distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
         return normal.dot(point - a).abs();
     }
     let from_side = |&(from, to): &(DVec3, DVec3)| {
-        let way = to - from;
-        let along = ((point - from).dot(way) / way.length_squared()).clamp(0.0, 1.0);
-        point.distance(from + way * along)
+        let edge = to - from;
+        let along = ((point - from).dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+        point.distance(from + edge * along)
     };
     sides.iter().map(from_side).fold(f64::INFINITY, f64::min)
 }
 
-/// By how much kinetic and gravitational energy exceed what there was at the start, at most, as a part of what all nodes lose on their way to
-/// the last frame: at least so much came from nowhere. Elastic energy is left out, and a mean velocity over a frame has less energy than the node.
-/// 0 where a ball does work.
+/// A lower bound of the energy gain: the largest kinetic plus gravitational energy above that at the start. It is
+/// relative to the potential energy that all nodes lose until the last frame. Elastic energy is omitted, and the mean
+/// velocity of a frame has less energy than the node. The result is 0 if a ball does work.
 pub fn energy_gain(model: &Model, motion: &Motion) -> f64 {
     if model.ball.is_some_and(|ball| ball.speed != 0.0) {
         return 0.0;
     }
     let before = std::iter::once(&model.positions).chain(&motion.frames);
     let energy = |(from, to): (&Vec<[f64; 3]>, &Vec<[f64; 3]>)| -> f64 {
-        let ways = from.iter().zip(to).zip(&model.masses);
-        let of_node = |((from, to), mass): ((&[f64; 3], &[f64; 3]), &f64)| {
+        let motions = from.iter().zip(to).zip(&model.masses);
+        let node_energy = |((from, to), mass): ((&[f64; 3], &[f64; 3]), &f64)| {
             let (from, to) = (DVec3::from(*from), DVec3::from(*to));
             mass * (0.5 * (to - from).length_squared() / FRAME.powi(2) + 0.5 * model.gravity * (from.y + to.y))
         };
-        ways.map(of_node).sum()
+        motions.map(node_energy).sum()
     };
     let most = before.zip(&motion.frames).map(energy).fold(f64::NEG_INFINITY, f64::max);
     let potential = |nodes: &[[f64; 3]]| -> f64 {

@@ -1,22 +1,22 @@
-//! How a line of points is played: from coarse to fine, until it need not or may not go on.
+//! Plays a line of points from coarse to fine, until a stop criterion is met.
 
 use std::path::PathBuf;
 
 use super::motion::Motion;
 use super::{DIVERGES, End, LineOutcome, Point, contact, model};
-use crate::players::{self, Line, Played, Said};
+use crate::players::{self, Line, Messages, Played};
 use crate::scenes::Scene;
 
-/// A line ends once a point is as near to the reference as this: well below the finest target.
+/// A line ends at this error, well below the finest target.
 const FINE_ENOUGH: f64 = 3e-4;
 
-/// A line is flat where two halvings of the step leave more than this of its error.
+/// A line is flat if two halvings of the step leave more than this fraction of its error.
 const FLAT: f64 = 0.8;
 
-/// How many times the limit the first point of a line may take that is any good.
+/// The time limit of a line's first useful point, as a multiple of the limit.
 const PATIENCE: f64 = 4.0;
 
-/// Plays a line's points from coarse to fine, until it need not or may not go on.
+/// Plays a line's points from coarse to fine, until a stop criterion is met.
 pub fn follow(
     scene: &Scene,
     engine: &str,
@@ -24,23 +24,23 @@ pub fn follow(
     line: &Line,
     error: &dyn Fn(&Motion) -> f64,
     limit: f64,
-) -> (LineOutcome, Said) {
+) -> (LineOutcome, Messages) {
     let mut outcome = LineOutcome {
         name: line.name.clone(),
         law: line.law,
         points: Vec::new(),
         end: End::Tried,
     };
-    let mut said = Said::default();
+    let mut messages = Messages::default();
     let simulated = scene.model.frames as f64 * model::FRAME;
     let mut failure = None;
     for settings in &line.points {
-        // A line that needs fine steps from the start has its chance.
+        // A line that needs fine steps from the start has a larger limit.
         let is_begun = outcome.points.iter().any(|point| point.error < 1.0);
         let limit = if is_begun { limit } else { PATIENCE * limit };
         let (played, words) = players::play(program, &scene.model, settings, limit * simulated);
-        said.version = words.version.or(said.version);
-        said.notes.extend(words.notes);
+        messages.version = words.version.or(messages.version);
+        messages.notes.extend(words.notes);
         let label = settings.join(" ");
         match played {
             Played::Whole { motion, seconds } => {
@@ -62,14 +62,14 @@ pub fn follow(
             Played::Cut { expected } => {
                 eprintln!("{}: {engine}, {}, {label}: over the limit", scene.name, line.name);
                 outcome.end = End::Limit(expected / simulated);
-                return (outcome, said);
+                return (outcome, messages);
             }
             Played::Refused(reason) => {
                 eprintln!("{}: {engine}, {}, {label}: {reason}", scene.name, line.name);
                 if reason != DIVERGES {
-                    said.notes.push(format!("{}, {label}: {reason}", line.name));
+                    messages.notes.push(format!("{}, {label}: {reason}", line.name));
                 }
-                // An engine that cannot do it says the same again; one that is unstable may not be with finer steps.
+                // An unsupported scene fails again in the same way; an unstable step may succeed when finer.
                 if failure.as_ref() == Some(&reason) && reason != DIVERGES {
                     break;
                 }
@@ -78,20 +78,21 @@ pub fn follow(
         }
         if outcome.points.last().is_some_and(|point| point.error < FINE_ENOUGH) {
             outcome.end = End::Reached;
-            return (outcome, said);
+            return (outcome, messages);
         }
         if is_flat(&outcome.points) {
             outcome.end = End::Flat;
-            return (outcome, said);
+            return (outcome, messages);
         }
     }
     if let (true, Some(reason)) = (outcome.points.is_empty(), failure) {
         outcome.end = End::Failed(reason);
     }
-    (outcome, said)
+    (outcome, messages)
 }
 
-/// Whether two halvings of the step have changed little. The first points of a line may be flat because they are coarse.
+/// True if two halvings of the step changed the error little. The first points of a line may be flat because they are
+/// coarse.
 fn is_flat(points: &[Point]) -> bool {
     match points {
         [_, .., a, _, c] => c.error > FLAT * a.error && a.error < 0.3,

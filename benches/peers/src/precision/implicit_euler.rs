@@ -1,4 +1,5 @@
-//! Converged steps of implicit Euler in double precision: the reference of those whose time is known for that method alone.
+//! Converged implicit Euler steps in double precision: the reference for engines whose time is only known for that
+//! method.
 
 use glam::DVec3;
 
@@ -7,10 +8,10 @@ use crate::precision::model::Model;
 use crate::precision::motion::Motion;
 use crate::precision::reference::System;
 
-/// A step's equation is solved until the forces that are left are this part of what there were.
+/// Newton's method ends at this ratio of the residual to the initial forces.
 const RESIDUAL: f64 = 1e-6;
 
-/// So many steps of `step` seconds from rest.
+/// Takes `count` steps of `step` seconds from rest.
 pub fn steps(model: &Model, law: Law, step: f64, count: usize) -> Motion {
     let system = System::new(model, law);
     let start: Vec<DVec3> = model.positions.iter().copied().map(DVec3::from).collect();
@@ -28,8 +29,8 @@ pub fn steps(model: &Model, law: Law, step: f64, count: usize) -> Motion {
     Motion::new(model.positions.clone(), frames)
 }
 
-/// The positions x that fulfil `M (x - y) / t² = f(x)` with y = positions + t velocities, by Newton's method with conjugate
-/// gradients; products with the matrix are differences of forces.
+/// Solves `M (x - y) / t² = f(x)` with y = positions + t velocities for the positions x. Uses Newton's method with
+/// conjugate gradients; products with the matrix are finite differences of forces.
 fn solved(system: &System, before: &[DVec3], velocities: &[DVec3], step: f64) -> Vec<DVec3> {
     let count = before.len();
     let inertia: Vec<f64> = system.masses().iter().map(|mass| mass / (step * step)).collect();
@@ -63,26 +64,30 @@ fn solved(system: &System, before: &[DVec3], velocities: &[DVec3], step: f64) ->
 fn corrected(system: &System, positions: &[DVec3], residual: &[DVec3], inertia: &[f64]) -> Vec<DVec3> {
     let count = positions.len();
     let mut solution = vec![DVec3::ZERO; count];
-    let mut left = residual.to_vec();
-    let scaled = |left: &[DVec3]| {
-        left.iter()
+    let mut remaining = residual.to_vec();
+    let scaled = |remaining: &[DVec3]| {
+        remaining
+            .iter()
             .zip(inertia)
             .map(|(force, inertia)| *force / *inertia)
             .collect::<Vec<_>>()
     };
-    let mut preconditioned = scaled(&left);
-    let mut way = preconditioned.clone();
-    let mut size = dot(&left, &preconditioned);
+    let mut preconditioned = scaled(&remaining);
+    let mut direction = preconditioned.clone();
+    let mut size = dot(&remaining, &preconditioned);
     let first = size;
     let (mut ahead, mut behind) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
     for _ in 0..3000 {
-        // A difference small beside the elements, large beside rounding.
-        let reach = way.iter().map(|part| part.abs().max_element()).fold(0.0, f64::max);
+        // A difference that is small compared with the elements and large compared with rounding.
+        let reach = direction
+            .iter()
+            .map(|component| component.abs().max_element())
+            .fold(0.0, f64::max);
         let small = 1e-6 / reach;
         let moved = |sign: f64| {
             positions
                 .iter()
-                .zip(&way)
+                .zip(&direction)
                 .map(|(x, d)| *x + *d * (sign * small))
                 .collect::<Vec<_>>()
         };
@@ -90,29 +95,29 @@ fn corrected(system: &System, positions: &[DVec3], residual: &[DVec3], inertia: 
         system.forces(&moved(-1.0), &mut behind);
         let mut product = ahead.clone();
         for node in 0..count {
-            product[node] = (behind[node] - ahead[node]) / (2.0 * small) + way[node] * inertia[node];
+            product[node] = (behind[node] - ahead[node]) / (2.0 * small) + direction[node] * inertia[node];
             if !system.is_free(node) {
                 product[node] = DVec3::ZERO;
             }
         }
-        let curvature = dot(&way, &product);
+        let curvature = dot(&direction, &product);
         if curvature <= 0.0 {
             break;
         }
         let along = size / curvature;
         for node in 0..count {
-            solution[node] += way[node] * along;
-            left[node] -= product[node] * along;
+            solution[node] += direction[node] * along;
+            remaining[node] -= product[node] * along;
         }
-        preconditioned = scaled(&left);
-        let next = dot(&left, &preconditioned);
+        preconditioned = scaled(&remaining);
+        let next = dot(&remaining, &preconditioned);
         if next < 1e-8 * first {
             break;
         }
-        let turn = next / size;
+        let beta = next / size;
         size = next;
         for node in 0..count {
-            way[node] = preconditioned[node] + way[node] * turn;
+            direction[node] = preconditioned[node] + direction[node] * beta;
         }
     }
     solution

@@ -1,25 +1,26 @@
-//! The laws of tetrahedra that engines use, in double precision. Each has the same Young's modulus and Poisson's ratio at
-//! small strains; they differ at large ones, so every law has a reference of its own.
+//! The elastic laws of the engines, in double precision. All have the same Young's modulus and Poisson's ratio at small
+//! strains. They differ at large strains, so every law has its own reference.
 
 use glam::DMat3;
 
-/// How the tetrahedra of a model resist deformation.
+/// The elastic law of a model's tetrahedra.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Law {
-    /// No tetrahedra: springs alone.
+    /// No tetrahedra, only springs.
     Springs,
-    /// `mu tr E² + lambda/2 (J - 1)²`, E being Green's strain: the default of sinew where Poisson's ratio is from 1/4 to 0.4.
+    /// `mu tr E² + lambda/2 (J - 1)²`, where E is Green's strain: the default of sinew for Poisson's ratios from 1/4 to
+    /// 0.4.
     SignedVolume,
     /// The stable neo-Hookean law with a logarithm (Smith, de Goes, Kim 2018, equation 14).
     NeoHookean,
-    /// The same without the logarithm: `mu/2 (I1 - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)²`.
+    /// The same law without the logarithm: `mu/2 (I1 - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)²`.
     PlainNeoHookean,
-    /// St Venant and Kirchhoff's: `mu tr E² + lambda/2 (tr E)²`.
+    /// The law of St Venant and Kirchhoff: `mu tr E² + lambda/2 (tr E)²`.
     StVenantKirchhoff,
 }
 
 impl Law {
-    /// Its name in files and reports.
+    /// The name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Springs => "springs",
@@ -64,7 +65,7 @@ fn trace(matrix: DMat3) -> f64 {
 mod tests {
     use super::*;
 
-    /// At rest there is no stress, and small strains follow Hooke's law.
+    /// There is no stress at rest, and small strains follow Hooke's law.
     #[test]
     fn laws_agree_at_small_strains() {
         let (mu, lambda) = (3.0, 5.0);

@@ -1,4 +1,4 @@
-//! Error against time of every engine in every scene, at 60 frames a second.
+//! Error against time of every engine in every scene, at 60 frames per second.
 
 mod contact;
 mod follow;
@@ -16,26 +16,26 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 
 use crate::contender::target;
-use crate::players::{self, Engine, Line, Said};
+use crate::players::{self, Engine, Line, Messages};
 use crate::scenes::{self, Measure, Scene, tip_ratio};
 use follow::follow;
 use law::Law;
 use motion::{Motion, relative_difference};
 use reference::Reference;
 
-/// What a player is said to do whose step is too long.
+/// The failure message of a player whose step is too long.
 pub const DIVERGES: &str = "it diverges";
 
-/// What a command asks for.
+/// The options of the command.
 pub struct Request {
-    /// The processor's seconds that a point may take for a simulated second.
+    /// Processor time that a point may take per simulated second [s].
     pub limit: f64,
-    /// Only scenes and engines whose name has this; empty: all.
+    /// Only scenes and engines whose names contain these; empty selects all.
     pub scene: String,
     pub engine: String,
 }
 
-/// A scene with what everyone did.
+/// A scene with the results of all engines.
 pub struct Outcome {
     pub scene: Scene,
     pub references: Vec<(Law, f64, usize)>,
@@ -43,17 +43,17 @@ pub struct Outcome {
     pub engines: Vec<EngineOutcome>,
 }
 
-/// An engine in a scene.
+/// The results of an engine in a scene.
 pub struct EngineOutcome {
     pub name: &'static str,
     pub color: &'static str,
     pub version: Option<String>,
     pub notes: Vec<String>,
-    /// Or why there are none.
+    /// The results of its lines, or the reason that there are none.
     pub lines: Result<Vec<LineOutcome>, String>,
 }
 
-/// A line of points, and how it ended.
+/// A line of points, and the reason of its end.
 pub struct LineOutcome {
     pub name: String,
     pub law: Law,
@@ -75,34 +75,34 @@ impl LineOutcome {
 /// A point of a diagram.
 pub struct Point {
     pub settings: String,
-    /// Of one thread, for a simulated second.
+    /// Time of one thread per simulated second [s].
     pub seconds: f64,
-    /// A part of the motion.
+    /// Error relative to the motion.
     pub error: f64,
-    /// Of the nodes at the last frame, on the mean, m.
+    /// Mean height of the nodes at the last frame [m].
     pub height: f64,
-    /// See [`Motion::speed_at_end`], m/s.
+    /// See [`Motion::speed_at_end`] [m/s].
     pub speed: f64,
     /// See [`contact::energy_gain`].
     pub gain: f64,
 }
 
-/// Why a line has no further points.
+/// The reason that a line has no further points.
 #[derive(Clone, Debug, PartialEq)]
 pub enum End {
-    /// Its last point is near enough.
+    /// The error of its last point is small enough.
     Reached,
-    /// Its last points are no nearer than those before.
+    /// The errors of its last points no longer decrease.
     Flat,
-    /// The next point would have taken so many seconds for a simulated second, above the limit.
+    /// The next point would exceed the limit; its time per simulated second [s].
     Limit(f64),
-    /// All of its settings were tried.
+    /// All of its settings were measured.
     Tried,
-    /// Every point failed, and why.
+    /// Every point failed, with the reason.
     Failed(String),
 }
 
-/// Runs everything and leaves tables and pictures in `target/report`.
+/// Runs all scenes and engines, and writes tables and diagrams to `target/report`.
 pub fn compare(request: &Request) {
     let programs: Vec<(Engine, Result<Vec<PathBuf>, String>)> = players::all()
         .into_iter()
@@ -117,11 +117,11 @@ pub fn compare(request: &Request) {
         if !scene.name.contains(&request.scene) {
             continue;
         }
-        // Checks are not timed: a short look is enough.
-        let part = if scene.measure == Measure::Check { 0.1 } else { 1.0 };
-        let limit = part * request.limit;
+        // Checks are not timed, so a short limit is enough.
+        let factor = if scene.measure == Measure::Check { 0.1 } else { 1.0 };
+        let limit = factor * request.limit;
         outcomes.push(simulate(scene, &programs, limit));
-        // After each scene: a run that is cut short has measured something.
+        // Written after each scene, so that an interrupted run has results.
         report(&outcomes, &programs, &[]);
     }
     let beams = if "sofa".contains(&request.scene) {
@@ -179,7 +179,7 @@ fn simulate(scene: Scene, programs: &[(Engine, Result<Vec<PathBuf>, String>)], l
                 let Some(reference) = reference else {
                     return (
                         LineOutcome::failed(line, "its law has no converged reference here"),
-                        Said::default(),
+                        Messages::default(),
                     );
                 };
                 let reference = measured(&scene, &reference.motion);
@@ -187,9 +187,9 @@ fn simulate(scene: Scene, programs: &[(Engine, Result<Vec<PathBuf>, String>)], l
                 follow(&scene, engine.name, &program, line, &error, limit)
             };
             let mut outcomes = Vec::new();
-            for (line, said) in lines.iter().map(play) {
-                outcome.version = said.version.or(outcome.version.take());
-                for note in said.notes {
+            for (line, messages) in lines.iter().map(play) {
+                outcome.version = messages.version.or(outcome.version.take());
+                for note in messages.notes {
                     if !outcome.notes.contains(&note) {
                         outcome.notes.push(note);
                     }
@@ -222,7 +222,7 @@ fn simulate(scene: Scene, programs: &[(Engine, Result<Vec<PathBuf>, String>)], l
     }
 }
 
-/// The part of a motion that a scene asks for.
+/// The part of a motion that the scene measures.
 fn measured(scene: &Scene, motion: &Motion) -> Motion {
     match scene.measure {
         Measure::Rest => motion.end(),

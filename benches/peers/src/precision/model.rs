@@ -1,66 +1,66 @@
-//! What every engine simulates: nodes, tetrahedra or springs, and their material, as a file that players in any language
-//! read.
+//! The model that every engine simulates: nodes, tetrahedra or springs, and material. It is written to a file that
+//! players in any language read.
 
 use std::fmt::Write;
 
 use crate::precision::law::Law;
 use crate::scenes::Block;
 
-/// Frames are of this length, s.
+/// Duration of a frame [s].
 pub const FRAME: f64 = 1.0 / 60.0;
 
-/// The skin of bodies that meet others, m.
+/// The collision margin of bodies [m].
 pub const SKIN: f64 = 1e-3;
 
-/// A rigid ball without friction that goes down and then stays where it is.
+/// A rigid frictionless ball that moves down and then stops.
 #[derive(Clone, Copy, Debug)]
 pub struct Ball {
-    /// As it begins.
+    /// Initial center [m].
     pub center: [f64; 3],
     pub radius: f64,
-    /// m/s along -y, over the first two thirds of the frames.
+    /// Speed along -y over the first two thirds of the frames [m/s].
     pub speed: f64,
 }
 
 impl Ball {
-    /// Its centre once so many of `frames` frames have passed.
+    /// Its center after `passed` of `frames` frames.
     pub fn center_after(&self, passed: usize, frames: usize) -> [f64; 3] {
         let [x, y, z] = self.center;
         [x, y - self.speed * FRAME * passed.min(2 * frames / 3) as f64, z]
     }
 }
 
-/// A scene's bodies and what acts on them. Numbers are `f64`; engines round them as they must.
+/// The bodies of a scene, and their loads. Numbers are `f64`; engines round them as necessary.
 #[derive(Clone, Debug, Default)]
 pub struct Model {
-    /// Metres.
+    /// Initial positions [m].
     pub positions: Vec<[f64; 3]>,
-    /// Kilograms.
+    /// Masses [kg].
     pub masses: Vec<f64>,
-    /// Nodes that stay where they are, in order.
+    /// Pinned nodes, in ascending order.
     pub pinned: Vec<usize>,
     pub tetrahedra: Vec<[usize; 4]>,
     pub springs: Vec<[usize; 2]>,
-    /// The surface of what meets something.
+    /// The surface of bodies with contact.
     pub triangles: Vec<[usize; 3]>,
-    /// All of the above is of so many equal bodies, one after the other; 0 is 1. They meet each other.
+    /// Number of equal bodies, stored one after the other; 0 means 1. They collide with each other.
     pub bodies: usize,
-    /// What stands in the way.
+    /// A ball that is an obstacle.
     pub ball: Option<Ball>,
-    /// Whether the ground y = 0 does too.
+    /// True if the ground y = 0 is an obstacle.
     pub has_floor: bool,
-    /// Of bodies with each other and with the ground.
+    /// Friction of bodies with each other and with the ground.
     pub friction: f64,
-    /// N/m, of every spring. Springs are at rest where they begin.
+    /// Stiffness of every spring [N/m]. Springs are at rest at the start.
     pub stiffness: f64,
-    /// Pa.
+    /// Young's modulus [Pa].
     pub young: f64,
     pub poisson: f64,
-    /// m/s² along -y.
+    /// Gravity along -y [m/s²].
     pub gravity: f64,
-    /// A node's damping for each kilogram of its mass, 1/s.
+    /// Damping of a node over its mass [1/s].
     pub damping: f64,
-    /// How many frames are simulated.
+    /// Number of simulated frames.
     pub frames: usize,
 }
 
@@ -72,7 +72,8 @@ impl Model {
         (mu, young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)))
     }
 
-    /// Tetrahedra of a soft solid under its own weight for a second, with these nodes held: Pa, kg/m³.
+    /// A soft solid under its own weight for a second, with these pinned nodes, Young's modulus [Pa] and density
+    /// [kg/m³].
     pub fn solid(block: Block, pinned: Vec<usize>, young: f64, density: f64) -> Self {
         let mut model = Self {
             positions: block.positions,
@@ -88,62 +89,62 @@ impl Model {
         model
     }
 
-    /// Gives each node its share of the mass of tetrahedra of so many kg/m³.
+    /// Distributes the mass of tetrahedra of this density [kg/m³] to the nodes.
     fn fill(&mut self, density: f64) {
         self.masses = vec![0.0; self.positions.len()];
         for corners in &self.tetrahedra {
             let [a, b, c, d] = corners.map(|node| glam::DVec3::from(self.positions[node]));
             let volume = (b - a).cross(c - a).dot(d - a) / 6.0;
-            assert!(volume > 0.0, "tetrahedra are the right way out");
+            assert!(volume > 0.0, "tetrahedra are positively oriented");
             for &node in corners {
                 self.masses[node] += 0.25 * density * volume;
             }
         }
     }
 
-    /// The same body once for each of these places.
-    pub fn copied(self, places: &[[f64; 3]]) -> Self {
+    /// Copies the body to each of these offsets.
+    pub fn copied(self, offsets: &[[f64; 3]]) -> Self {
         let count = self.positions.len();
-        let moved = |place: &[f64; 3]| {
-            let place = *place;
+        let moved = |offset: &[f64; 3]| {
+            let offset = *offset;
             let positions = self.positions.iter();
-            positions.map(move |start| std::array::from_fn(|axis| start[axis] + place[axis]))
+            positions.map(move |start| std::array::from_fn(|axis| start[axis] + offset[axis]))
         };
         fn shifted<const N: usize>(elements: &[[usize; N]], count: usize, bodies: usize) -> Vec<[usize; N]> {
             let of_body = |body| elements.iter().map(move |nodes| nodes.map(|node| node + body * count));
             (0..bodies).flat_map(of_body).collect()
         }
         Self {
-            positions: places.iter().flat_map(moved).collect(),
-            masses: self.masses.repeat(places.len()),
-            tetrahedra: shifted(&self.tetrahedra, count, places.len()),
-            triangles: shifted(&self.triangles, count, places.len()),
-            bodies: places.len(),
+            positions: offsets.iter().flat_map(moved).collect(),
+            masses: self.masses.repeat(offsets.len()),
+            tetrahedra: shifted(&self.tetrahedra, count, offsets.len()),
+            triangles: shifted(&self.triangles, count, offsets.len()),
+            bodies: offsets.len(),
             ..self
         }
     }
 
-    /// How many bodies there are.
+    /// Number of bodies.
     pub fn body_count(&self) -> usize {
         self.bodies.max(1)
     }
 
-    /// One of its bodies alone.
+    /// One of the bodies.
     pub fn body(&self, index: usize) -> Self {
-        fn part<T>(all: &[T], index: usize, count: usize) -> &[T] {
+        fn slice<T>(all: &[T], index: usize, count: usize) -> &[T] {
             let size = all.len() / count;
             &all[index * size..(index + 1) * size]
         }
         let count = self.body_count();
         let first = index * self.positions.len() / count;
         Self {
-            positions: part(&self.positions, index, count).to_vec(),
-            masses: part(&self.masses, index, count).to_vec(),
-            tetrahedra: part(&self.tetrahedra, index, count)
+            positions: slice(&self.positions, index, count).to_vec(),
+            masses: slice(&self.masses, index, count).to_vec(),
+            tetrahedra: slice(&self.tetrahedra, index, count)
                 .iter()
                 .map(|nodes| nodes.map(|node| node - first))
                 .collect(),
-            triangles: part(&self.triangles, index, count)
+            triangles: slice(&self.triangles, index, count)
                 .iter()
                 .map(|nodes| nodes.map(|node| node - first))
                 .collect(),
@@ -152,7 +153,7 @@ impl Model {
         }
     }
 
-    /// The file: words and numbers, each section with its name and count first.
+    /// The text of the file: words and numbers, each section preceded by its name and count.
     pub fn text(&self) -> String {
         let mut text = String::new();
         let _ = writeln!(
@@ -197,7 +198,7 @@ impl Model {
         text
     }
 
-    /// What [`Model::text`] wrote.
+    /// Parses the text of [`Model::text`].
     pub fn from_text(text: &str) -> Self {
         let mut words = text.split_ascii_whitespace();
         let mut model = Self::default();
@@ -259,12 +260,12 @@ impl Model {
         model
     }
 
-    /// Whether there is anything to meet.
+    /// True if there is any contact.
     pub fn has_contact(&self) -> bool {
         self.ball.is_some() || self.has_floor || self.body_count() > 1
     }
 
-    /// Whether a law is one that this model can have.
+    /// True if this model supports the law.
     pub fn has(&self, law: Law) -> bool {
         self.tetrahedra.is_empty() == (law == Law::Springs)
     }

@@ -1,8 +1,8 @@
-//! Where nodes are at the end of each frame, and how far two motions are apart.
+//! Positions of nodes at the end of each frame, and differences of two motions.
 
 use crate::precision::model::{FRAME, Model};
 
-/// The nodes' positions at the start and at the end of each frame.
+/// Positions of the nodes at the start and at the end of each frame.
 #[derive(Clone)]
 pub struct Motion {
     start: Vec<[f64; 3]>,
@@ -14,32 +14,32 @@ impl Motion {
         Self { start, frames }
     }
 
-    /// From the coordinates of all frames in order; what is left of the last frame is dropped.
+    /// Builds a motion from the coordinates of all frames in order; an incomplete last frame is dropped.
     pub fn from_numbers(numbers: &[f64], model: &Model) -> Self {
         let (nodes, _) = numbers.as_chunks::<3>();
         let frames = nodes.chunks_exact(model.positions.len()).map(<[_]>::to_vec);
         Self::new(model.positions.clone(), frames.collect())
     }
 
-    /// Its last frame alone.
+    /// The last frame only.
     pub fn end(&self) -> Self {
         let last = self.frames.last().cloned();
         Self::new(self.start.clone(), last.into_iter().collect())
     }
 
-    /// How fast nodes go over the last ten frames, m/s, RMS.
+    /// RMS speed of nodes over the last ten frames [m/s].
     pub fn speed_at_end(&self) -> f64 {
         let last = &self.frames[self.frames.len().saturating_sub(11)..];
         rms(last.iter().skip(1).zip(last)) / FRAME
     }
 
-    /// The mean height of the nodes at the last frame, m.
+    /// The mean height of the nodes at the last frame [m].
     pub fn height(&self) -> f64 {
         let last = self.frames.last().map_or(&self.start, |frame| frame);
-        last.iter().map(|place| place[1]).sum::<f64>() / last.len() as f64
+        last.iter().map(|position| position[1]).sum::<f64>() / last.len() as f64
     }
 
-    /// Whether every coordinate is a number.
+    /// True if every coordinate is finite.
     pub fn is_finite(&self) -> bool {
         self.frames.iter().flatten().flatten().all(|number| number.is_finite())
     }
@@ -51,7 +51,7 @@ impl Motion {
     }
 }
 
-/// RMS distance of nodes over all frames, as a part of the RMS displacement of `reference`.
+/// RMS distance of nodes over all frames, relative to the RMS displacement of `reference`.
 pub fn relative_difference(motion: &Motion, reference: &Motion) -> f64 {
     rms(motion.frames.iter().zip(&reference.frames)) / reference.displacement()
 }

@@ -5,11 +5,11 @@ use std::fmt::Write;
 use crate::precision::tables::is_timed;
 use crate::precision::{EngineOutcome, Outcome, Point};
 
-/// Powers of ten that both axes have.
+/// Ranges of both axes, as powers of ten.
 const SECONDS: [i32; 2] = [-3, 2];
 const ERRORS: [i32; 2] = [-5, 0];
 
-/// A diagram's place in a picture.
+/// The position of a diagram in an image.
 struct Panel {
     left: f64,
     top: f64,
@@ -97,12 +97,12 @@ fn picture(width: f64, height: f64, body: &str) -> String {
     )
 }
 
-/// Whether a point is in the picture: others are further off than the body moves.
+/// True if a point is in the image; the error of others exceeds the motion of the body.
 fn is_shown(point: &Point) -> bool {
     point.error <= 10f64.powi(ERRORS[1])
 }
 
-/// The points of an engine that no other point of it beats in both time and error, by time.
+/// The points of an engine that are Pareto-optimal in time and error, by time.
 fn best(engine: &EngineOutcome) -> Vec<&Point> {
     let points = engine.lines.iter().flatten().flat_map(|line| &line.points);
     let mut points: Vec<&Point> = points.filter(|point| is_shown(point)).collect();
@@ -116,20 +116,20 @@ fn best(engine: &EngineOutcome) -> Vec<&Point> {
     points
 }
 
-/// The best of every engine in every scene.
+/// The best points of every engine in every scene.
 pub fn overview(outcomes: &[Outcome]) -> String {
     let timed: Vec<&Outcome> = outcomes.iter().filter(|outcome| is_timed(outcome)).collect();
     let rows = timed.len().div_ceil(3).max(1) as f64;
     let mut body = String::new();
-    for (place, outcome) in timed.iter().enumerate() {
+    for (index, outcome) in timed.iter().enumerate() {
         let panel = Panel {
-            left: 58.0 + 300.0 * (place % 3) as f64,
-            top: 30.0 + 240.0 * (place / 3) as f64,
+            left: 58.0 + 300.0 * (index % 3) as f64,
+            top: 30.0 + 240.0 * (index / 3) as f64,
             width: 230.0,
             height: 180.0,
         };
         body += &panel.frame(outcome.scene.name);
-        // sinew last, on top.
+        // sinew is drawn last, on top.
         for engine in outcome.engines.iter().rev() {
             body += &panel.line(best(engine).into_iter(), engine.color, "");
         }

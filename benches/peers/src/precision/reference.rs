@@ -1,4 +1,4 @@
-//! The reference that belongs to no engine: leapfrog in double precision, its step halved until the motion stays.
+//! The engine-independent reference: leapfrog in double precision, with its step halved until the motion converges.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
@@ -9,28 +9,28 @@ use crate::precision::law::Law;
 use crate::precision::model::{FRAME, Model};
 use crate::precision::motion::{Motion, relative_difference};
 
-/// A reference may differ by this part of the motion from the one of twice its step.
+/// The largest relative difference of a reference from the motion with twice the step.
 const SURE: f64 = 3e-5;
 
-/// No more substeps per frame are tried.
+/// The maximum number of substeps per frame.
 const MOST_SUBSTEPS: usize = 2048;
 
 /// A converged motion.
 pub struct Reference {
     pub motion: Motion,
-    /// Its difference from the motion with twice the step, as a part of the motion. Its own error is some third of that, as
-    /// the method is of second order.
+    /// Its relative difference from the motion with twice the step. Its own error is about a third of that, as the
+    /// method is second-order accurate.
     pub doubt: f64,
     pub substeps: usize,
 }
 
-/// The motion of a model under a law; `None` where no step is short enough. It is kept in `folder` for the next run.
+/// The converged motion of a model under a law; `None` if no step is short enough. It is cached in `folder`.
 pub fn converged(model: &Model, law: Law, folder: &Path) -> Option<Reference> {
     let mut hasher = DefaultHasher::new();
     (model.text(), law, SURE.to_bits()).hash(&mut hasher);
     let file = folder.join(format!("{:016x}.reference", hasher.finish()));
-    if let Some(kept) = read(&file, model) {
-        return Some(kept);
+    if let Some(cached) = read(&file, model) {
+        return Some(cached);
     }
     let mut coarse: Option<Motion> = None;
     let mut substeps = 16;
@@ -82,7 +82,7 @@ fn write(file: &Path, reference: &Reference) {
     }
 }
 
-/// A model as its forces need it.
+/// A model in the form that its forces need.
 pub struct System {
     law: Law,
     mu: f64,
@@ -100,7 +100,7 @@ pub struct System {
 
 struct Tetrahedron {
     corners: [usize; 4],
-    /// The inverse of the matrix of its edges at rest.
+    /// The inverse of the edge matrix at rest.
     inverse: DMat3,
     volume: f64,
 }
@@ -138,29 +138,29 @@ impl System {
         }
     }
 
-    /// Of each node.
+    /// The mass of each node.
     pub fn masses(&self) -> &[f64] {
         &self.masses
     }
 
-    /// Whether nothing holds a node.
+    /// True if a node is not pinned.
     pub fn is_free(&self, node: usize) -> bool {
         self.is_free[node]
     }
 
-    /// Of all nodes, N.
+    /// The weight of all nodes [N].
     pub fn weight(&self) -> f64 {
         self.masses.iter().sum::<f64>() * self.gravity.length()
     }
 
-    /// Elastic forces and weight.
+    /// Computes elastic forces and weight.
     pub fn forces(&self, positions: &[DVec3], forces: &mut [DVec3]) {
         for (force, mass) in forces.iter_mut().zip(&self.masses) {
             *force = self.gravity * *mass;
         }
         for &([a, b], rest) in &self.springs {
-            let way = positions[b] - positions[a];
-            let pull = way * (self.stiffness * (1.0 - rest / way.length()));
+            let offset = positions[b] - positions[a];
+            let pull = offset * (self.stiffness * (1.0 - rest / offset.length()));
             forces[a] += pull;
             forces[b] -= pull;
         }
@@ -181,10 +181,10 @@ impl System {
         }
     }
 
-    /// All frames with so many substeps each: half a kick, damping, drift, half a kick. `None` where it leaves the numbers.
+    /// All frames with this many substeps each: half a kick, damping, drift, half a kick. `None` if it diverges.
     fn motion(&self, substeps: usize) -> Option<Motion> {
         let step = FRAME / substeps as f64;
-        let kept = (-0.5 * self.damping * step).exp();
+        let damping_factor = (-0.5 * self.damping * step).exp();
         let mut positions = self.start.clone();
         let mut velocities = vec![DVec3::ZERO; positions.len()];
         let mut forces = velocities.clone();
@@ -195,13 +195,13 @@ impl System {
                 for node in 0..positions.len() {
                     if self.is_free[node] {
                         velocities[node] += forces[node] * (0.5 * step / self.masses[node]);
-                        velocities[node] *= kept;
+                        velocities[node] *= damping_factor;
                         positions[node] += velocities[node] * step;
                     }
                 }
                 self.forces(&positions, &mut forces);
                 for node in 0..positions.len() {
-                    velocities[node] *= kept;
+                    velocities[node] *= damping_factor;
                     velocities[node] += forces[node] * (0.5 * step / self.masses[node]);
                 }
             }

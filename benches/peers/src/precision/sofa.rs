@@ -1,4 +1,4 @@
-//! sinew beside the times per step that SOFA's authors published.
+//! Compares sinew with times per step published by SOFA's authors.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ use crate::precision::motion::{Motion, relative_difference};
 use crate::precision::summary::number;
 use crate::scenes::{SofaBeam, sofa_beams};
 
-/// Seconds.
+/// Duration of a step [s].
 const STEP: f64 = 0.01;
 
 /// A beam with one setting of sinew.
@@ -18,13 +18,13 @@ pub struct Row {
     nodes: [usize; 3],
     published: f64,
     settings: &'static str,
-    /// Per step of 10 ms, of one thread.
+    /// Time of one thread per step of 10 ms [ms].
     milliseconds: f64,
-    /// Against converged implicit Euler steps, of the motion.
+    /// Error against converged implicit Euler steps, relative to the motion.
     error: f64,
 }
 
-/// Their names, and what they set.
+/// The name of a setting, and its values.
 type Setting = (&'static str, &'static [(&'static str, &'static str)]);
 
 const SETTINGS: [Setting; 7] = [
@@ -37,7 +37,7 @@ const SETTINGS: [Setting; 7] = [
     ("`accuracy` 1e-4", &[("accuracy", "1e-4")]),
 ];
 
-/// Both beams, each with every setting.
+/// Measures both beams with every setting.
 pub fn measure() -> Vec<Row> {
     let mut rows = Vec::new();
     for (beam, steps) in sofa_beams().iter().zip([20, 4]) {
@@ -60,7 +60,8 @@ fn row(beam: &SofaBeam, reference: &Motion, settings: &[(&str, &str)], name: &'s
     let fixed = [("solver", "implicit"), ("order", "1")];
     let settings = Settings::new(fixed.iter().chain(settings));
     let frames = reference.frames.len();
-    // The first run finds the error; steps far from rest cost what later ones do, so time is of a longer run.
+    // The first run measures the error. The time is that of a longer run, since steps far from rest cost as much as
+    // later ones.
     let (motion, _) = run(&beam.model, &settings, frames)?;
     let (_, mut times) = run(&beam.model, &settings, 40)?;
     times.sort_unstable_by(f64::total_cmp);
@@ -73,7 +74,7 @@ fn row(beam: &SofaBeam, reference: &Motion, settings: &[(&str, &str)], name: &'s
     })
 }
 
-/// The motion, and what each step took in ms.
+/// The motion, and the time of each step [ms].
 fn run(model: &Model, settings: &Settings, steps: usize) -> Result<(Motion, Vec<f64>), String> {
     let mut player = SinewPlayer::build(model, settings)?;
     let (mut frames, mut times) = (Vec::new(), Vec::new());
@@ -93,9 +94,9 @@ pub fn markdown(rows: &[Row]) -> String {
         return String::new();
     }
     let mut text = String::from(
-        "## Beside SOFA's published times\n\nBeams of tetrahedra, implicit Euler, steps of 10 ms. SOFA's times are its authors', on their \
-         machine; its error is not published. sinew: IMPLICIT, `order` 1, one thread, median of 40 steps; its error is against \
-         implicit Euler steps that are solved in double precision, so that it is the equation's alone.\n\n\
+        "## Comparison with SOFA's published times\n\nBeams of tetrahedra, implicit Euler, steps of 10 ms. SOFA's times are its authors' on their \
+         machine; its error is not published. sinew: IMPLICIT, `order` 1, one thread, median of 40 steps; its error is relative to \
+         implicit Euler steps that are solved in double precision, so that it excludes the time discretization.\n\n\
          | nodes | SOFA, ms | sinew | ms | times as fast | error |\n|---|---|---|---|---|---|\n",
     );
     for row in rows {

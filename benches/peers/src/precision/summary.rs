@@ -1,22 +1,22 @@
-//! What each engine needs for an error, over all of its lines.
+//! The time that each engine needs for an error, over all of its lines.
 
 use crate::precision::{End, EngineOutcome};
 
-/// Parts of the motion.
+/// Errors relative to the motion.
 pub const TARGETS: [f64; 3] = [0.1, 0.01, 0.001];
 
-/// What an engine needs for an error.
+/// The time that an engine needs for an error.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Need {
-    /// Seconds of one thread for a simulated second: its fastest point at most so far off.
+    /// Seconds of one thread per simulated second, of its fastest point within the error.
     Seconds(f64),
-    /// No line came near enough, and one was cut by the time limit.
+    /// No line reached the error, and one was stopped by the time limit.
     NotWithinTheLimit,
-    /// No line came near enough, and all are flat.
+    /// No line reached the error, and all are flat.
     Never,
-    /// No line came near enough with the settings that were tried.
+    /// No line reached the error with the measured settings.
     NotTried,
-    /// It cannot simulate the scene, or is not there.
+    /// The engine cannot simulate the scene, or is not available.
     Absent,
 }
 
@@ -32,7 +32,7 @@ impl Need {
     }
 }
 
-/// Three digits.
+/// Formats a number with three digits.
 pub fn number(value: f64) -> String {
     match value {
         _ if value >= 100.0 => format!("{value:.0}"),
@@ -43,7 +43,7 @@ pub fn number(value: f64) -> String {
     }
 }
 
-/// What an engine needs for an error of at most `target`.
+/// The time that an engine needs for an error of at most `target`.
 pub fn need(engine: &EngineOutcome, target: f64) -> Need {
     let Ok(lines) = &engine.lines else {
         return Need::Absent;

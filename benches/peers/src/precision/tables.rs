@@ -7,22 +7,22 @@ use crate::precision::{End, LineOutcome, Outcome, Point, sofa};
 use crate::report::machine;
 use crate::scenes::Measure;
 
-/// What is the same for all.
+/// Conditions that are the same for all engines.
 const METHOD: &str = "\
 Every engine gets the same nodes, masses, tetrahedra or springs, material and gravity, and simulates frames of 1/60 s. Each
-run is a process of its own on one thread. Time is the processor time of stepping alone. The reference belongs to no
-engine: leapfrog in double precision, its step halved until the motion stays. Each law of elasticity has its own, so an
-engine is compared with the law that it has. Error is the RMS distance of the nodes from the reference at all frames, over
-the RMS displacement there; at rest it is that of the last frame. A line ends where it comes within 0.03 %, where two
-halvings of the step change little, or where a point would take longer than the limit.
+run is a separate process on one thread. Time is the processor time of stepping only. The reference is independent of the
+engines: leapfrog in double precision, with its step halved until the motion converges. Each law of elasticity has its own
+reference, so that an engine is compared with its own law. Error is the RMS distance of the nodes from the reference over
+all frames, divided by the RMS displacement; at rest it is that of the last frame. A line ends at an error of 0.03 %, if two
+halvings of the step change little, or if a point would exceed the time limit.
 ";
 
-/// Whether a scene has errors against time: it is no check, and nothing is in its way.
+/// True if a scene has errors against time: it is neither a check nor a contact scene.
 pub fn is_timed(outcome: &Outcome) -> bool {
     matches!(outcome.scene.measure, Measure::Motion | Measure::Rest)
 }
 
-/// The whole report.
+/// The complete report.
 pub fn markdown(outcomes: &[Outcome], notes: &[(&str, &str)], beams: &[sofa::Row]) -> String {
     let mut text = format!("# Engines: error against time\n\nMachine: {}.\n\n{METHOD}\n", machine());
     text +=
@@ -46,7 +46,7 @@ pub fn markdown(outcomes: &[Outcome], notes: &[(&str, &str)], beams: &[sofa::Row
     text
 }
 
-/// What each engine needs in each scene; the least is bold.
+/// The time of each engine in each scene; the smallest is bold.
 fn summary(outcomes: &[Outcome]) -> String {
     let timed: Vec<&Outcome> = outcomes.iter().filter(|outcome| is_timed(outcome)).collect();
     let Some(first) = timed.first() else {
@@ -86,7 +86,7 @@ fn cell(outcome: &Outcome, row: usize, target: f64) -> String {
     }
 }
 
-/// Free fall, which players pass before their times mean anything.
+/// Free fall, a check that players pass before their times are meaningful.
 fn checked(outcomes: &[Outcome]) -> String {
     let mut text = String::from("## Checks\n\nThe least error of each engine in free fall.\n\n");
     for outcome in outcomes
@@ -130,7 +130,7 @@ fn scene(outcome: &Outcome) -> String {
     for (law, doubt, substeps) in &outcome.references {
         let _ = writeln!(
             text,
-            "- reference, {}: {substeps} substeps a frame; with half as many it moves by {doubt:.0e} of the motion",
+            "- reference, {}: {substeps} substeps a frame; half as many change it by {doubt:.0e} of the motion",
             law.name()
         );
     }
@@ -138,7 +138,7 @@ fn scene(outcome: &Outcome) -> String {
         let _ = writeln!(
             text,
             "- the end of the reference at rest sinks {ratio:.3} times as far as a Timoshenko beam: linear tetrahedra, four cells \
-             thick, are too stiff in bending by so much"
+             thick, are too stiff in bending by this factor"
         );
     }
     text += "\n| engine | line | law | points: s / error | end |\n|---|---|---|---|---|\n";
@@ -175,15 +175,15 @@ fn scene(outcome: &Outcome) -> String {
     text
 }
 
-/// Time beside penetration.
+/// Time and penetration.
 fn contact(outcome: &Outcome) -> String {
     let Measure::Contact { size } = outcome.scene.measure else {
         return String::new();
     };
     let mut text = format!(
-        "## {}\n\n{}. A line ends where no node is inside anything at the end of any frame. Energy: at least so much more than at the start, \
-         in parts of what is lost. Speed: of the last ten frames. The mean height at the end tells whether all \
-         fell alike.\n\n| engine | line | settings | s | deepest, mm | energy, % | speed, mm/s | height, mm |\n|---|---|---|---|---|---|---|---|\n",
+        "## {}\n\n{}. A line ends when no node is in an obstacle at the end of any frame. Energy: a lower bound of the increase since the start, \
+         relative to the loss of potential energy. Speed: of the last ten frames. The mean height at the end shows whether all \
+         fell equally far.\n\n| engine | line | settings | s | deepest, mm | energy, % | speed, mm/s | height, mm |\n|---|---|---|---|---|---|---|---|\n",
         outcome.scene.name, outcome.scene.about
     );
     for engine in &outcome.engines {

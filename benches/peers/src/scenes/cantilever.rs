@@ -1,4 +1,4 @@
-//! A beam that is held at one end and released from the straight.
+//! A straight beam that is fixed at one end and released.
 
 use super::mesh::{block, nodes};
 use super::{Measure, Scene};
@@ -21,7 +21,7 @@ pub fn released() -> Scene {
     }
 }
 
-/// Damped until it rests.
+/// The damped motion until rest.
 pub fn at_rest() -> Scene {
     Scene {
         name: "cantilever at rest",
@@ -33,15 +33,15 @@ pub fn at_rest() -> Scene {
 
 fn model(damping: f64, frames: usize) -> Model {
     let block = block(CELLS, EDGE);
-    let held = nodes(&block.positions, |[x, _, _]| x < 0.5 * EDGE);
+    let pinned = nodes(&block.positions, |[x, _, _]| x < 0.5 * EDGE);
     Model {
         damping,
         frames,
-        ..Model::solid(block, held, 2e6, DENSITY)
+        ..Model::solid(block, pinned, 2e6, DENSITY)
     }
 }
 
-/// The deflection of the end at the last frame, over Timoshenko's for a beam under its own weight.
+/// Tip deflection at the last frame, over Timoshenko's for a beam under its own weight.
 pub fn tip_ratio(model: &Model, motion: &Motion) -> f64 {
     let [length, height] = [CELLS[0], CELLS[1]].map(|cells| cells as f64 * EDGE);
     let load = DENSITY * model.gravity * height * height;

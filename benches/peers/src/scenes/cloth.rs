@@ -9,7 +9,7 @@ const SIDE: u32 = 25;
 pub fn scene() -> Scene {
     Scene {
         name: "cloth",
-        about: "25 x 25 nodes of 0.25 g, 20 mm apart, springs of 1000 N/m to all 8 neighbours, hung from two corners and released \
+        about: "25 x 25 nodes of 0.25 g, 20 mm apart, springs of 1000 N/m to all 8 neighbors, hung from two corners and released \
                 from the horizontal, damping 4 /s"
             .into(),
         model: Model {

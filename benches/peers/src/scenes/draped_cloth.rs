@@ -1,4 +1,4 @@
-//! A net of springs that falls over a ball: what contact costs, and how deep it lets nodes sink in.
+//! A net of springs that falls over a ball: the cost of contact, and the penetration of nodes.
 
 use super::mesh::net;
 use super::{Measure, Scene};
@@ -12,7 +12,7 @@ pub fn scene() -> Scene {
     let middle = 0.5 * f64::from(SPACING) * f64::from(SIDE - 1);
     Scene {
         name: "cloth over a ball",
-        about: "21 x 21 nodes of 0.25 g, 15 mm apart, springs of 1000 N/m to all 8 neighbours, fall 20 mm onto a fixed ball of \
+        about: "21 x 21 nodes of 0.25 g, 15 mm apart, springs of 1000 N/m to all 8 neighbors, fall 20 mm onto a fixed ball of \
                 100 mm without friction, damping 4 /s"
             .into(),
         model: Model {

@@ -1,4 +1,4 @@
-//! A block and a chain that nothing holds: whoever does not fall like a stone is set up wrongly.
+//! A block and a chain in free fall: an engine with other results is set up incorrectly.
 
 use super::mesh::block;
 use super::{Measure, Scene};

@@ -1,4 +1,4 @@
-//! Blocks of cubes that are cut in five tetrahedra each, and nets of springs.
+//! Blocks of cubes with five tetrahedra each, and nets of springs.
 
 use crate::cloth::Cloth;
 use crate::precision::model::Model;
@@ -9,7 +9,7 @@ pub struct Block {
     pub tetrahedra: Vec<[usize; 4]>,
 }
 
-/// The corner of a block of so many cubes along each axis is at the origin.
+/// A block of `cells` cubes along each axis, with a corner at the origin.
 pub fn block(cells: [usize; 3], edge: f64) -> Block {
     let [nx, ny, nz] = cells.map(|count| count + 1);
     let node = |x: usize, y: usize, z: usize| (z * ny + y) * nx + x;
@@ -17,7 +17,7 @@ pub fn block(cells: [usize; 3], edge: f64) -> Block {
     for z in 0..nz {
         for y in 0..ny {
             for x in 0..nx {
-                positions.push([x, y, z].map(|place| place as f64 * edge));
+                positions.push([x, y, z].map(|coordinate| coordinate as f64 * edge));
             }
         }
     }
@@ -25,7 +25,7 @@ pub fn block(cells: [usize; 3], edge: f64) -> Block {
     for z in 0..cells[2] {
         for y in 0..cells[1] {
             for x in 0..cells[0] {
-                // Neighbours are mirror images, so that diagonals of faces meet.
+                // Neighboring cubes are mirror images, so that the diagonals of shared faces match.
                 let is_odd = (x + y + z) % 2 == 1;
                 let corner = |bits: usize| {
                     let along = if is_odd { 1 - (bits & 1) } else { bits & 1 };
@@ -41,14 +41,14 @@ pub fn block(cells: [usize; 3], edge: f64) -> Block {
     Block { positions, tetrahedra }
 }
 
-/// The surface of tetrahedra, outward.
+/// The surface of tetrahedra, facing outward.
 pub fn surface(tetrahedra: &[[usize; 4]]) -> Vec<[usize; 3]> {
     let tetrahedra: Vec<[u32; 4]> = tetrahedra.iter().map(|nodes| nodes.map(|node| node as u32)).collect();
     let faces = sinew::mesh::boundary(&tetrahedra).expect("memory");
     faces.into_iter().map(|nodes| nodes.map(|node| node as usize)).collect()
 }
 
-/// A square net in the plane y = 0 with so many nodes along a side, of one mass, kg, each, and springs to all 8 neighbours.
+/// A square net in the plane y = 0 with `side` nodes per side, of equal mass [kg], and springs to all 8 neighbors.
 pub fn net(side: u32, spacing: f32, mass: f64) -> Model {
     let cloth = Cloth {
         spacing,
@@ -57,7 +57,10 @@ pub fn net(side: u32, spacing: f32, mass: f64) -> Model {
     let side = side as usize;
     let corners = (0..side - 1).flat_map(|row| (0..side - 1).map(move |column| row * side + column));
     Model {
-        positions: cloth.positions().map(|place| place.map(f64::from)).collect(),
+        positions: cloth
+            .positions()
+            .map(|coordinates| coordinates.map(f64::from))
+            .collect(),
         masses: vec![mass; side * side],
         springs: cloth.springs().map(|ends| ends.map(|end| end as usize)).collect(),
         triangles: corners
@@ -67,7 +70,7 @@ pub fn net(side: u32, spacing: f32, mass: f64) -> Model {
     }
 }
 
-/// The nodes of which something is true.
+/// The nodes that satisfy a predicate.
 pub fn nodes(positions: &[[f64; 3]], is_one: impl Fn([f64; 3]) -> bool) -> Vec<usize> {
     (0..positions.len()).filter(|&node| is_one(positions[node])).collect()
 }

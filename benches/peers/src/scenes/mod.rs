@@ -1,4 +1,4 @@
-//! The scenes: each a discrete model that every engine is given, node by node.
+//! The scenes: each a discrete model that every engine receives node by node.
 
 mod cantilever;
 mod cloth;
@@ -18,25 +18,25 @@ pub use cantilever::tip_ratio;
 pub use mesh::Block;
 pub use sofa_beam::{SofaBeam, sofa_beams};
 
-/// A model with its name and what is asked of its motion.
+/// A model with its name and the measure of its motion.
 pub struct Scene {
     pub name: &'static str,
-    /// A line for a reader.
+    /// A one-line description.
     pub about: String,
     pub model: Model,
     pub measure: Measure,
 }
 
-/// Where an error is measured.
+/// The measured quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measure {
-    /// At the end of each frame, of what a player must get right before it is timed.
+    /// Positions at the end of each frame, as a check of a player before it is timed.
     Check,
-    /// At the end of each frame.
+    /// Positions at the end of each frame.
     Motion,
-    /// At the last frame, when a damped body rests.
+    /// Positions at the last frame, when a damped body is at rest.
     Rest,
-    /// How deep nodes are in what they meet at the end of frames, in parts of this size, m. There is no reference.
+    /// Depth of nodes in obstacles at the end of frames, relative to this size [m]. There is no reference.
     Contact { size: f64 },
 }
 

@@ -5,27 +5,31 @@ use super::{Measure, Scene};
 use crate::precision::model::Model;
 
 const CELLS: [usize; 3] = [16, 8, 6];
-/// Metres from end to end, before it is bent.
+/// Length from end to end before bending [m].
 const LENGTH: f64 = 0.16;
 
 pub fn scene() -> Scene {
     let mut block = block(CELLS, 1.0);
-    let held = nodes(&block.positions, |[x, _, _]| x < 1.5);
-    block.positions.iter_mut().for_each(|place| *place = shaped(*place));
+    let pinned = nodes(&block.positions, |[x, _, _]| x < 1.5);
+    block
+        .positions
+        .iter_mut()
+        .for_each(|position| *position = shaped(*position));
     Scene {
         name: "organ",
         about: "an organ-like body of 16 x 8 x 6 cells, rounded, tapered and bent, 0.16 m long, hung by one end and released: \
                 E = 10 kPa, nu = 0.3, 1050 kg/m³"
             .into(),
-        model: Model::solid(block, held, 1e4, 1050.0),
+        model: Model::solid(block, pinned, 1e4, 1050.0),
         measure: Measure::Motion,
     }
 }
 
-/// Where a corner of the lattice is in the organ.
+/// Maps a lattice corner to its position in the organ.
 fn shaped([x, y, z]: [f64; 3]) -> [f64; 3] {
-    let [x, y, z] = [x / CELLS[0] as f64, y / CELLS[1] as f64, z / CELLS[2] as f64].map(|part| 2.0 * part - 1.0);
-    // Towards the ball of which the cube is the hull, not all the way: edges of the lattice would become flat.
+    let [x, y, z] =
+        [x / CELLS[0] as f64, y / CELLS[1] as f64, z / CELLS[2] as f64].map(|fraction| 2.0 * fraction - 1.0);
+    // Toward the inscribed ball of the cube, but not completely: edges of the lattice would become flat.
     let round = 0.75;
     let pulled = |a: f64, b: f64, c: f64| {
         let ball = (1.0 - b * b / 2.0 - c * c / 2.0 + b * b * c * c / 3.0).sqrt();

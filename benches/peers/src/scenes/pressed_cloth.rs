@@ -1,4 +1,4 @@
-//! A ball that is pressed into a net of springs held at its rim.
+//! A ball that is pressed into a net of springs with a pinned border.
 
 use super::mesh::net;
 use super::{Measure, Scene};
@@ -13,12 +13,12 @@ pub fn scene() -> Scene {
     let is_rim = |node: usize| {
         [node % side, node / side]
             .iter()
-            .any(|&place| place == 0 || place + 1 == side)
+            .any(|&index| index == 0 || index + 1 == side)
     };
     let nodes = side * side;
     Scene {
         name: "ball pressed into a cloth",
-        about: "a ball of 30 mm goes 40 mm down into a cloth of 200 mm, 41 x 41 nodes, held at its rim, without weight: springs of \
+        about: "a ball of 30 mm goes 40 mm down into a cloth of 200 mm, 41 x 41 nodes, fixed at its border, without weight: springs of \
                 100 N/m, 0.1 kg, damping 2 /s, no friction"
             .into(),
         model: Model {

@@ -1,4 +1,4 @@
-//! A chain of springs that is held at one end and falls from the horizontal.
+//! A horizontal chain of springs that is fixed at one end and released.
 
 use super::{Measure, Scene};
 use crate::precision::model::Model;

@@ -1,14 +1,14 @@
-//! The beams whose time per step SOFA's authors published.
+//! The beams whose times per step were published by SOFA's authors.
 
 use super::mesh::{block, nodes};
 use crate::precision::model::Model;
 
-/// A beam, and what is published about it.
+/// A beam and its published time.
 pub struct SofaBeam {
     /// Nodes along each axis.
     pub nodes: [usize; 3],
     pub model: Model,
-    /// ms per step of 10 ms, implicit Euler, tetrahedra.
+    /// Time per step of 10 ms with implicit Euler and tetrahedra [ms].
     pub published: f64,
 }
 
@@ -21,10 +21,10 @@ pub fn sofa_beams() -> Vec<SofaBeam> {
 fn beam(counts: [usize; 3], published: f64) -> SofaBeam {
     let edge = 0.1 / (counts[1] - 1) as f64;
     let block = block(counts.map(|count| count - 1), edge);
-    let held = nodes(&block.positions, |[x, _, _]| x < 0.5 * edge);
+    let pinned = nodes(&block.positions, |[x, _, _]| x < 0.5 * edge);
     SofaBeam {
         nodes: counts,
-        model: Model::solid(block, held, 2e6, 1000.0),
+        model: Model::solid(block, pinned, 2e6, 1000.0),
         published,
     }
 }

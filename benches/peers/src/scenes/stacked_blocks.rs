@@ -4,8 +4,8 @@ use super::mesh::{block, surface};
 use super::{Measure, Scene};
 use crate::precision::model::Model;
 
-/// Blocks of so many cubes a side, of this edge, m, at these places.
-fn blocks(cells: usize, edge: f64, young: f64, places: &[[f64; 3]]) -> Model {
+/// Blocks with `cells` cubes per side, of this edge [m], at these offsets.
+fn blocks(cells: usize, edge: f64, young: f64, offsets: &[[f64; 3]]) -> Model {
     let block = block([cells; 3], edge);
     let triangles = surface(&block.tetrahedra);
     Model {
@@ -16,10 +16,10 @@ fn blocks(cells: usize, edge: f64, young: f64, places: &[[f64; 3]]) -> Model {
         frames: 120,
         ..Model::solid(block, Vec::new(), young, 1000.0)
     }
-    .copied(places)
+    .copied(offsets)
 }
 
-/// One upon the other.
+/// Two blocks, one above the other.
 pub fn two() -> Scene {
     Scene {
         name: "two blocks",
@@ -31,9 +31,9 @@ pub fn two() -> Scene {
     }
 }
 
-/// Twenty small ones.
+/// A heap of twenty small blocks.
 pub fn heap() -> Scene {
-    let place = |index: usize| {
+    let offset = |index: usize| {
         let (x, z, layer) = (index % 2, index / 2 % 2, index / 4);
         let askew = if layer % 2 == 0 { 0.004 } else { -0.004 };
         [
@@ -46,7 +46,7 @@ pub fn heap() -> Scene {
         name: "heap of blocks",
         about: "20 cubes of 40 mm, 27 nodes each, fall in a heap on the ground: E = 20 kPa, nu = 0.3, 1000 kg/m³, friction 0.5, damping 2 /s"
             .into(),
-        model: blocks(2, 0.02, 2e4, &(0..20).map(place).collect::<Vec<_>>()),
+        model: blocks(2, 0.02, 2e4, &(0..20).map(offset).collect::<Vec<_>>()),
         measure: Measure::Contact { size: 0.04 },
     }
 }

@@ -1,4 +1,4 @@
-//! Numbers that take long to compute, kept in `target/reference` by a hash of the scene they belong to.
+//! A cache of numbers that take long to compute, in `target/reference`, keyed by a hash of the scene.
 
 use std::path::{Path, PathBuf};
 
@@ -7,11 +7,12 @@ use xxhash_rust::xxh3::xxh3_64;
 use crate::report::Report;
 use crate::scene::{DURATION, SAMPLES, Scene};
 
-/// To be changed with how they are computed.
+/// Must be incremented if the computation of the numbers changes.
 const VERSION: u8 = 2;
 
-/// The `count` numbers of this name for the scene: as they were kept, or computed now. `None`: they could not be computed.
-pub fn kept(
+/// Returns the `count` cached numbers of this name for the scene, or computes and caches them. `None` if they cannot be
+/// computed.
+pub fn cached(
     scene: &Scene,
     name: &str,
     count: usize,
@@ -24,7 +25,7 @@ pub fn kept(
     }
     let numbers = compute()?;
     if let Err(error) = write(&path, &numbers) {
-        report.progress(&format!("{} could not be kept: {error}", path.display()));
+        report.progress(&format!("{} could not be cached: {error}", path.display()));
     }
     Some(numbers)
 }
