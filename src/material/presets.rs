@@ -13,7 +13,7 @@ use std::ffi::CStr;
 ///     density: LIVER.density,
 ///     ..Material::default()
 /// };
-/// Soft tissue is nearly incompressible: E is three times G.
+/// // Soft tissue is nearly incompressible: E is three times G.
 /// assert_eq!(material.young_modulus, 3.0 * LIVER.shear_modulus);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -36,7 +36,7 @@ const MAX_SAMPLES: usize = 16;
 /// let block = Mesh::block([0.1, 0.1, 0.1], [2, 2, 2])?;
 /// let surface = ClosedSurface::new(&block.positions, &block.surface()?)?;
 /// assert!((surface.volume() - 1e-3).abs() < 1e-9);
-/// A sheet encloses no volume.
+/// // A sheet encloses no volume.
 /// let sheet = Mesh::cloth([0.1, 0.1], [2, 2])?;
 /// assert!(ClosedSurface::new(&sheet.positions, &sheet.triangles).is_err());
 /// # Ok::<(), sinew::Error>(())

@@ -23,7 +23,7 @@ const WELD: f64 = 1e-6;
 /// ```
 /// # use glam::Vec3;
 /// # use sinew::mesh::{Mesh, tidy};
-/// Two triangles with two corners written twice.
+/// // Two triangles with two corners written twice.
 /// let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Z, Vec3::X, Vec3::Z, Vec3::X + Vec3::Z];
 /// let loaded = tidy(&Mesh { positions, triangles: vec![[0, 2, 1], [3, 4, 5]], ..Mesh::default() })?;
 /// assert_eq!(loaded.mesh.triangles, [[0, 2, 1], [1, 2, 3]]);
@@ -46,7 +46,7 @@ pub struct LoadedMesh {
 /// ```
 /// # use glam::Vec3;
 /// # use sinew::mesh::{Mesh, tidy};
-/// The last vertex is unused, and a triangle occurs twice.
+/// // The last vertex is unused, and a triangle occurs twice.
 /// let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Z, Vec3::Y];
 /// let report = tidy(&Mesh { positions, triangles: vec![[0, 2, 1], [2, 1, 0]], ..Mesh::default() })?.report;
 /// assert_eq!((report.dropped_vertices, report.doubled_triangles), (1, 1));

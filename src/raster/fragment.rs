@@ -64,7 +64,7 @@ impl Window {
 /// let mut depths = Vec::new();
 /// let corners = [Vec3::NEG_Z, Vec3::new(0.1, 0.0, -1.0), Vec3::new(0.0, 0.1, -1.0)];
 /// view.triangle(&Window::new(64, 48), corners, |fragment| depths.push(fragment.depth));
-/// Half of ten by ten pixels, at a depth of 1 m.
+/// // Half of ten by ten pixels, at a depth of 1 m.
 /// assert!((45..=55).contains(&depths.len()) && depths.iter().all(|depth| (depth - 1.0).abs() < 1e-6));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

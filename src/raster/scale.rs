@@ -44,7 +44,7 @@ pub enum Colours {
 /// #     scene.draw(&scene.camera(Vec3::Y, Vec3::NEG_Z, 0.6, 1.0)?, 32, 32)
 /// # };
 /// let scale = ColourScale { colours: Colours::Sequential, low: 0.0, high: 0.3 };
-/// A value above the range has the last color.
+/// // A value above the range has the last color.
 /// assert_eq!(drawn(0.9, scale)?, drawn(0.3, scale)?);
 /// assert_ne!(drawn(0.1, scale)?, drawn(0.3, scale)?);
 /// # Ok::<(), sinew::Error>(())

@@ -96,7 +96,10 @@ impl ImageSpaceDefinition {
 /// ```
 #[doc = include_str!("../../doctest/two_cubes.txt")]
 /// let mut space = ImageSpace::new(&ImageSpaceDefinition::new(0.002), &[&cube, &cube])?;
-/// Cubes of 10 cm, with an offset of 8 cm.
+/// // Cubes of 10 cm, with an offset of 8 cm.
+/// let overlap = space.detect(&bodies)?;
+/// assert!((overlap.volume - 0.1 * 0.1 * 0.02).abs() < 0.1 * overlap.volume);
+/// # Ok::<(), sinew::Error>(())
 /// ```
 #[derive(Debug)]
 pub struct ImageSpace {

@@ -21,7 +21,7 @@ use scanner::Scanner;
 /// use sinew::mesh::{MeshFormat, load};
 /// # let path = std::env::temp_dir().join(format!("sinew_mesh_format_{}.txt", std::process::id()));
 /// # std::fs::write(&path, "v 0 0 0\nv 100 0 0\nv 0 0 100\nf 1 3 2\n").expect("a file");
-/// A file in millimeters whose name has no known extension.
+/// // A file in millimeters whose name has no known extension.
 /// let loaded = load(&path, MeshFormat::Obj, 0.001)?;
 /// assert_eq!(loaded.mesh.positions[1].x, 0.1);
 /// # std::fs::remove_file(&path).expect("the file");
