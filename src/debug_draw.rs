@@ -78,7 +78,8 @@ pub trait DebugCanvas {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DebugDrawDefinition {
-    /// A point at each contact of a tool with a body at the end of the last step, and a line along the force on the tool.
+    /// A point at each contact of a tool with a body at the end of the last step, and a line along the force on the
+    /// tool.
     pub contacts: bool,
     /// A line along the normal of each such contact, away from the tool.
     pub normals: bool,
@@ -122,7 +123,8 @@ impl World {
     /// Draws the state after the last step. It allocates nothing and changes nothing.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): a length or the scale is out of range. After an error nothing is drawn.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): a length or the scale is out of range. After an error
+    /// nothing is drawn.
     pub fn debug_draw(&self, definition: &DebugDrawDefinition, canvas: &mut dyn DebugCanvas) -> Result<()> {
         not_negative("normal_length", definition.normal_length)?;
         not_negative("force_scale", definition.force_scale)?;

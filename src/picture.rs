@@ -93,8 +93,8 @@ impl World {
     /// Renders an image with some bodies colored by values. The image has no legend.
     ///
     /// # Errors
-    /// Those of [`World::picture`]. [`Error::InvalidArgument`]: the number of values differs from the number of nodes, a value is not finite, or
-    /// `low` of a scale is not below `high`. [`Error::StaleId`].
+    /// Those of [`World::picture`]. [`Error::InvalidArgument`]: the number of values differs from the number of nodes,
+    /// a value is not finite, or `low` of a scale is not below `high`. [`Error::StaleId`].
     pub fn picture_of_values(&self, definition: &PictureDefinition, coloured: &[BodyValues]) -> Result<Image> {
         for of in coloured {
             self.body(of.body)?;

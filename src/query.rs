@@ -111,12 +111,12 @@ impl World {
     }
 
     /// The first point of a body's surface on a ray from `origin` (m) along `direction` (of any length) within
-    /// `max_distance` (m, can be infinite), at the current positions; `None` without a hit. Both sides of triangles count;
-    /// a ray in the plane of a triangle does not hit it.
+    /// `max_distance` (m, can be infinite), at the current positions; `None` without a hit. Both sides of triangles
+    /// count; a ray in the plane of a triangle does not hit it.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a number is not finite, the direction is zero, or `max_distance` is negative or not a number.
-    /// [`Error::OutOfMemory`]: the search tree of a body could not be allocated.
+    /// [`Error::InvalidArgument`]: a number is not finite, the direction is zero, or `max_distance` is negative or not
+    /// a number. [`Error::OutOfMemory`]: the search tree of a body could not be allocated.
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, max_distance: f32) -> Result<Option<SurfaceHit>> {
         self.cast_ray_where(origin, direction, max_distance, |_| true)
     }
@@ -168,12 +168,12 @@ impl World {
         Ok(found.map(|(_, hit)| hit))
     }
 
-    /// The point of the bodies' surfaces nearest to `point` (m), at the current positions, within `max_distance` (m, can
-    /// be infinite); `None` without one.
+    /// The point of the bodies' surfaces nearest to `point` (m), at the current positions, within `max_distance` (m,
+    /// can be infinite); `None` without one.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a coordinate is not finite, or `max_distance` is negative or not a number. [`Error::OutOfMemory`]: the search
-    /// tree of a body could not be allocated.
+    /// [`Error::InvalidArgument`]: a coordinate is not finite, or `max_distance` is negative or not a number.
+    /// [`Error::OutOfMemory`]: the search tree of a body could not be allocated.
     pub fn nearest_point(&self, point: Vec3, max_distance: f32) -> Result<Option<SurfaceHit>> {
         finite_vector("point", point)?;
         check_distance(max_distance)?;

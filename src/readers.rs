@@ -15,8 +15,8 @@ const MAX_READERS: usize = 126;
 
 /// Lock-free access from another thread to the latest complete positions of a body, while its world steps and changes.
 ///
-/// Created by [`World::create_reader`](crate::World::create_reader), and owned by the reading thread. It can outlive the body
-/// and the world, and can be dropped on any thread.
+/// Created by [`World::create_reader`](crate::World::create_reader), and owned by the reading thread. It can outlive
+/// the body and the world, and can be dropped on any thread.
 ///
 /// ```
 #[doc = include_str!("doctest/cloth.txt")]
@@ -49,9 +49,11 @@ pub struct BodyReader {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame<'a> {
-    /// The positions of the nodes, m, in the caller's order, including nodes that cuts have added: [`Body::positions`](crate::Body::positions).
+    /// The positions of the nodes, m, in the caller's order, including nodes that cuts have added:
+    /// [`Body::positions`](crate::Body::positions).
     pub positions: &'a [Vec3],
-    /// The triangles of the render surface: [`Body::surface`](crate::Body::surface). They change only with `topology_version`.
+    /// The triangles of the render surface: [`Body::surface`](crate::Body::surface). They change only with
+    /// `topology_version`.
     pub triangles: &'a [[u32; 3]],
     /// The version of the frame. It grows whenever the body moves.
     pub version: u64,
@@ -70,7 +72,8 @@ pub struct Frame<'a> {
 impl BodyReader {
     /// The latest frame. It does not change until the next call.
     ///
-    /// The call copies, allocates and locks nothing and never waits. Without a later frame it returns the same one again.
+    /// The call copies, allocates and locks nothing and never waits. Without a later frame it returns the same one
+    /// again.
     pub fn read(&mut self) -> Frame<'_> {
         // This comes first: after the end nothing changes any more.
         let is_over = self.reader.is_over();
@@ -235,7 +238,8 @@ impl Shown {
     }
 }
 
-/// Lists of triangles shared by snapshots: one more than there are snapshots. A list is reused once no snapshot has it, so that a step frees none.
+/// Lists of triangles shared by snapshots: one more than there are snapshots. A list is reused once no snapshot has it,
+/// so that a step frees none.
 #[derive(Debug)]
 struct TriangleLists {
     lists: Vec<Arc<Vec<[u32; 3]>>>,

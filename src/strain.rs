@@ -1,11 +1,12 @@
 //! Strain of a mesh, from current positions and rest positions.
 //!
 //! A body keeps rest positions and elements only if it needs them, so the caller passes both. Any triangles, tetrahedra
-//! and pairs of nodes can be used. Bodies whose strain is never queried use no extra memory. With other rest positions, such as those of an earlier
-//! moment, the result is the strain since then.
+//! and pairs of nodes can be used. Bodies whose strain is never queried use no extra memory. With other rest positions,
+//! such as those of an earlier moment, the result is the strain since then.
 //!
-//! Let F be the deformation gradient of a triangle or tetrahedron and U its stretch, `F = R U` with a rotation R. The principal strains are the
-//! eigenvalues of `U - 1` (engineering strain, Biot 1965): 0 under rigid motion, 0.1 for an elongation by a tenth, -1 if flat.
+//! Let F be the deformation gradient of a triangle or tetrahedron and U its stretch, `F = R U` with a rotation R. The
+//! principal strains are the eigenvalues of `U - 1` (engineering strain, Biot 1965): 0 under rigid motion, 0.1 for an
+//! elongation by a tenth, -1 if flat.
 
 use glam::{DMat3, DVec3, Vec3};
 
@@ -37,7 +38,8 @@ pub struct Strain {
     pub growth: f32,
 }
 
-/// Writes the strain `L/L0 - 1` of lines between pairs of nodes, such as springs, with rest lengths in meters; 0 if the rest length is 0.
+/// Writes the strain `L/L0 - 1` of lines between pairs of nodes, such as springs, with rest lengths in meters; 0 if the
+/// rest length is 0.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`]: the lists differ in length, a pair does not name two nodes, a position is
@@ -62,8 +64,8 @@ pub fn of_springs(positions: &[Vec3], pairs: &[[u32; 2]], rest_lengths: &[f32], 
 /// Writes the strain of triangles with these rest positions.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`]: `positions` and `rest_positions`, or `strains` and `triangles`, differ in length, a triangle does not name three
-/// nodes, or a position is not finite. After an error nothing is written.
+/// [`Error::InvalidArgument`]: `positions` and `rest_positions`, or `strains` and `triangles`, differ in length, a
+/// triangle does not name three nodes, or a position is not finite. After an error nothing is written.
 pub fn of_triangles(
     rest_positions: &[Vec3],
     positions: &[Vec3],
@@ -98,11 +100,12 @@ pub fn of_tetrahedra(
     )
 }
 
-/// Writes for each node the mean of the values of its elements, for example to draw strain; 0 for a node without elements.
+/// Writes for each node the mean of the values of its elements, for example to draw strain; 0 for a node without
+/// elements.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`]: `values` and elements differ in length, an element does not name `N` of the nodes, or a value
-/// is not finite. [`Error::OutOfMemory`]. After an error nothing is written.
+/// [`Error::InvalidArgument`]: `values` and elements differ in length, an element does not name `N` of the nodes, or a
+/// value is not finite. [`Error::OutOfMemory`]. After an error nothing is written.
 pub fn mean_at_nodes<const N: usize>(elements: &[[u32; N]], values: &[f32], means: &mut [f32]) -> Result<()> {
     node_indices("elements", elements, means.len())?;
     expect_count("values", values.len(), elements.len())?;

@@ -64,14 +64,15 @@ const FRAME: f32 = 1.0 / 60.0;
 pub struct WorldDefinition {
     /// The acceleration of gravity, m/s².
     pub gravity: Vec3,
-    /// The number of threads, at most 256. 1 uses the caller's thread only, 0 one thread per core. The result is the same for any number.
+    /// The number of threads, at most 256. 1 uses the caller's thread only, 0 one thread per core. The result is the
+    /// same for any number.
     pub thread_count: u32,
-    /// The number of substeps per step; 0 for as many as stability needs. [`Solver::Implicit`](crate::Solver::Implicit) and
-    /// [`Solver::Newton`](crate::Solver::Newton) take more: at most 1 ms near a tool and 0.25 ms when attached to a body. They also divide
-    /// a substep that gains energy, up to 4096 substeps per step.
+    /// The number of substeps per step; 0 for as many as stability needs. [`Solver::Implicit`](crate::Solver::Implicit)
+    /// and [`Solver::Newton`](crate::Solver::Newton) take more: at most 1 ms near a tool and 0.25 ms when attached to a
+    /// body. They also divide a substep that gains energy, up to 4096 substeps per step.
     pub substeps: u32,
-    /// The largest number of substeps, at least 1. A step that needs more is [`Error::Unstable`]. The additional substeps of implicit solvers
-    /// are limited to 4096 instead: that is 4 s near a tool, or 1 s attached to a body.
+    /// The largest number of substeps, at least 1. A step that needs more is [`Error::Unstable`]. The additional
+    /// substeps of implicit solvers are limited to 4096 instead: that is 4 s near a tool, or 1 s attached to a body.
     pub max_substeps: u32,
     /// The largest position error of a single step, m; 0 turns the error control off. It requires `substeps` 0.
     pub tolerance: f32,

@@ -1,8 +1,8 @@
 //! Steps with a deadline while other work keeps every core busy, and their errors.
 //!
 //! The processor is shared with as many idle loops as it has cores. The wall time of a step then measures the
-//! scheduling, the thread's own time the step itself; both are counted. Now and then a saved copy of the world takes the
-//! same step in the same number of parts, with the largest budget of work that they allow.
+//! scheduling, the thread's own time the step itself; both are counted. Now and then a saved copy of the world takes
+//! the same step in the same number of parts, with the largest budget of work that they allow.
 
 use std::fmt::Write;
 use std::sync::atomic::{AtomicBool, Ordering};

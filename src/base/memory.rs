@@ -72,8 +72,8 @@ pub(crate) fn reserve<T>(values: &mut Vec<T>, count: usize) -> Result<()> {
     Ok(values.try_reserve_exact(count.saturating_sub(values.len()))?)
 }
 
-/// Reserves room for `count` values, rounded up by at most an eighth, so that a list that grows with each body is rarely copied. The capacity
-/// depends only on the count, so that a loaded world has the same.
+/// Reserves room for `count` values, rounded up by at most an eighth, so that a list that grows with each body is
+/// rarely copied. The capacity depends only on the count, so that a loaded world has the same.
 pub(crate) fn reserve_in_steps<T>(values: &mut Vec<T>, count: usize) -> Result<()> {
     reserve(values, count.next_multiple_of((count.next_power_of_two() / 8).max(1)))
 }

@@ -103,10 +103,11 @@ pub struct StepReport {
     pub stable_substep: f32,
     /// The number of bodies that would have become non-finite. They were rolled back; the others were stepped.
     pub bodies_restored: u32,
-    /// The estimated largest position error of the step, m; 0 without a tolerance, infinite if the step was refused before an estimate.
+    /// The estimated largest position error of the step, m; 0 without a tolerance, infinite if the step was refused
+    /// before an estimate.
     pub error_estimate: f32,
-    /// The number of interpenetrating surface edges, between bodies or within a body with self-contact, that contact could not
-    /// prevent. Edges inside a closed body are pushed out again.
+    /// The number of interpenetrating surface edges, between bodies or within a body with self-contact, that contact
+    /// could not prevent. Edges inside a closed body are pushed out again.
     pub crossings: u32,
     /// The reason of an unstable step.
     pub limit: Option<StepLimit>,
@@ -141,7 +142,8 @@ pub struct StepLimit {
     pub of: SubstepLimit,
     /// The estimated number of substeps that the step needs.
     pub needed: u32,
-    /// True if [`Solver::Auto`](crate::Solver::Auto) chose the solver of the body, so that choosing AUTO would not help.
+    /// True if [`Solver::Auto`](crate::Solver::Auto) chose the solver of the body, so that choosing AUTO would not
+    /// help.
     pub is_chosen: bool,
 }
 

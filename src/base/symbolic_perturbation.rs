@@ -33,7 +33,8 @@ fn exact_triple(a: DVec3, b: DVec3, c: DVec3) -> f64 {
         (four[0], four[1]) = two_product(high, c);
         (four[2], four[3]) = two_product(low, c);
     }
-    // The terms are added to an expansion of nonoverlapping numbers. Its last nonzero number has the sign of the sum (Shewchuk 1997).
+    // The terms are added to an expansion of nonoverlapping numbers. Its last nonzero number has the sign of the sum
+    // (Shewchuk 1997).
     let mut sum = [0.0; 24];
     for (count, &term) in terms.iter().enumerate() {
         let mut carried = term;
@@ -58,8 +59,8 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (sum, (a - (sum - taken)) + (b - taken))
 }
 
-/// True if a value is above 0 after an infinitesimal shift along x, a far smaller one along y and again a far smaller one along z (simulation of
-/// simplicity: Edelsbrunner, Muecke 1990). `slope` is its derivative along the axes.
+/// True if a value is above 0 after an infinitesimal shift along x, a far smaller one along y and again a far smaller
+/// one along z (simulation of simplicity: Edelsbrunner, Muecke 1990). `slope` is its derivative along the axes.
 pub(crate) fn is_above(value: f64, slope: DVec3) -> bool {
     [value, slope.x, slope.y, slope.z]
         .into_iter()

@@ -62,9 +62,9 @@ pub(crate) const fn least_of_field<T, F: Saved>(_: fn(&T) -> &F) -> usize {
     F::LEAST
 }
 
-/// Implements [`Saved`] for a structure: `saved! { Name { all, its, fields } }`, or `saved! { [T: Saved] Name<T> { .. } }` for a generic one. A missing field
-/// does not compile, unless `leaves { field: value }` gives its value after loading. With
-/// `where check` loaded values must pass a check. `saved! { Name }` is for a structure without fields.
+/// Implements [`Saved`] for a structure: `saved! { Name { all, its, fields } }`, or `saved! { [T: Saved] Name<T> { .. }
+/// }` for a generic one. A missing field does not compile, unless `leaves { field: value }` gives its value after
+/// loading. With `where check` loaded values must pass a check. `saved! { Name }` is for a structure without fields.
 macro_rules! saved {
     ($name:ident) => {
         impl $crate::codec::Saved for $name {

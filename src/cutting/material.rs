@@ -80,8 +80,8 @@ impl CutMaterial {
         }
     }
 
-    /// The number of components that the last cut has added. `None` if more than `max_simplices` triangles or tetrahedra must be
-    /// visited.
+    /// The number of components that the last cut has added. `None` if more than `max_simplices` triangles or
+    /// tetrahedra must be visited.
     pub fn parted(&self, changes: &Changes, max_simplices: usize) -> Result<Option<u32>> {
         match self {
             Self::Springs(_) => Ok(Some(0)),

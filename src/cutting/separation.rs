@@ -25,8 +25,8 @@ impl CutSurface {
         )
     }
 
-    /// True if the last cut has separated a component with less area than `min_size` in the rest shape, m². `rim` contains
-    /// its new cut-boundary edges.
+    /// True if the last cut has separated a component with less area than `min_size` in the rest shape, m². `rim`
+    /// contains its new cut-boundary edges.
     ///
     /// Each flood fill stops when all have met, or when it has covered that area or its whole component.
     pub fn has_parted_less(&self, rim: &[RimEdge], min_size: f64) -> Result<bool> {
@@ -52,8 +52,8 @@ impl CutSolid {
         count_separated(self, Floods::from(sides.clone().flatten())?, sides, max_simplices)
     }
 
-    /// True if the last cut, which has opened `faces`, has separated a component with less volume than `min_size` in the
-    /// rest shape, m³.
+    /// True if the last cut, which has opened `faces`, has separated a component with less volume than `min_size` in
+    /// the rest shape, m³.
     ///
     /// Each flood fill stops when all have met, or when it has covered that volume or its whole component.
     pub(crate) fn has_parted_less(&self, faces: &[CutFace], min_size: f64) -> Result<bool> {

@@ -36,8 +36,8 @@ pub(super) enum Binding {
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 
 impl Binding {
-    /// Binds each vertex to the tetrahedron that contains it, or else the nearest one; among several to the one in which it is deepest. Returns these
-    /// tetrahedra too.
+    /// Binds each vertex to the tetrahedron that contains it, or else the nearest one; among several to the one in
+    /// which it is deepest. Returns these tetrahedra too.
     pub fn to_tetrahedra(vertices: &[Vec3], positions: &[Vec3], tetrahedra: &[[u32; 4]]) -> Result<(Self, Vec<u32>)> {
         let corners = |index: u32| tetrahedra[index as usize].map(|node| positions[node as usize]);
         let solids: Vec<PlacedTetrahedron> = memory::collected(
@@ -157,8 +157,8 @@ fn nearest_triangles(vertices: &[Vec3], positions: &[Vec3], triangles: &[[u32; 3
     Ok(nearest)
 }
 
-/// Binds a vertex to a triangle: its projection onto the plane, which can lie outside the triangle, and its height. A triangle without area
-/// binds it to the nearest point, without height.
+/// Binds a vertex to a triangle: its projection onto the plane, which can lie outside the triangle, and its height. A
+/// triangle without area binds it to the nearest point, without height.
 fn bind_to_triangle(point: DVec3, nodes: [u32; 3], corners: [Vec3; 3]) -> OverTriangle {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     let normal = (b - a).cross(c - a).normalize_or_zero();

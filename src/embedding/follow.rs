@@ -51,9 +51,9 @@ impl Follower {
         })
     }
 
-    /// Binds each vertex to the copy of its cell that has the material at the vertex, and keeps the triangles whose corners are connected. `pieces` is the
-    /// connected component of each node. Returns false, and changes nothing, if the vertices are not bound to cells of the material. An
-    /// error changes nothing either.
+    /// Binds each vertex to the copy of its cell that has the material at the vertex, and keeps the triangles whose
+    /// corners are connected. `pieces` is the connected component of each node. Returns false, and changes nothing, if
+    /// the vertices are not bound to cells of the material. An error changes nothing either.
     pub fn follow(
         &self,
         (material, pieces): (&CutMaterial, &[u32]),
@@ -121,7 +121,8 @@ impl<const N: usize> BoundCells<N> {
             .try_for_each(|&nodes| check_nodes(nodes, node_count).map(drop))
     }
 
-    /// The nodes of the new cell of each vertex, from its current nodes and weights. Keeps the triangles whose corners are connected.
+    /// The nodes of the new cell of each vertex, from its current nodes and weights. Keeps the triangles whose corners
+    /// are connected.
     fn follow(
         &self,
         (body, pieces_of_nodes): (&impl CellComplex<N>, &[u32]),
@@ -161,8 +162,8 @@ impl<const N: usize> BoundCells<N> {
 
     /// The triangles whose corners are connected when the vertices are bound to cells of these nodes.
     fn connected_triangles(&self, nodes: &[[u32; N]], pieces: &[u32]) -> Result<Vec<[u32; 3]>> {
-        // Connected vertices share as many nodes as their original cells did; copies on different sides of a cut share fewer. They also
-        // belong to one connected component.
+        // Connected vertices share as many nodes as their original cells did; copies on different sides of a cut share
+        // fewer. They also belong to one connected component.
         let common = |a: [u32; N], b: [u32; N]| a.iter().filter(|node| b.contains(node)).count();
         let are_connected = |u: u32, v: u32| {
             let [u, v] = [u, v].map(|vertex| vertex as usize);

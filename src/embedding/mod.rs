@@ -35,17 +35,17 @@ pub struct EmbeddingDefinition<'a> {
     pub vertices: &'a [Vec3],
     /// The triangles, outward by the right-hand rule. Without them there are no normals.
     pub triangles: &'a [[u32; 3]],
-    /// The tetrahedra that the body was created with. Each vertex is bound to the one that contains it, or the nearest. After a cut or tear the
-    /// body's current tetrahedra are used instead. If the list is empty, each vertex is bound to the nearest triangle of the body's render surface, and keeps
-    /// its distance from it.
+    /// The tetrahedra that the body was created with. Each vertex is bound to the one that contains it, or the nearest.
+    /// After a cut or tear the body's current tetrahedra are used instead. If the list is empty, each vertex is bound
+    /// to the nearest triangle of the body's render surface, and keeps its distance from it.
     pub tetrahedra: &'a [[u32; 4]],
 }
 
 /// A fine surface bound to a coarse body. The caller owns it; it costs the body nothing.
 ///
-/// In a tetrahedron a vertex keeps its barycentric weights, so the surface follows affine motions of the body exactly. On a triangle a vertex keeps
-/// its barycentric weights and its distance along the normal. After cuts and tears each vertex follows its own side, and triangles that would span
-/// the cut are removed.
+/// In a tetrahedron a vertex keeps its barycentric weights, so the surface follows affine motions of the body exactly.
+/// On a triangle a vertex keeps its barycentric weights and its distance along the normal. After cuts and tears each
+/// vertex follows its own side, and triangles that would span the cut are removed.
 ///
 /// ```
 /// # use glam::Vec3;
@@ -74,13 +74,14 @@ pub struct Embedding {
     normals: Vec<Vec3>,
     /// True if the normals match the positions.
     are_normals_new: bool,
-    /// The inverse of the mean edge, 1/m. It keeps normals of very small and very large triangles in the range of `f32`.
+    /// The inverse of the mean edge, 1/m. It keeps normals of very small and very large triangles in the range of
+    /// `f32`.
     scale: f32,
 }
 
 impl Embedding {
-    /// An embedding for node positions and a render surface, and the cells of the material that the vertices are bound to. `material` is given for
-    /// surfaces, and for bodies that have been cut.
+    /// An embedding for node positions and a render surface, and the cells of the material that the vertices are bound
+    /// to. `material` is given for surfaces, and for bodies that have been cut.
     fn new(
         definition: &EmbeddingDefinition,
         positions: &[Vec3],
@@ -136,9 +137,10 @@ impl Embedding {
     /// Moves the vertices with the body. It allocates only after a cut or tear, when it binds the vertices again.
     ///
     /// # Errors
-    /// [`Error::StaleId`]: the body was destroyed. [`Error::Unsupported`]: the body was cut or torn, and the vertices are bound to the surface of a
-    /// tetrahedral body, or to other tetrahedra than it was created with. [`Error::InvalidArgument`]: the body lacks nodes that the vertices are bound
-    /// to, as in a snapshot from before a cut. [`Error::OutOfMemory`]. After an error the vertices keep their positions.
+    /// [`Error::StaleId`]: the body was destroyed. [`Error::Unsupported`]: the body was cut or torn, and the vertices
+    /// are bound to the surface of a tetrahedral body, or to other tetrahedra than it was created with.
+    /// [`Error::InvalidArgument`]: the body lacks nodes that the vertices are bound to, as in a snapshot from before a
+    /// cut. [`Error::OutOfMemory`]. After an error the vertices keep their positions.
     pub fn update(&mut self, world: &World) -> Result<()> {
         let body = world.body(self.body)?;
         if body.topology_version() != self.topology {
@@ -162,10 +164,12 @@ impl Embedding {
         self.update_from(body.positions())
     }
 
-    /// Moves the vertices to node positions, m, such as [`Frame::positions`](crate::Frame::positions). It can be called on any thread while the world steps.
+    /// Moves the vertices to node positions, m, such as [`Frame::positions`](crate::Frame::positions). It can be called
+    /// on any thread while the world steps.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: the number of positions differs from the number of nodes at the last [`update`](Self::update), which follows cuts.
+    /// [`Error::InvalidArgument`]: the number of positions differs from the number of nodes at the last
+    /// [`update`](Self::update), which follows cuts.
     pub fn update_from(&mut self, positions: &[Vec3]) -> Result<()> {
         ensure!(
             positions.len() == self.node_count,
@@ -183,13 +187,15 @@ impl Embedding {
         &self.positions
     }
 
-    /// The triangles in the order given, without those that span a cut. They change only in the first update after a cut.
+    /// The triangles in the order given, without those that span a cut. They change only in the first update after a
+    /// cut.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// The outward unit normals of the vertices: area-weighted means over the triangles, 0 if the mean is 0. The list is empty without triangles.
-    /// The first call after an update computes them; the address of the list does not change.
+    /// The outward unit normals of the vertices: area-weighted means over the triangles, 0 if the mean is 0. The list
+    /// is empty without triangles. The first call after an update computes them; the address of the list does not
+    /// change.
     pub fn normals(&mut self) -> &[Vec3] {
         if !self.are_normals_new && !self.normals.is_empty() {
             vertex_normals(&self.positions, &self.triangles, self.scale, &mut self.normals);
@@ -203,8 +209,9 @@ impl World {
     /// Binds a fine surface to a body in their current positions.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there are no vertices; a vertex is not finite or further than 1e9 m from the origin; an index is
-    /// out of range; no tetrahedron has a volume; there are neither tetrahedra nor a render surface of the body. [`Error::OutOfMemory`].
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there are no vertices; a vertex is not finite or further than
+    /// 1e9 m from the origin; an index is out of range; no tetrahedron has a volume; there are neither tetrahedra nor a
+    /// render surface of the body. [`Error::OutOfMemory`].
     pub fn create_embedding(&self, body: BodyId, definition: &EmbeddingDefinition) -> Result<Embedding> {
         let host = self.body(body)?;
         // For an uncut solid the caller's tetrahedra are used.
@@ -215,13 +222,14 @@ impl World {
         Ok(embedding)
     }
 
-    /// Creates a tetrahedral body from a closed render surface, and binds the surface to it. [`Mesh::filled`] makes the tetrahedra, with a mean edge of
-    /// `spacing` meters. The surface is `positions` and `triangles` of the definition; the other fields are as for
-    /// [`create_body`](World::create_body), with uniform values for nodes and springs.
+    /// Creates a tetrahedral body from a closed render surface, and binds the surface to it. [`Mesh::filled`] makes the
+    /// tetrahedra, with a mean edge of `spacing` meters. The surface is `positions` and `triangles` of the definition;
+    /// the other fields are as for [`create_body`](World::create_body), with uniform values for nodes and springs.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: as for [`Mesh::filled`] and [`create_body`](World::create_body), or the definition has tetrahedra, cells, springs, rest
-    /// positions, rest lengths, or values for each node or spring, which do not exist yet. [`Error::OutOfMemory`].
+    /// [`Error::InvalidArgument`]: as for [`Mesh::filled`] and [`create_body`](World::create_body), or the definition
+    /// has tetrahedra, cells, springs, rest positions, rest lengths, or values for each node or spring, which do not
+    /// exist yet. [`Error::OutOfMemory`].
     pub fn create_body_from_surface(
         &mut self,
         definition: &BodyDefinition,
@@ -257,7 +265,8 @@ impl World {
     }
 }
 
-/// True if vertices bound to these tetrahedra are bound to cells of the material. After a topology change they always are.
+/// True if vertices bound to these tetrahedra are bound to cells of the material. After a topology change they always
+/// are.
 fn is_made_of(material: &CutMaterial, tetrahedra: &[[u32; 4]], was_changed: bool) -> bool {
     match material {
         CutMaterial::Springs(_) => false,

@@ -4,7 +4,8 @@ use crate::base::{Error, Result, ToolId, above_zero, ensure, not_negative};
 
 use super::six::Vector6;
 
-/// The least ratio of angular stiffness (at the lever arm) to stiffness: a lower one is lost in rounding when both are solved together.
+/// The least ratio of angular stiffness (at the lever arm) to stiffness: a lower one is lost in rounding when both are
+/// solved together.
 const MIN_ANGULAR_RATIO: f64 = 1e-6;
 
 /// The definition of the coupling of a haptic device to a tool. Plain data, used only during
@@ -24,13 +25,14 @@ const MIN_ANGULAR_RATIO: f64 = 1e-6;
 pub struct HapticDefinition {
     /// The tool that the device moves.
     pub tool: ToolId,
-    /// The stiffness of the spring between device and tool, N/m, above 0. The device must be stable with it: use at most about half of the device's
-    /// damping, N s/m, divided by the time between ticks.
+    /// The stiffness of the spring between device and tool, N/m, above 0. The device must be stable with it: use at
+    /// most about half of the device's damping, N s/m, divided by the time between ticks.
     pub stiffness: f32,
-    /// The angular stiffness, N m/rad; 0 for `stiffness` at a lever arm of half of the tool's length. It is at least a millionth of that.
+    /// The angular stiffness, N m/rad; 0 for `stiffness` at a lever arm of half of the tool's length. It is at least a
+    /// millionth of that.
     pub angular_stiffness: f32,
-    /// The damping ratio of the coupling, which acts where tissue resists; 1 damps `device_mass` critically. Passivity control is
-    /// less effective with 0.
+    /// The damping ratio of the coupling, which acts where tissue resists; 1 damps `device_mass` critically. Passivity
+    /// control is less effective with 0.
     pub damping_ratio: f32,
     /// The mass of the moving part of the device, kg, above 0.
     pub device_mass: f32,
@@ -38,8 +40,8 @@ pub struct HapticDefinition {
     pub force_limit: f32,
     /// The largest torque, N m, at least 0; no limit with 0 or infinity.
     pub torque_limit: f32,
-    /// The largest rate of change of the force, N/s, at least 0; no limit with 0 or infinity. A force delayed by this limit can return more energy than
-    /// the user supplied: the loop is passive only while the limit is not reached.
+    /// The largest rate of change of the force, N/s, at least 0; no limit with 0 or infinity. A force delayed by this
+    /// limit can return more energy than the user supplied: the loop is passive only while the limit is not reached.
     pub force_rate_limit: f32,
     /// The largest rate of change of the torque, N m/s, at least 0; no limit with 0 or infinity.
     pub torque_rate_limit: f32,
@@ -110,7 +112,8 @@ impl HapticDefinition {
     }
 }
 
-/// The spring and damper between device and proxy. Pairs are for translation and for rotation, which is scaled by the lever arm.
+/// The spring and damper between device and proxy. Pairs are for translation and for rotation, which is scaled by the
+/// lever arm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coupling {
     /// m.

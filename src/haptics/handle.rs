@@ -80,15 +80,16 @@ pub struct HapticTick {
     pub lost: f64,
 }
 
-/// The device thread's access to a tool, created by [`World::create_haptic`](crate::World::create_haptic). One thread can tick it while
-/// another steps the world.
+/// The device thread's access to a tool, created by [`World::create_haptic`](crate::World::create_haptic). One thread
+/// can tick it while another steps the world.
 ///
 /// A tick allocates nothing, takes no lock, never waits, and takes a few microseconds at most.
 ///
-/// A spring and a damper couple the device to a proxy of the tool (virtual coupling: Colgate, Stanley, Brown 1995). The massless proxy is
-/// where the spring and the tissue balance. A local model from the last step stands for the tissue: the wrench on the tool and its change with
-/// the tool's motion, learned from the last motions. The difference interval two models fades in over the time interval
-/// them. A tick changes the force by at most `stiffness * displacement + damping * change of velocity`, plus 0.02 N or 2 %.
+/// A spring and a damper couple the device to a proxy of the tool (virtual coupling: Colgate, Stanley, Brown 1995). The
+/// massless proxy is where the spring and the tissue balance. A local model from the last step stands for the tissue:
+/// the wrench on the tool and its change with the tool's motion, learned from the last motions. The difference interval
+/// two models fades in over the time interval them. A tick changes the force by at most `stiffness * displacement +
+/// damping * change of velocity`, plus 0.02 N or 2 %.
 ///
 /// Dropping the handle ends the coupling.
 ///
@@ -161,12 +162,14 @@ impl HapticHandle {
         }
     }
 
-    /// Returns the force on the device until the next tick, on_device its pose and velocity, m/s and rad/s, world axes, `dt` seconds after the last
-    /// tick. With `None` the velocity is computed from the displacement since the last tick.
+    /// Returns the force on the device until the next tick, on_device its pose and velocity, m/s and rad/s, world axes,
+    /// `dt` seconds after the last tick. With `None` the velocity is computed from the displacement since the last
+    /// tick.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a number is not finite, a coordinate is further than 1e9 m from 0, the orientation is zero, or `dt` is not above 0 and at
-    /// most 1. After an error nothing has changed; apply no force to the device. A refused call allocates its message.
+    /// [`Error::InvalidArgument`]: a number is not finite, a coordinate is further than 1e9 m from 0, the orientation
+    /// is zero, or `dt` is not above 0 and at most 1. After an error nothing has changed; apply no force to the device.
+    /// A refused call allocates its message.
     pub fn tick(
         &mut self,
         pose: Pose,
@@ -310,7 +313,8 @@ impl HapticHandle {
         self.observer.balance(account, &on_proxy, &self.coupling, motion.dt);
     }
 
-    /// The largest change of the wrench in a tick: what the spring and damper of the coupling explain, plus a small amount.
+    /// The largest change of the wrench in a tick: what the spring and damper of the coupling explain, plus a small
+    /// amount.
     fn allowed(&self, motion: &DeviceMotion) -> [f64; 2] {
         let parts: [fn(&Vector6) -> DVec3; 2] = [six::along, six::about];
         std::array::from_fn(|k| {

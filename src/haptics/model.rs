@@ -112,8 +112,8 @@ impl WrenchModel {
         )
     }
 
-    /// The wrench of the tissue on a proxy that is coupled by springs of this stiffness to a device at this motion, in static equilibrium (Saupin, Duriez,
-    /// Cotin 2008).
+    /// The wrench of the tissue on a proxy that is coupled by springs of this stiffness to a device at this motion, in
+    /// static equilibrium (Saupin, Duriez, Cotin 2008).
     pub fn wrench_at(&self, device: &Vector6, spring: &Vector6) -> Vector6 {
         let pull = six::sum(&six::each(spring, device), &self.wrench);
         let proxy = six::product(&self.compliance, &pull);

@@ -1,7 +1,8 @@
 //! Passivity control: the coupling returns no more energy than the user supplied.
 //!
-//! The energy dissipated by the coupling is the hand's work on the device, less the tool's work on the tissue, less the energy stored in the spring. If it
-//! falls below 0, delays have generated energy, and a damper dissipates it (Hannaford, Ryu 2002, with two ports).
+//! The energy dissipated by the coupling is the hand's work on the device, less the tool's work on the tissue, less the
+//! energy stored in the spring. If it falls below 0, delays have generated energy, and a damper dissipates it
+//! (Hannaford, Ryu 2002, with two ports).
 
 use super::definition::{Coupling, expanded};
 use super::six::{self, Vector6};
@@ -46,7 +47,8 @@ impl Observer {
         self.by_proxy -= 0.5 * (six::dot(on_proxy[0], displacement) + six::dot(on_proxy[1], displacement));
     }
 
-    /// Updates the energy balance. `work` is the tool's work on the tissue until the local model, and `sent_work` the proxy's until then.
+    /// Updates the energy balance. `work` is the tool's work on the tissue until the local model, and `sent_work` the
+    /// proxy's until then.
     pub fn balance(&mut self, (work, sent_work): (f64, f64), on_proxy: &Vector6, coupling: &Coupling, dt: f64) {
         let on_tissue = work + self.by_proxy - sent_work;
         let stiffness = expanded(coupling.stiffness);
@@ -83,8 +85,9 @@ impl Observer {
         self.dissipated = 0.0;
     }
 
-    /// The damping, N s/m, that dissipates generated energy at this velocity of the device. `pushed` is the wrench on the device, and `releasable` the elastic
-    /// energy behind it, J. The part of its work that was never supplied is withheld. `delay` is the delay of the local model, s.
+    /// The damping, N s/m, that dissipates generated energy at this velocity of the device. `pushed` is the wrench on
+    /// the device, and `releasable` the elastic energy behind it, J. The part of its work that was never supplied is
+    /// withheld. `delay` is the delay of the local model, s.
     pub fn damping(
         &self,
         velocity: &Vector6,
@@ -112,7 +115,8 @@ impl Observer {
         ((generated / DISSIPATION_TIME.max(dt) + unpaid) / square).min(MAX_DAMPING * coupling.critical)
     }
 
-    /// The fraction of that energy that was never supplied, by the hand's own balance. It counts if the energy would be released within the delay.
+    /// The fraction of that energy that was never supplied, by the hand's own balance. It counts if the energy would be
+    /// released within the delay.
     fn unsupplied_share(&self, power: f64, releasable: f64, delay: f64) -> f64 {
         let soon = (power * delay / releasable).min(1.0);
         // A hand that has supplied nothing is moved by the tissue.

@@ -5,7 +5,8 @@ use glam::{DQuat, DVec3};
 use super::six::{self, Matrix6, Vector6};
 use crate::geometry::rotation;
 
-/// The least motion that updates the estimate, relative to the lever arm. Smaller ones are hidden by the tissue's own motion.
+/// The least motion that updates the estimate, relative to the lever arm. Smaller ones are hidden by the tissue's own
+/// motion.
 const MIN_DISPLACEMENT: f64 = 0.02;
 
 /// The largest stiffness relative to the coupling. A larger one makes no difference to the user.
@@ -51,9 +52,10 @@ impl Secant {
         &self.stiffness
     }
 
-    /// Updates the estimate with the wrench at a pose in a step of `dt` seconds. `lever` scales rotations, m; `coupling` is the coupling's stiffness, N/m.
-    /// A free tool resets the estimate. Held tissue oscillates and seems soft as it swings back; yielding to that would feed the oscillation. The
-    /// estimate for held tissue therefore stays at the largest recent value.
+    /// Updates the estimate with the wrench at a pose in a step of `dt` seconds. `lever` scales rotations, m;
+    /// `coupling` is the coupling's stiffness, N/m. A free tool resets the estimate. Held tissue oscillates and seems
+    /// soft as it swings back; yielding to that would feed the oscillation. The estimate for held tissue therefore
+    /// stays at the largest recent value.
     pub fn update(
         &mut self,
         (position, orientation): (DVec3, DQuat),

@@ -1,7 +1,7 @@
 //! Motions and wrenches as vectors of six numbers: three for translation and three for rotation.
 //!
-//! Rotations are scaled by the lever arm of a tool, so that all numbers have the same unit: a motion is (displacement, lever angle), m, a wrench
-//! (force, torque / lever), N.
+//! Rotations are scaled by the lever arm of a tool, so that all numbers have the same unit: a motion is (displacement,
+//! lever angle), m, a wrench (force, torque / lever), N.
 
 use glam::DVec3;
 

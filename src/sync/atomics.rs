@@ -1,4 +1,5 @@
-//! The atomics and cells of this module. `tests/handover.rs` replaces them by loom's, and by orderings too weak, which loom must detect.
+//! The atomics and cells of this module. `tests/handover.rs` replaces them by loom's, and by orderings too weak, which
+//! loom must detect.
 
 use std::cell;
 use std::sync::atomic::Ordering;

@@ -1,12 +1,14 @@
 //! Publishes the latest complete value from one thread to several others, in two more buffers than there are readers.
 //!
-//! The writer announces each version, with its buffer, in one atomic word. Each buffer has a word with its version and its number of claims. A
-//! reader claims a buffer by incrementing the claims in a compare-exchange, which fails unless the buffer still has the announced version.
-//! The writer takes a buffer without claims that is not the latest by setting its word to 0, a version that is never announced.
+//! The writer announces each version, with its buffer, in one atomic word. Each buffer has a word with its version and
+//! its number of claims. A reader claims a buffer by incrementing the claims in a compare-exchange, which fails unless
+//! the buffer still has the announced version. The writer takes a buffer without claims that is not the latest by
+//! setting its word to 0, a version that is never announced.
 //!
 //! While the writer searches, each reader can block at most one buffer: the one that it holds, or one whose
-//! announcement it read earlier; a later claim is of the latest buffer. One buffer is therefore always free, and the writer, which visits each once, is
-//! wait-free. A reader repeats its claim only after another reader's claim or release, or a later version: it is lock-free.
+//! announcement it read earlier; a later claim is of the latest buffer. One buffer is therefore always free, and the
+//! writer, which visits each once, is wait-free. A reader repeats its claim only after another reader's claim or
+//! release, or a later version: it is lock-free.
 
 // Threads share the buffers; each access states its reason.
 #![allow(unsafe_code)]

@@ -56,7 +56,8 @@ impl<T> BufferWriter<T> {
     /// Overwrites an old value and publishes it.
     pub fn write<R>(&mut self, write: impl FnOnce(&mut T) -> R) -> R {
         let result = self.shared.buffers[usize::from(self.own)].with_mut(|buffer| {
-            // SAFETY: the buffer is the writer's own until the exchange below, and `self` is borrowed by this call alone.
+            // SAFETY: the buffer is the writer's own until the exchange below, and `self` is borrowed by this call
+            // alone.
             write(unsafe { &mut *buffer })
         });
         self.own = self.shared.between.swap(self.own | NEW, ACQUIRE_RELEASE) & WHICH;

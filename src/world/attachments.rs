@@ -65,19 +65,22 @@ impl World {
         Ok(self.attach(body, tool, [AttachPoint::of_node(node)].into_iter(), force_limit)?[0])
     }
 
-    /// Attaches nodes of a body to a tool, with one attachment for each node. The nodes move rigidly with the tool from their current positions,
-    /// with every solver, until [`World::release`]. In the next step they take the tool's velocity.
+    /// Attaches nodes of a body to a tool, with one attachment for each node. The nodes move rigidly with the tool from
+    /// their current positions, with every solver, until [`World::release`]. In the next step they take the tool's
+    /// velocity.
     ///
-    /// The force on the nodes, with their inertia and damping, is part of the tool's wrench. The tool no longer collides with these nodes, nor
-    /// with edges and faces that contain one of them. An attachment breaks in a step whose mean force exceeds `force_limit`, N; the node keeps its
-    /// velocity ([`World::slipped`]). With 0 or infinity it never breaks.
+    /// The force on the nodes, with their inertia and damping, is part of the tool's wrench. The tool no longer
+    /// collides with these nodes, nor with edges and faces that contain one of them. An attachment breaks in a step
+    /// whose mean force exceeds `force_limit`, N; the node keeps its velocity ([`World::slipped`]). With 0 or infinity
+    /// it never breaks.
     ///
-    /// An attached node cannot be pinned. If its position is set, it stays attached at the new position. A tool can hold a node several times; the
-    /// attachments then share the force. Destroying the body or the tool destroys the attachment.
+    /// An attached node cannot be pinned. If its position is set, it stays attached at the new position. A tool can
+    /// hold a node several times; the attachments then share the force. Destroying the body or the tool destroys the
+    /// attachment.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a node does not exist, is pinned, massless or held by another tool, or the
-    /// limit is negative or not a number. [`Error::OutOfMemory`]. After an error nothing is attached.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a node does not exist, is pinned, massless or held by another
+    /// tool, or the limit is negative or not a number. [`Error::OutOfMemory`]. After an error nothing is attached.
     pub fn attach_nodes(
         &mut self,
         body: BodyId,
@@ -89,14 +92,17 @@ impl World {
         self.attach(body, tool, nodes.iter().copied().map(AttachPoint::of_node), force_limit)
     }
 
-    /// Attaches points of a body's surface to a tool, with one attachment for each point. An attachment holds the corners of the point's triangle
-    /// as [`World::attach_nodes`] does, except corners of weight 0. The triangle therefore cannot rotate relative to the tool. A
-    /// point on an edge holds the edge; a point at a corner holds the node.
+    /// Attaches points of a body's surface to a tool, with one attachment for each point. An attachment holds the
+    /// corners of the point's triangle as [`World::attach_nodes`] does, except corners of weight 0. The triangle
+    /// therefore cannot rotate relative to the tool. A point on an edge holds the edge; a point at a corner holds the
+    /// node.
     ///
-    /// The force of an attachment is the force on all its corners. Attachments that share a corner share its force by their weights.
+    /// The force of an attachment is the force on all its corners. Attachments that share a corner share its force by
+    /// their weights.
     ///
     /// # Errors
-    /// Those of [`World::attach_nodes`]. [`Error::InvalidArgument`] also if a triangle does not exist, or if weights are negative, not finite or do not sum to 1.
+    /// Those of [`World::attach_nodes`]. [`Error::InvalidArgument`] also if a triangle does not exist, or if weights
+    /// are negative, not finite or do not sum to 1.
     pub fn attach_points(
         &mut self,
         body: BodyId,
@@ -187,25 +193,27 @@ impl World {
         Ok(())
     }
 
-    /// Attaches points of a body to points of another body, or of the same one, with one attachment for each pair. A point is a node or a point of
-    /// the surface. From the next step on the two points coincide, with every solver. Points that are apart are drawn together within a few hundredths of
-    /// a second, but at 0.25 m/s at most. Each body can rotate about the point; three attachments prevent rotation.
+    /// Attaches points of a body to points of another body, or of the same one, with one attachment for each pair. A
+    /// point is a node or a point of the surface. From the next step on the two points coincide, with every solver.
+    /// Points that are apart are drawn together within a few hundredths of a second, but at 0.25 m/s at most. Each body
+    /// can rotate about the point; three attachments prevent rotation.
     ///
     /// The bodies take their substeps together. Those of [`Solver::Implicit`](crate::Solver::Implicit) and
-    /// [`Solver::Newton`](crate::Solver::Newton) are 0.25 ms at most and first-order accurate. Momentum is conserved; so is angular momentum once the points
-    /// coincide. Along an axis in which pins or tools hold both points the attachment does nothing. Features that share an attached pair
-    /// do not collide with each other.
+    /// [`Solver::Newton`](crate::Solver::Newton) are 0.25 ms at most and first-order accurate. Momentum is conserved;
+    /// so is angular momentum once the points coincide. Along an axis in which pins or tools hold both points the
+    /// attachment does nothing. Features that share an attached pair do not collide with each other.
     ///
-    /// An attachment breaks in a step whose mean force exceeds `force_limit`, N ([`World::slipped`]); with 0 or infinity it never
-    /// breaks. [`World::attachment_force`] returns the force on `body`. Destroying either body destroys the attachment.
+    /// An attachment breaks in a step whose mean force exceeds `force_limit`, N ([`World::slipped`]); with 0 or
+    /// infinity it never breaks. [`World::attachment_force`] returns the force on `body`. Destroying either body
+    /// destroys the attachment.
     ///
-    /// The method is sequential impulses (Catto 2005). Between bodies of [`Solver::Verlet`](crate::Solver::Verlet) this is SHAKE (Ryckaert, Ciccotti,
-    /// Berendsen 1977), with the other solvers a projection (Chorin 1968).
+    /// The method is sequential impulses (Catto 2005). Between bodies of [`Solver::Verlet`](crate::Solver::Verlet) this
+    /// is SHAKE (Ryckaert, Ciccotti, Berendsen 1977), with the other solvers a projection (Chorin 1968).
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a node or triangle does not exist, weights are negative, not finite or do not sum to 1,
-    /// the two points are the same, the two lists differ in length, or the limit is negative or not a number.
-    /// [`Error::OutOfMemory`]. After an error nothing is attached.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a node or triangle does not exist, weights are negative, not
+    /// finite or do not sum to 1, the two points are the same, the two lists differ in length, or the limit is negative
+    /// or not a number. [`Error::OutOfMemory`]. After an error nothing is attached.
     pub fn attach_to_body(
         &mut self,
         body: BodyId,
@@ -382,8 +390,8 @@ impl World {
         &self.slipped
     }
 
-    /// The total force on several tools, such as the two jaws of a forceps, and their torque about a point, world axes, mean over the last step,
-    /// N and N m.
+    /// The total force on several tools, such as the two jaws of a forceps, and their torque about a point, world axes,
+    /// mean over the last step, N and N m.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a tool is named more than once, or the point is not finite.

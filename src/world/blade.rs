@@ -42,10 +42,11 @@ const MAX_ROTATION: f64 = 0.5;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BladeDefinition {
-    /// Both ends of the cutting edge, relative to the blade's origin, m. Each coordinate is within 1e9 of 0, and the ends differ.
+    /// Both ends of the cutting edge, relative to the blade's origin, m. Each coordinate is within 1e9 of 0, and the
+    /// ends differ.
     pub edge: [Vec3; 2],
-    /// The stiffness of the coupling between the blade and its proxy in each body, N/m; above 0 and finite. Before cutting, tissue of
-    /// toughness T deforms by about T / `stiffness`: a lower value is a blunter blade.
+    /// The stiffness of the coupling between the blade and its proxy in each body, N/m; above 0 and finite. Before
+    /// cutting, tissue of toughness T deforms by about T / `stiffness`: a lower value is a blunter blade.
     pub stiffness: f32,
     /// Which bodies the blade cuts.
     pub filter: CollisionFilter,
@@ -91,7 +92,8 @@ pub struct BladeReport {
     pub torque: Vec3,
     /// The work that moving the blade has done on tissue in the step, J.
     pub work: f64,
-    /// The length of the cuts made at the end of the step, in the rest shape, m. For solids it is measured on the surface.
+    /// The length of the cuts made at the end of the step, in the rest shape, m. For solids it is measured on the
+    /// surface.
     pub length: f64,
     /// The distance from the proxy to the blade, m; 0 where no tissue resists.
     pub lag: f64,
@@ -221,8 +223,8 @@ impl Blade {
         poses.map(|pose| self.edge.map(|end| pose.position + pose.orientation * end))
     }
 
-    /// Positions of the edge over the next step, from start to end. The blade translates and rotates uniformly; the number of positions keeps the
-    /// rotation between two of them small.
+    /// Positions of the edge over the next step, from start to end. The blade translates and rotates uniformly; the
+    /// number of positions keeps the rotation between two of them small.
     pub fn edge_positions(&self) -> (usize, impl Fn(usize) -> [Vec3; 2] + use<>) {
         let (edge, from, to) = (self.edge, self.pose, self.target.unwrap_or(self.pose));
         let [start, end] = [from, to].map(|pose| pose.orientation.as_dquat().normalize());

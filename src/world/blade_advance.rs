@@ -16,7 +16,8 @@ const TURNED_BACK: f64 = 0.1;
 /// An intersection with tissue shorter than this fraction of a cell is rounding.
 const CRUMB: f64 = 1e-3;
 
-/// How far beyond an edge tissue is searched, as a fraction of a cell: further than snapping opens cuts ahead of the edge.
+/// How far beyond an edge tissue is searched, as a fraction of a cell: further than snapping opens cuts ahead of the
+/// edge.
 const PROBED: f64 = 0.12;
 
 /// Tissue that has moved past an edge by at most this fraction of a cell still counts as ahead of it.
@@ -29,7 +30,8 @@ const SHORTEST_CUT: f64 = 0.2;
 const SHORTEST_CUT_IN_SOLIDS: f64 = 0.1;
 
 impl World {
-    /// Moves the proxy of a blade in a body after the blade, and cuts the tissue between. After an error the proxy stays.
+    /// Moves the proxy of a blade in a body after the blade, and cuts the tissue between. After an error the proxy
+    /// stays.
     pub(super) fn follow_blade(
         &mut self,
         blade: &mut Blade,
@@ -62,8 +64,8 @@ impl World {
         result
     }
 
-    /// Where the edge was before the step, relative to the tissue in its current position: tissue can have moved onto the edge.
-    /// If the proxy is held in the tissue, its holds determine that.
+    /// Where the edge was before the step, relative to the tissue in its current position: tissue can have moved onto
+    /// the edge. If the proxy is held in the tissue, its holds determine that.
     fn start_in(&self, blade: &mut Blade, at: usize, start: [Vec3; 2], dt: f32) -> Result<[Vec3; 2]> {
         let proxy = &blade.proxies[at];
         if !proxy.holds.is_empty() || !proxy.stroke.ends().is_empty() || proxy.was_outside != Some(true) {
@@ -185,7 +187,8 @@ impl World {
         Ok(())
     }
 
-    /// Advances a proxy as far as the coupling force exceeds the resistance, and cuts where the uncut distance is long enough.
+    /// Advances a proxy as far as the coupling force exceeds the resistance, and cuts where the uncut distance is long
+    /// enough.
     fn advance_proxy(&mut self, blade: &mut Blade, id: BodyId, toughness: f64, approach: &mut Approach) -> Result<()> {
         self.look_ahead(blade, id, approach)?;
         let known = blade.proxies.iter().position(|proxy| proxy.body == id);
@@ -299,7 +302,8 @@ impl World {
         Ok(())
     }
 
-    /// Ends the stroke of a proxy that has left its body: cuts what it has passed through since the last cut, up to `reached`.
+    /// Ends the stroke of a proxy that has left its body: cuts what it has passed through since the last cut, up to
+    /// `reached`.
     fn end_stroke(
         &mut self,
         proxy: &mut Proxy,
@@ -321,7 +325,8 @@ fn size_of(met: &[BladeContact]) -> f64 {
     met.iter().map(|part| part.size).fold(0.0, f64::max)
 }
 
-/// The distance that an edge passes through tissue in the rest shape, m. In solids it is the mean along the part of the edge inside.
+/// The distance that an edge passes through tissue in the rest shape, m. In solids it is the mean along the part of the
+/// edge inside.
 fn depth_through(met: &[BladeContact], edge: [Vec3; 2]) -> f64 {
     let amount: f64 = met.iter().map(|part| part.amount).sum();
     if !met.iter().any(|part| part.is_area) {

@@ -28,8 +28,8 @@ impl World {
         tissue.reserve_attachments([slot; 2], count)
     }
 
-    /// Holds a proxy at these points, or at its previous holds if there are none. All holds together act as a spring of this stiffness and largest
-    /// force, N/m and N.
+    /// Holds a proxy at these points, or at its previous holds if there are none. All holds together act as a spring of
+    /// this stiffness and largest force, N/m and N.
     pub(super) fn hold_blade(
         &mut self,
         proxy: &mut Proxy,

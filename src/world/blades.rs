@@ -1,9 +1,10 @@
 //! Blades: edges that cut the tissue they are moved through, with force feedback.
 //!
-//! The *proxy* of a blade in a body is the edge up to which tissue is cut. A spring couples it to the true edge, which is ahead of it (Mahvash,
-//! Hayward 2001). During a step the spring is a constraint between the tissue at the proxy and the moving true edge. Each substep solves its
-//! impulse implicitly, so that it is stable for any stiffness and step. Its force never exceeds the resistance of the tissue. At the
-//! end of the step the proxy advances, and the tissue between its two positions is cut.
+//! The *proxy* of a blade in a body is the edge up to which tissue is cut. A spring couples it to the true edge, which
+//! is ahead of it (Mahvash, Hayward 2001). During a step the spring is a constraint between the tissue at the proxy and
+//! the moving true edge. Each substep solves its impulse implicitly, so that it is stable for any stiffness and step.
+//! Its force never exceeds the resistance of the tissue. At the end of the step the proxy advances, and the tissue
+//! between its two positions is cut.
 
 use glam::{DVec3, Quat, Vec3};
 
@@ -15,23 +16,29 @@ use crate::deformable_contact::LinearPath;
 use crate::slots::Slots;
 
 impl World {
-    /// Adds a blade: an edge that is moved by its pose, as a tool is. It cuts bodies with [`BodyDefinition::spare_nodes`] as
-    /// [`World::cut`] does, against their [`toughness`](crate::BodyDefinition::toughness). A blade is an edge without volume; add a tool for the body of
+    /// Adds a blade: an edge that is moved by its pose, as a tool is. It cuts bodies with
+    /// [`BodyDefinition::spare_nodes`] as [`World::cut`] does, against their
+    /// [`toughness`](crate::BodyDefinition::toughness). A blade is an edge without volume; add a tool for the body of
     /// the instrument.
     ///
-    /// The edge first deforms the tissue, until the spring of [`BladeDefinition::stiffness`] pulls as hard as the tissue resists: by its
-    /// toughness for each meter cut in the rest shape. From then on the proxy advances at the end of each step until both forces are equal again. The work of the
-    /// blade is therefore the toughness times the length of the cut (in solids its area), plus the energy stored in the spring (Mahvash, Hayward
-    /// 2001). The force on the tissue is the force on the blade: momentum is conserved. An edge that moves along itself, or back through its own cut,
-    /// meets no resistance.
+    /// The edge first deforms the tissue, until the spring of [`BladeDefinition::stiffness`] pulls as hard as the
+    /// tissue resists: by its toughness for each meter cut in the rest shape. From then on the proxy advances at the
+    /// end of each step until both forces are equal again. The work of the blade is therefore the toughness times the
+    /// length of the cut (in solids its area), plus the energy stored in the spring (Mahvash, Hayward 2001). The force
+    /// on the tissue is the force on the blade: momentum is conserved. An edge that moves along itself, or back through
+    /// its own cut, meets no resistance.
     ///
-    /// The cut follows the path of the proxy, in steps of a fifth of a triangle's shortest edge, and to its end where the blade leaves the tissue. Passing
-    /// through a triangle takes about ten [`spare_nodes`](crate::BodyDefinition::spare_nodes). Tissue of toughness 0 is cut in each step exactly along the
-    /// edge's path. If a cut fails, the proxy stays and the spring keeps pulling with the resistance of the tissue ([`BladeReport::refused`]).
+    /// The cut follows the path of the proxy, in steps of a fifth of a triangle's shortest edge, and to its end where
+    /// the blade leaves the tissue. Passing through a triangle takes about ten
+    /// [`spare_nodes`](crate::BodyDefinition::spare_nodes). Tissue of toughness 0 is cut in each step exactly along the
+    /// edge's path. If a cut fails, the proxy stays and the spring keeps pulling with the resistance of the tissue
+    /// ([`BladeReport::refused`]).
     ///
-    /// Tissue that moves onto a resting edge is cut as if the edge had moved. Rotations are divided into parts of half a radian.
+    /// Tissue that moves onto a resting edge is cut as if the edge had moved. Rotations are divided into parts of half
+    /// a radian.
     ///
-    /// A body that holds a blade takes its substeps as an attached body does. A step in which a blade moves through tissue can allocate.
+    /// A body that holds a blade takes its substeps as an attached body does. A step in which a blade moves through
+    /// tissue can allocate.
     ///
     /// [`BodyDefinition::spare_nodes`]: crate::BodyDefinition::spare_nodes
     ///
@@ -61,11 +68,12 @@ impl World {
         Ok(())
     }
 
-    /// Moves a blade to `position`, m, over the next step, at constant velocity, and rotates it to `orientation`; `None` keeps its orientation.
+    /// Moves a blade to `position`, m, over the next step, at constant velocity, and rotates it to `orientation`;
+    /// `None` keeps its orientation.
     ///
     /// # Errors
-    /// [`Error::StaleId`](crate::Error::StaleId). [`Error::InvalidArgument`](crate::Error::InvalidArgument): a number is not finite, a coordinate is
-    /// further than 1e9 m from 0, or the orientation is zero.
+    /// [`Error::StaleId`](crate::Error::StaleId). [`Error::InvalidArgument`](crate::Error::InvalidArgument): a number
+    /// is not finite, a coordinate is further than 1e9 m from 0, or the orientation is zero.
     pub fn set_blade_pose(&mut self, blade: BladeId, position: Vec3, orientation: Option<Quat>) -> Result<()> {
         let blade = self.blades.get_mut(blade.0)?;
         let pose = blade.target.unwrap_or(blade.pose);

@@ -73,32 +73,37 @@ impl World {
 
     /// Cuts a body along the surface swept by a blade's edge, at the current positions of the nodes.
     ///
-    /// The render surface gets a new point wherever the blade crosses one of its edges or ends within a triangle, and opens between these points. An
-    /// existing point or edge is used if it lies within 5 % of the shortest edge of the simulated triangle, in the rest shape. The simulation mesh keeps
-    /// its shape (virtual node algorithm: Molino, Bao, Fedkiw 2004). A triangle whose material has separated is copied for each piece, with its share of
-    /// masses and stiffnesses. Beyond the cut the copies have nodes that are not drawn; copies share nodes where their
-    /// material is connected. Springs that lie along no triangle edge are removed where the blade passes through them.
+    /// The render surface gets a new point wherever the blade crosses one of its edges or ends within a triangle, and
+    /// opens between these points. An existing point or edge is used if it lies within 5 % of the shortest edge of the
+    /// simulated triangle, in the rest shape. The simulation mesh keeps its shape (virtual node algorithm: Molino, Bao,
+    /// Fedkiw 2004). A triangle whose material has separated is copied for each piece, with its share of masses and
+    /// stiffnesses. Beyond the cut the copies have nodes that are not drawn; copies share nodes where their material is
+    /// connected. Springs that lie along no triangle edge are removed where the blade passes through them.
     ///
-    /// In tetrahedral bodies the crossed edges are divided in the same way. The faces between the new points open when one of their
-    /// corners separates, at the latest when the last edge of a tetrahedron is crossed. The inner surfaces are drawn from then on. A body of springs alone
-    /// loses the springs that the blade passes through.
+    /// In tetrahedral bodies the crossed edges are divided in the same way. The faces between the new points open when
+    /// one of their corners separates, at the latest when the last edge of a tetrahedron is crossed. The inner surfaces
+    /// are drawn from then on. A body of springs alone loses the springs that the blade passes through.
     ///
-    /// A sweep that begins exactly where the body's last sweep ended continues it: it begins at the current position of the tissue in which the blade
-    /// stopped. A blade that rests in moving tissue therefore leaves no bridges.
+    /// A sweep that begins exactly where the body's last sweep ended continues it: it begins at the current position of
+    /// the tissue in which the blade stopped. A blade that rests in moving tissue therefore leaves no bridges.
     ///
-    /// Nodes keep their numbers; new nodes are appended. They are copies, which move as their original did, and points of the surface between nodes,
-    /// which have no mass and follow their nodes. Mass, momentum and energy are conserved. A pin or an attachment holds a node where
-    /// it is drawn; copies beyond the cut are free. Copies of a massless node get the mean mass of their material.
+    /// Nodes keep their numbers; new nodes are appended. They are copies, which move as their original did, and points
+    /// of the surface between nodes, which have no mass and follow their nodes. Mass, momentum and energy are
+    /// conserved. A pin or an attachment holds a node where it is drawn; copies beyond the cut are free. Copies of a
+    /// massless node get the mean mass of their material.
     ///
-    /// Other forces are divided too: anchor springs by the masses of their nodes, forces along springs with those, fibers with the tetrahedra, and bending
-    /// hinges by area where both triangles still share the edge. A hinge is removed if its edge is cut; an opened cavity loses its pressure.
+    /// Other forces are divided too: anchor springs by the masses of their nodes, forces along springs with those,
+    /// fibers with the tetrahedra, and bending hinges by area where both triangles still share the edge. A hinge is
+    /// removed if its edge is cut; an opened cavity loses its pressure.
     ///
-    /// Positions and triangles that were borrowed before are stale. [`Body::changes_since`] lists the changes for a renderer.
+    /// Positions and triangles that were borrowed before are stale. [`Body::changes_since`] lists the changes for a
+    /// renderer.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::Unsupported`]: the body has no [`BodyDefinition::spare_nodes`]. [`Error::InvalidArgument`]: an end of
-    /// the blade is not finite. [`Error::Capacity`]: too few spare nodes are left, or a node has no free slot in a row of fixed
-    /// length. [`Error::OutOfMemory`]. After an error nothing has changed.
+    /// [`Error::StaleId`]. [`Error::Unsupported`]: the body has no [`BodyDefinition::spare_nodes`].
+    /// [`Error::InvalidArgument`]: an end of the blade is not finite. [`Error::Capacity`]: too few spare nodes are
+    /// left, or a node has no free slot in a row of fixed length. [`Error::OutOfMemory`]. After an error nothing has
+    /// changed.
     pub fn cut(&mut self, body: BodyId, sweep: &Sweep) -> Result<CutReport> {
         let report = self.change_topology(body, |content, skin| content.cut(sweep, skin))?;
         self.bodies.get_mut(body.0)?.publish_topology();
@@ -186,18 +191,20 @@ impl World {
         self.bodies.get_mut(body.0)
     }
 
-    /// Moves the free nodes of a body to static equilibrium under gravity, pins and the forces applied since the last step, with every solver.
+    /// Moves the free nodes of a body to static equilibrium under gravity, pins and the forces applied since the last
+    /// step, with every solver.
     ///
-    /// It finds the nearest minimum of the energy that lies downhill. Velocities become zero, and the pin forces are known afterwards. The applied forces
-    /// stay pending. It is not a step: it allocates and can take long. It ignores tools.
+    /// It finds the nearest minimum of the energy that lies downhill. Velocities become zero, and the pin forces are
+    /// known afterwards. The applied forces stay pending. It is not a step: it allocates and can take long. It ignores
+    /// tools.
     ///
-    /// A connected component without pins is moved too if the net force on it is zero. Its rigid-body position and orientation are then
-    /// unspecified.
+    /// A connected component without pins is moved too if the net force on it is zero. Its rigid-body position and
+    /// orientation are then unspecified.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the tolerance is out of range, a net force acts on a component
-    /// along an axis without pins, or the body is attached to a body. [`Error::NotConverged`]: no equilibrium within the allowed iterations.
-    /// [`Error::OutOfMemory`]. After an error nothing has changed.
+    /// along an axis without pins, or the body is attached to a body. [`Error::NotConverged`]: no equilibrium within
+    /// the allowed iterations. [`Error::OutOfMemory`]. After an error nothing has changed.
     pub fn rest_state(&mut self, body: BodyId, definition: &RestStateDefinition) -> Result<RestStateReport> {
         self.check_not_attached(body)?;
         let gravity = self.definition.gravity;

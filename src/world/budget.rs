@@ -1,9 +1,10 @@
 //! Steps with a work budget or a time limit.
 //!
-//! A unit of work is one substep of every VERLET body, or one matrix-vector product of every IMPLICIT or NEWTON body: about one
-//! pass over all springs and elements. If the budget does not cover the explicit substeps of the whole step, the step simulates a shorter time and
-//! carries the rest to the next step. An implicit equation is solved as far as the budget allows; its residual acts as a force in
-//! the next step. Such a step has all guarantees of an ordinary one: contact, energy and finiteness.
+//! A unit of work is one substep of every VERLET body, or one matrix-vector product of every IMPLICIT or NEWTON body:
+//! about one pass over all springs and elements. If the budget does not cover the explicit substeps of the whole step,
+//! the step simulates a shorter time and carries the rest to the next step. An implicit equation is solved as far as
+//! the budget allows; its residual acts as a force in the next step. Such a step has all guarantees of an ordinary one:
+//! contact, energy and finiteness.
 //!
 //! The clock decides only how much work a step may do. With the same work the result is the same on any machine.
 
@@ -89,8 +90,8 @@ impl World {
     /// [`BudgetReport::work`]. Tools, pins and blades complete their motion; applied forces act for the simulated time.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: `dt` or `work` is out of range. [`Error::Unsupported`]: the world has fixed substeps or a tolerance.
-    /// [`Error::Unstable`]: as [`World::step`]; nothing has moved then, and the lag stays as it was.
+    /// [`Error::InvalidArgument`]: `dt` or `work` is out of range. [`Error::Unsupported`]: the world has fixed substeps
+    /// or a tolerance. [`Error::Unstable`]: as [`World::step`]; nothing has moved then, and the lag stays as it was.
     pub fn step_with_budget(&mut self, dt: f32, work: u32) -> Result<BudgetReport> {
         above_zero("dt", dt)?;
         ensure!(work != 0, "work is 0: must be at least 1");
@@ -143,13 +144,15 @@ impl World {
         })
     }
 
-    /// Steps as [`World::step_with_budget`] does, with the work that fits into `seconds` at the pace of the last steps. The report has this work.
+    /// Steps as [`World::step_with_budget`] does, with the work that fits into `seconds` at the pace of the last steps.
+    /// The report has this work.
     ///
-    /// Plan for a part of a frame. Work is measured in passes over all forces, not in time. A step can be late if the machine becomes
-    /// slower, or when a body first touches a tool.
+    /// Plan for a part of a frame. Work is measured in passes over all forces, not in time. A step can be late if the
+    /// machine becomes slower, or when a body first touches a tool.
     ///
     /// # Errors
-    /// As [`World::step_with_budget`]. [`Error::InvalidArgument`]: `seconds` is out of range. [`Error::Unsupported`]: the platform has no clock.
+    /// As [`World::step_with_budget`]. [`Error::InvalidArgument`]: `seconds` is out of range. [`Error::Unsupported`]:
+    /// the platform has no clock.
     pub fn step_within(&mut self, dt: f32, seconds: f64) -> Result<BudgetReport> {
         above_zero("seconds", seconds)?;
         check_clock("step_within")?;

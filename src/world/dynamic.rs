@@ -22,13 +22,14 @@ impl World {
 
     /// Makes a tool dynamic: a rigid body with this mass, at rest. `None` makes it kinematic, which is the default.
     ///
-    /// From the next step on gravity, [`World::apply_wrench`] and contact with bodies move a dynamic tool. In every substep the impulses on the tissue
-    /// act on the tool too, so momentum is conserved and the step is stable for any ratio of masses. Pinned nodes
-    /// stop the tool too. Tools do not collide with each other. Bodies near a dynamic tool do not sleep. Setting another mass keeps the velocity.
+    /// From the next step on gravity, [`World::apply_wrench`] and contact with bodies move a dynamic tool. In every
+    /// substep the impulses on the tissue act on the tool too, so momentum is conserved and the step is stable for any
+    /// ratio of masses. Pinned nodes stop the tool too. Tools do not collide with each other. Bodies near a dynamic
+    /// tool do not sleep. Setting another mass keeps the velocity.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is out of range, the tool is a plane, it holds attachments, or a
-    /// [`HapticHandle`](crate::HapticHandle) moves it. [`Error::OutOfMemory`].
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is out of range, the tool is a plane, it holds
+    /// attachments, or a [`HapticHandle`](crate::HapticHandle) moves it. [`Error::OutOfMemory`].
     pub fn set_dynamic(&mut self, tool: ToolId, mass: Option<&MassProperties>) -> Result<()> {
         self.check_not_led(tool)?;
         let slot = self.tools.slot(tool.0)?;
@@ -85,7 +86,8 @@ impl World {
         Ok(())
     }
 
-    /// Adds a force at a dynamic tool's center of mass, N, and a torque about it, N m, in world axes. Both act throughout the next step.
+    /// Adds a force at a dynamic tool's center of mass, N, and a torque about it, N m, in world axes. Both act
+    /// throughout the next step.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is not finite, or the tool is kinematic.
@@ -99,8 +101,8 @@ impl World {
         Ok(())
     }
 
-    /// Moves a tool to a position, m, and orientation immediately; `None` keeps its orientation. The motion is not swept: tissue inside the tool
-    /// is pushed out over the next steps. A dynamic tool keeps its velocity.
+    /// Moves a tool to a position, m, and orientation immediately; `None` keeps its orientation. The motion is not
+    /// swept: tissue inside the tool is pushed out over the next steps. A dynamic tool keeps its velocity.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: as for [`World::set_pose`], or the tool holds attachments.
@@ -172,8 +174,9 @@ impl World {
         }
     }
 
-    /// True if each dynamic tool pressed as many bodies in the attempted step as its mass was divided among. Otherwise the next attempt uses the new
-    /// number. After [`DIVISIONS`] attempts the mass is divided among all bodies, which always suffices.
+    /// True if each dynamic tool pressed as many bodies in the attempted step as its mass was divided among. Otherwise
+    /// the next attempt uses the new number. After [`DIVISIONS`] attempts the mass is divided among all bodies, which
+    /// always suffices.
     pub(super) fn are_masses_divided(&mut self, attempts: u32) -> bool {
         let mut are_masses_divided = true;
         for tool in &mut self.dynamic {

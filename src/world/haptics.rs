@@ -18,7 +18,8 @@ const NEGLIGIBLE: f64 = 1e-3;
 /// The mass of the touched nodes decays by this factor per step: a bouncing tool touches them again.
 const MASS_DECAY: f64 = 0.95;
 
-/// The largest fraction of the prediction error that is adopted in a step while the tool holds tissue, whose oscillation lags.
+/// The largest fraction of the prediction error that is adopted in a step while the tool holds tissue, whose
+/// oscillation lags.
 const MAX_SHARE_HELD: f64 = 0.5;
 
 /// The lever arm of a plane, m.
@@ -54,9 +55,10 @@ pub(super) struct HapticLink {
 }
 
 impl HapticLink {
-    /// Adopts the mean wrench of a step, which applies at its middle. `inertia` is the mass of the touched nodes over the square of the step,
-    /// N/m. Where this exceeds the stiffness of the coupling, a change of the tool's speed gives a jolt from which the massless proxy would rebound.
-    /// Therefore only a fraction of the prediction error is adopted in each step, and at max_share `max_share`.
+    /// Adopts the mean wrench of a step, which applies at its middle. `inertia` is the mass of the touched nodes over
+    /// the square of the step, N/m. Where this exceeds the stiffness of the coupling, a change of the tool's speed
+    /// gives a jolt from which the massless proxy would rebound. Therefore only a fraction of the prediction error is
+    /// adopted in each step, and at max_share `max_share`.
     fn adopt(&mut self, middle: (DVec3, DQuat), wrench: &Vector6, (inertia, max_share): (f64, f64)) -> Vector6 {
         let turned = rotation::rotation_between(self.middle.1, middle.1) * self.coupling.lever;
         let displacement = joined(middle.0 - self.middle.0, turned);
@@ -73,13 +75,14 @@ impl HapticLink {
 }
 
 impl World {
-    /// Creates a haptic handle for a tool, to be used on the thread of the device. The tool should be at the device's pose: the first step moves it
-    /// there. While the handle exists, [`World::set_pose`] of the tool is
-    /// refused. Each step moves the tool to the last pose of the handle's proxy ([`World::tool_target`]). The handle costs a few microseconds per step.
+    /// Creates a haptic handle for a tool, to be used on the thread of the device. The tool should be at the device's
+    /// pose: the first step moves it there. While the handle exists, [`World::set_pose`] of the tool is refused. Each
+    /// step moves the tool to the last pose of the handle's proxy ([`World::tool_target`]). The handle costs a few
+    /// microseconds per step.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a value of the definition is out of range, another handle moves the tool, or the tool is
-    /// dynamic. [`Error::OutOfMemory`].
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a value of the definition is out of range, another handle moves
+    /// the tool, or the tool is dynamic. [`Error::OutOfMemory`].
     pub fn create_haptic(&mut self, definition: &HapticDefinition) -> Result<HapticHandle> {
         self.check_kinematic(definition.tool)?;
         let tool = self.tools.get(definition.tool.0)?;

@@ -6,8 +6,9 @@ use crate::solver::Outcome;
 
 /// Times and counts of the last step, whether it was taken or refused.
 ///
-/// Times are in seconds. `step` is the time of the whole step. The other times are sums over the threads that took part, so several threads
-/// can exceed `step` together; with one thread the sum of the stages is less than `step`. The rest is checks and the choice of substeps.
+/// Times are in seconds. `step` is the time of the whole step. The other times are sums over the threads that took
+/// part, so several threads can exceed `step` together; with one thread the sum of the stages is less than `step`. The
+/// rest is checks and the choice of substeps.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]
@@ -26,9 +27,11 @@ pub struct StepProfile {
     pub step: f64,
     /// Targets and paths of tools and blades.
     pub plan: f64,
-    /// Bodies of [`Solver::Verlet`](crate::Solver::Verlet): forces, velocities and positions, in one pass over the nodes.
+    /// Bodies of [`Solver::Verlet`](crate::Solver::Verlet): forces, velocities and positions, in one pass over the
+    /// nodes.
     pub forces: f64,
-    /// Bodies of [`Solver::Implicit`](crate::Solver::Implicit) and [`Solver::Newton`](crate::Solver::Newton): their equations, with the forces.
+    /// Bodies of [`Solver::Implicit`](crate::Solver::Implicit) and [`Solver::Newton`](crate::Solver::Newton): their
+    /// equations, with the forces.
     pub solver: f64,
     /// The search for features near a tool or near another surface.
     pub broad_phase: f64,
@@ -62,7 +65,8 @@ impl World {
     /// Turns profiling of steps on or off, from the next step on. Without profiling a step reads no clock.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory); [`Error::Unsupported`](crate::Error::Unsupported): the platform has no clock.
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory); [`Error::Unsupported`](crate::Error::Unsupported): the
+    /// platform has no clock.
     pub fn set_profiling(&mut self, on: bool) -> Result<()> {
         if !on {
             self.profile = None;

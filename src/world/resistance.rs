@@ -23,7 +23,8 @@ pub(super) struct Resistance {
     pub toughness: f64,
 }
 
-/// Where an intersection begins or ends along the path, m, and the change of the resistance there, N, and of its slope, N/m.
+/// Where an intersection begins or ends along the path, m, and the change of the resistance there, N, and of its slope,
+/// N/m.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Knot {
     at: f64,
@@ -46,11 +47,12 @@ pub(super) struct Advance {
 }
 
 impl Resistance {
-    /// Advances the proxy along a path of `distance` meters until the spring pulls no harder than the tissue resists. The work of the spring is then
-    /// the toughness times the cut. `met` has the intersections up to `reach`; `held` is the resistance at the start.
+    /// Advances the proxy along a path of `distance` meters until the spring pulls no harder than the tissue resists.
+    /// The work of the spring is then the toughness times the cut. `met` has the intersections up to `reach`; `held` is
+    /// the resistance at the start.
     ///
-    /// The strain differs from triangle to triangle, so that the measured resistance jumps. The resistance therefore follows it over the length of a
-    /// cell, and over less in solids, where an edge is in many cells.
+    /// The strain differs from triangle to triangle, so that the measured resistance jumps. The resistance therefore
+    /// follows it over the length of a cell, and over less in solids, where an edge is in many cells.
     pub fn advance(
         &self,
         (met, reach): (&[BladeContact], f64),

@@ -39,7 +39,8 @@ pub(super) fn wake_islands(tissue: &DeformableContact, bodies: &mut Slots<Body>,
     }
 }
 
-/// Puts each island to sleep whose bodies have all been at rest for long enough. `was_stepped` is true of a body that was_stepped the step.
+/// Puts each island to sleep whose bodies have all been at rest for long enough. `was_stepped` is true of a body that
+/// was_stepped the step.
 pub(super) fn put_islands_to_sleep(
     tissue: &mut DeformableContact,
     bodies: &mut Slots<Body>,

@@ -12,7 +12,8 @@ impl World {
         [self.definition.substeps, self.definition.max_substeps]
     }
 
-    /// Sets the number of substeps per step, from the next step on. With 0 a step takes as many as stability needs, up to `max_substeps`.
+    /// Sets the number of substeps per step, from the next step on. With 0 a step takes as many as stability needs, up
+    /// to `max_substeps`.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: `max_substeps` is 0. [`Error::OutOfMemory`]. After an error nothing has changed.
@@ -37,12 +38,14 @@ impl World {
         Ok(())
     }
 
-    /// Changes the settings of a body, from the next step on, and wakes it. Surfaces closer than a new thickness are pushed apart. Parts that
-    /// interpenetrate bodies with which the body now collides count as crossings, and are pushed out of closed bodies.
+    /// Changes the settings of a body, from the next step on, and wakes it. Surfaces closer than a new thickness are
+    /// pushed apart. Parts that interpenetrate bodies with which the body now collides count as crossings, and are
+    /// pushed out of closed bodies.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is out of range. [`Error::Unsupported`]: the body was cut, and its collision flags
-    /// change without both becoming 0. [`Error::OutOfMemory`]. After an error nothing has changed.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is out of range. [`Error::Unsupported`]: the body was
+    /// cut, and its collision flags change without both becoming 0. [`Error::OutOfMemory`]. After an error nothing has
+    /// changed.
     pub fn set_body_settings(&mut self, body: BodyId, settings: BodySettings) -> Result<()> {
         let content = self.bodies.get(body.0)?;
         let before = content.system().contact;

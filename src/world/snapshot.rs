@@ -29,16 +29,18 @@ const SHAPE: u64 = {
 };
 
 impl World {
-    /// The world as bytes. [`World::load`] restores a world that continues bitwise identically: with cuts and tears, contacts, attachments, sutures,
-    /// blades within a stroke, and forces applied for the next step. Ids are valid in the restored world.
+    /// The world as bytes. [`World::load`] restores a world that continues bitwise identically: with cuts and tears,
+    /// contacts, attachments, sutures, blades within a stroke, and forces applied for the next step. Ids are valid in
+    /// the restored world.
     ///
-    /// A snapshot does not contain threads, [`BodyReader`](crate::BodyReader)s and [`Embedding`](crate::Embedding)s; create them again.
-    /// The bytes can be loaded by this version of the library only. They do not depend on the number of threads. The snapshots of two worlds created alike differ
-    /// in the tag of their ids; compare states by [`World::state_hash`].
+    /// A snapshot does not contain threads, [`BodyReader`](crate::BodyReader)s and [`Embedding`](crate::Embedding)s;
+    /// create them again. The bytes can be loaded by this version of the library only. They do not depend on the number
+    /// of threads. The snapshots of two worlds created alike differ in the tag of their ids; compare states by
+    /// [`World::state_hash`].
     ///
     /// # Errors
-    /// [`Error::Unsupported`]: a [`HapticHandle`](crate::HapticHandle) moves a tool, or the world has reserved more memory than a snapshot can describe.
-    /// [`Error::OutOfMemory`].
+    /// [`Error::Unsupported`]: a [`HapticHandle`](crate::HapticHandle) moves a tool, or the world has reserved more
+    /// memory than a snapshot can describe. [`Error::OutOfMemory`].
     pub fn save(&self) -> Result<Vec<u8>> {
         let size = self.snapshot_size()?;
         let mut bytes = memory::filled(0, size)?;
@@ -72,7 +74,8 @@ impl World {
     /// Saves the world as [`World::save`] does, into `bytes` of length [`World::snapshot_size`].
     ///
     /// # Errors
-    /// [`Error::Unsupported`], as for [`World::save`]. [`Error::InvalidArgument`]: the length of `bytes` differs. After an error nothing is written.
+    /// [`Error::Unsupported`], as for [`World::save`]. [`Error::InvalidArgument`]: the length of `bytes` differs. After
+    /// an error nothing is written.
     pub fn save_into(&self, bytes: &mut [u8]) -> Result<()> {
         let size = self.snapshot_size()?;
         ensure!(
@@ -145,16 +148,17 @@ impl World {
         write_section(to, *b"TISS", |to| tissue.save(to));
     }
 
-    /// Restores a world from a snapshot, with this number of threads or the caller's job system, as in [`WorldDefinition`].
-    /// Ids of the saved world are valid in it.
+    /// Restores a world from a snapshot, with this number of threads or the caller's job system, as in
+    /// [`WorldDefinition`]. Ids of the saved world are valid in it.
     ///
-    /// It continues bitwise identically if this processor supports the SIMD level of the saved world. Otherwise [`Kernel::Best`] becomes the best level of
-    /// this processor. Bytes that are truncated, changed or not a snapshot are refused.
+    /// It continues bitwise identically if this processor supports the SIMD level of the saved world. Otherwise
+    /// [`Kernel::Best`] becomes the best level of this processor. Bytes that are truncated, changed or not a snapshot
+    /// are refused.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: the bytes are not a snapshot, or `thread_count` is too large. [`Error::Unsupported`]: the snapshot is of another version
-    /// of the library, this processor does not support the SIMD level that the world was created with, or the system cannot start so many threads.
-    /// [`Error::OutOfMemory`].
+    /// [`Error::InvalidArgument`]: the bytes are not a snapshot, or `thread_count` is too large.
+    /// [`Error::Unsupported`]: the snapshot is of another version of the library, this processor does not support the
+    /// SIMD level that the world was created with, or the system cannot start so many threads. [`Error::OutOfMemory`].
     pub fn load(bytes: &[u8], thread_count: u32, tasks: Option<RunTasks>) -> Result<Self> {
         let portable = Kernel::Portable.choose()?;
         let mut bytes = opened(bytes, SHAPE)?;

@@ -15,7 +15,8 @@ use crate::slots::Slots;
 use crate::solver::{Outcome, RESERVE, StepRequest, attempt};
 use crate::threads::{Items, Team};
 
-/// All threads share a body of at least this many nodes. For a smaller body, waiting for the threads costs more than it saves.
+/// All threads share a body of at least this many nodes. For a smaller body, waiting for the threads costs more than it
+/// saves.
 const SHARED_FROM: usize = 8192;
 
 /// The least number of nodes of all small bodies group for which other threads are woken.
@@ -26,7 +27,8 @@ impl World {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: `dt` is out of range. [`Error::Unstable`]: a body needs more substeps than
-    /// [`max_substeps`](crate::WorldDefinition::max_substeps) allows. Nothing has moved then; pending forces and poses stay pending.
+    /// [`max_substeps`](crate::WorldDefinition::max_substeps) allows. Nothing has moved then; pending forces and poses
+    /// stay pending.
     pub fn step(&mut self, dt: f32) -> Result<StepReport> {
         above_zero("dt", dt)?;
         let watch = self.begin_profile();
@@ -107,7 +109,8 @@ impl World {
         Ok(report)
     }
 
-    /// Attempts the step of every body. Returns the number of interpenetrating edges, or the report of a step that some body cannot take.
+    /// Attempts the step of every body. Returns the number of interpenetrating edges, or the report of a step that some
+    /// body cannot take.
     fn attempt(&mut self, dt: f32, team: &Team) -> std::result::Result<u32, StepReport> {
         let Self {
             definition,
@@ -271,7 +274,8 @@ impl World {
         self.end_slipped();
     }
 
-    /// True if no tool exceeds its force limit. A tool that does moves less far in the next attempt; `last` is true if that is the last one.
+    /// True if no tool exceeds its force limit. A tool that does moves less far in the next attempt; `last` is true if
+    /// that is the last one.
     fn are_within_limits(&mut self, dt: f32, last: bool) -> bool {
         let mut are_within = true;
         for (index, (_, tool)) in self.tools.iter_mut().enumerate() {
@@ -288,7 +292,8 @@ impl World {
         paths.clear();
         for (slot, tool) in self.tools.iter() {
             let mut path = ToolPath::new(slot, tool);
-            // Pinned tissue is much stiffer than the coupling to a haptic device, whose force lags one step: the tool would oscillate.
+            // Pinned tissue is much stiffer than the coupling to a haptic device, whose force lags one step: the tool
+            // would oscillate.
             path.collides_with_pinned = tool.force_limit < f32::INFINITY || !self.is_in_hand(slot);
             paths.push(path);
         }

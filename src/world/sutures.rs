@@ -29,7 +29,8 @@ pub struct SutureDefinition {
     pub length: Option<f32>,
     /// The stiffness of the thread, N/m, above 0. With the default, infinity, it does not stretch.
     pub stiffness: f32,
-    /// The force at which the suture breaks out of the tissue, N, at least 0. With 0, the default, or infinity it never breaks.
+    /// The force at which the suture breaks out of the tissue, N, at least 0. With 0, the default, or infinity it never
+    /// breaks.
     pub force_limit: f32,
 }
 
@@ -70,22 +71,27 @@ pub struct SutureReport {
 }
 
 impl World {
-    /// Creates a suture between a point of a body and a point of another body, or of the same one. The thread pulls the points together while their distance
-    /// exceeds its length, and never pushes. Each body can rotate about its point. The joined surfaces still collide.
+    /// Creates a suture between a point of a body and a point of another body, or of the same one. The thread pulls the
+    /// points together while their distance exceeds its length, and never pushes. Each body can rotate about its point.
+    /// The joined surfaces still collide.
     ///
-    /// A suture is an attachment: [`World::release`] cuts it, and [`World::attachment_force`] returns the force on `body`. It breaks in a step whose mean
-    /// force exceeds [`SutureDefinition::force_limit`], and is then listed by [`World::slipped`]. Destroying either body destroys it. The bodies
-    /// take their substeps together, as with [`World::attach_to_body`]; the stiffness does not shorten them.
+    /// A suture is an attachment: [`World::release`] cuts it, and [`World::attachment_force`] returns the force on
+    /// `body`. It breaks in a step whose mean force exceeds [`SutureDefinition::force_limit`], and is then listed by
+    /// [`World::slipped`]. Destroying either body destroys it. The bodies take their substeps together, as with
+    /// [`World::attach_to_body`]; the stiffness does not shorten them.
     ///
-    /// A thread shorter than the distance of its points is drawn in as by [`World::set_suture_length`]. Momentum is conserved. So is angular momentum, unless
-    /// the points of a very short thread pass each other. Energy grows only by drawing a thread in. A thread that becomes taut within a substep
-    /// dissipates energy, and so do oscillations along a stiff thread.
+    /// A thread shorter than the distance of its points is drawn in as by [`World::set_suture_length`]. Momentum is
+    /// conserved. So is angular momentum, unless the points of a very short thread pass each other. Energy grows only
+    /// by drawing a thread in. A thread that becomes taut within a substep dissipates energy, and so do oscillations
+    /// along a stiff thread.
     ///
-    /// The method is a compliant constraint along the thread, by implicit Euler steps (Macklin, Müller, Chentanez 2016).
+    /// The method is a compliant constraint along the thread, by implicit Euler steps (Macklin, Müller, Chentanez
+    /// 2016).
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a node or triangle does not exist, weights are negative, not finite or do not sum to 1,
-    /// the two points are the same, or a number of the definition is out of range. [`Error::OutOfMemory`]. After an error there is no suture.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a node or triangle does not exist, weights are negative, not
+    /// finite or do not sum to 1, the two points are the same, or a number of the definition is out of range.
+    /// [`Error::OutOfMemory`]. After an error there is no suture.
     pub fn suture(
         &mut self,
         body: BodyId,
@@ -114,8 +120,8 @@ impl World {
         Ok(ids[0])
     }
 
-    /// Tightens or loosens a suture: its rest length becomes `length`, m, at least 0, uniformly over the next step. It shortens by
-    /// 0.25 m/s at most, over several steps if necessary.
+    /// Tightens or loosens a suture: its rest length becomes `length`, m, at least 0, uniformly over the next step. It
+    /// shortens by 0.25 m/s at most, over several steps if necessary.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the attachment is not a suture, or `length` is out of range.

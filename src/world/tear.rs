@@ -6,7 +6,8 @@ use crate::body::{Body, TearOutcome};
 use crate::def::TearRefusal;
 
 impl World {
-    /// Tears bodies, one after the other, at the springs whose limits the step has exceeded. A tear without room is skipped.
+    /// Tears bodies, one after the other, at the springs whose limits the step has exceeded. A tear without room is
+    /// skipped.
     pub(super) fn tear(&mut self) {
         for slot in 0..self.bodies.slot_count() {
             while let Some(spring) = self.bodies.at_mut(slot).and_then(Body::next_tear) {

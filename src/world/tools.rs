@@ -93,12 +93,13 @@ impl World {
         bodies.for_each(|(_, body)| body.system_mut().contacts = None);
     }
 
-    /// Moves a tool to `position`, m, over the next step, and rotates it to `orientation`; `None` keeps its orientation. Tissue gives
-    /// way. If the force limit stops the tool short, the rest of the motion is dropped; call `set_pose` again to continue.
+    /// Moves a tool to `position`, m, over the next step, and rotates it to `orientation`; `None` keeps its
+    /// orientation. Tissue gives way. If the force limit stops the tool short, the rest of the motion is dropped; call
+    /// `set_pose` again to continue.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is not finite, a coordinate is further than 1e9 m from 0, the
-    /// orientation is zero, a [`HapticHandle`](crate::HapticHandle) moves the tool, or it is dynamic.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is not finite, a coordinate is further than 1e9 m from
+    /// 0, the orientation is zero, a [`HapticHandle`](crate::HapticHandle) moves the tool, or it is dynamic.
     pub fn set_pose(&mut self, tool: ToolId, position: Vec3, orientation: Option<Quat>) -> Result<()> {
         self.check_not_led(tool)?;
         self.check_kinematic(tool)?;
@@ -117,7 +118,8 @@ impl World {
         self.wake_near(tool)
     }
 
-    /// Sets the largest force that moves a tool, N, at least 0, from the next step on. With 0 or infinity there is no limit.
+    /// Sets the largest force that moves a tool, N, at least 0, from the next step on. With 0 or infinity there is no
+    /// limit.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: it is below 0 or not a number.
@@ -147,8 +149,9 @@ impl World {
         Ok(self.tools.get(tool.0)?.pose)
     }
 
-    /// The pose that the last step moved a tool to. It differs from the tool's pose only if a force limit has stopped the tool. Passing these poses
-    /// to [`World::set_pose`] step by step repeats the motion in another world, such as the motion by a [`HapticHandle`](crate::HapticHandle).
+    /// The pose that the last step moved a tool to. It differs from the tool's pose only if a force limit has stopped
+    /// the tool. Passing these poses to [`World::set_pose`] step by step repeats the motion in another world, such as
+    /// the motion by a [`HapticHandle`](crate::HapticHandle).
     ///
     /// # Errors
     /// [`Error::StaleId`].
@@ -165,8 +168,8 @@ impl World {
         Ok((tool.force, tool.torque))
     }
 
-    /// A bound on the error of the force on a tool from unsolved equations of the last step, N. It is 0 if only VERLET bodies press the tool. It does not
-    /// include the errors of the mesh and of the step length.
+    /// A bound on the error of the force on a tool from unsolved equations of the last step, N. It is 0 if only VERLET
+    /// bodies press the tool. It does not include the errors of the mesh and of the step length.
     ///
     /// # Errors
     /// [`Error::StaleId`].
@@ -193,8 +196,8 @@ impl World {
         Ok(bodies.flat_map(move |(id, body)| body.contacts_with(slot, BodyId(id))))
     }
 
-    /// The contacts of a body with other bodies and with itself at the end of the last step. Points belong to the other body; forces act
-    /// on this one. Sleeping bodies have no contacts.
+    /// The contacts of a body with other bodies and with itself at the end of the last step. Points belong to the other
+    /// body; forces act on this one. Sleeping bodies have no contacts.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId).
@@ -220,7 +223,8 @@ impl World {
         }))
     }
 
-    /// The bodies that a blade pressed in the last step, with the mean of their hold points and the force on the blade. They have no nodes.
+    /// The bodies that a blade pressed in the last step, with the mean of their hold points and the force on the blade.
+    /// They have no nodes.
     ///
     /// # Errors
     /// [`Error::StaleId`](crate::Error::StaleId).
@@ -237,7 +241,8 @@ impl World {
         }))
     }
 
-    /// The pairs of tool and body whose contact began or ended in the last step. Destroying a tool or body ends no contact.
+    /// The pairs of tool and body whose contact began or ended in the last step. Destroying a tool or body ends no
+    /// contact.
     pub fn contact_changes(&self) -> impl Iterator<Item = ContactChange> {
         self.bodies.iter_ids().flat_map(move |(body, content)| {
             self.tools.iter_ids().filter_map(move |(tool, _)| {
@@ -252,8 +257,8 @@ impl World {
         })
     }
 
-    /// The pairs of bodies whose contact began or ended in the last step. Sleeping bodies stay in contact. Destroying a body ends no
-    /// contact.
+    /// The pairs of bodies whose contact began or ended in the last step. Sleeping bodies stay in contact. Destroying a
+    /// body ends no contact.
     pub fn body_contact_changes(&self) -> impl Iterator<Item = BodyContactChange> {
         let pairs = self.tissue.iter().flat_map(|tissue| tissue.touching_pairs.changes());
         pairs.filter_map(|pair| {
@@ -265,7 +270,8 @@ impl World {
         })
     }
 
-    /// The pairs of blade and body whose contact began or ended in the last step. Destroying a blade or body ends no contact.
+    /// The pairs of blade and body whose contact began or ended in the last step. Destroying a blade or body ends no
+    /// contact.
     pub fn blade_contact_changes(&self) -> impl Iterator<Item = BladeContactChange> {
         self.blades.iter_ids().flat_map(|(blade, content)| {
             let changed = content

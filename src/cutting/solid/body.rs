@@ -269,8 +269,8 @@ impl CutSolid {
         Ok(())
     }
 
-    /// The next tetrahedron around an edge, through the face opposite corner `opposite`, and the corner opposite the face
-    /// after it.
+    /// The next tetrahedron around an edge, through the face opposite corner `opposite`, and the corner opposite the
+    /// face after it.
     pub(crate) fn next_around_edge(&self, tetrahedron: u32, edge: [u32; 2], opposite: u32) -> (u32, u32) {
         let across = self.tetrahedra[tetrahedron].neighbors[self.corner(tetrahedron, opposite)];
         if across == NONE {

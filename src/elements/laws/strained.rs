@@ -7,8 +7,8 @@
 //! Let s be the principal stretches, and c the products of two of them. In the principal frame, all terms but w11 have
 //! closed forms. Pairs of off-diagonal entries have the eigenvalues `2 w1 + 2 w2 s_k² ± (2 w2 c_k + wJ s_k)`. The
 //! diagonal entries have the matrix `2 w1 + 2 w2 (I1 + 2 s s^T - 3 s_k²) + wJ O + wJJ c c^T`. Here O has the
-//! off-diagonal entries s_k; it is also `(c c^T - diag c²) / J`. With `wJ = -4 w2 + r` the matrix is the sum of
-//! `2 w1 + r O + wJJ c c^T` and `2 w2 (I1 - s_k² + 2 (Oc - O))`, where Oc has the off-diagonal entries c_k. Bounds on these
+//! off-diagonal entries s_k; it is also `(c c^T - diag c²) / J`. With `wJ = -4 w2 + r` the matrix is the sum of `2 w1 +
+//! r O + wJJ c c^T` and `2 w2 (I1 - s_k² + 2 (Oc - O))`, where Oc has the off-diagonal entries c_k. Bounds on these
 //! terms serve to make the tangent positive semidefinite, and to bound its stiffness.
 
 use super::Hyperelastic;

@@ -1,8 +1,8 @@
 //! The difference of two similar byte strings.
 //!
-//! It is a list of parts. Each part has three numbers of 8 bytes: the offset of a copy in the old string, its length, and the number of new bytes
-//! that follow the copy. Then come these bytes. Snapshots differ by changed numbers and by insertions, so bytes are compared at the same
-//! offset from the start, and from the end.
+//! It is a list of parts. Each part has three numbers of 8 bytes: the offset of a copy in the old string, its length,
+//! and the number of new bytes that follow the copy. Then come these bytes. Snapshots differ by changed numbers and by
+//! insertions, so bytes are compared at the same offset from the start, and from the end.
 
 use super::append;
 use crate::base::{Error, Result, ensure};

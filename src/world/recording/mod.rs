@@ -1,7 +1,7 @@
 //! Recordings of a world in a file, and their replay: the state before each step, and the hash of the state after it.
 //!
-//! Calls between two steps are not recorded one by one, but as the difference that they make to the snapshot of the world. This
-//! covers every call, keeps ids, and records haptic handles as poses. The file format is
+//! Calls between two steps are not recorded one by one, but as the difference that they make to the snapshot of the
+//! world. This covers every call, keeps ids, and records haptic handles as poses. The file format is
 //!
 //! | bytes | what |
 //! |---|---|
@@ -95,14 +95,16 @@ fn append(to: &mut Vec<u8>, bytes: &[u8]) -> Result<()> {
 }
 
 impl World {
-    /// Records all steps from the next one on into a file, for [`World::replay`]: the first snapshot, the changes before each step, and
-    /// the hash of the state after it. An existing file is replaced.
+    /// Records all steps from the next one on into a file, for [`World::replay`]: the first snapshot, the changes
+    /// before each step, and the hash of the state after it. An existing file is replaced.
     ///
-    /// Recording takes two snapshots per step and keeps two in memory. A recorded step writes to the file and can allocate. If writing
-    /// fails or memory runs out, the recording ends and steps continue; [`World::stop_recording`] returns the error.
+    /// Recording takes two snapshots per step and keeps two in memory. A recorded step writes to the file and can
+    /// allocate. If writing fails or memory runs out, the recording ends and steps continue; [`World::stop_recording`]
+    /// returns the error.
     ///
     /// # Errors
-    /// [`Error::Io`]: the file cannot be created. [`Error::InvalidArgument`]: the world is already being recorded. [`Error::OutOfMemory`].
+    /// [`Error::Io`]: the file cannot be created. [`Error::InvalidArgument`]: the world is already being recorded.
+    /// [`Error::OutOfMemory`].
     pub fn start_recording(&mut self, path: &Path) -> Result<()> {
         ensure!(self.recorder.is_none(), "world is recorded already: stop that first");
         let mut frame = Vec::new();
@@ -124,8 +126,8 @@ impl World {
     /// Ends a recording and returns the number of steps in the file.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: the world is not being recorded. [`Error::Io`], [`Error::OutOfMemory`]: the recording ended earlier; the file
-    /// has the steps until then. In every case recording is off afterwards.
+    /// [`Error::InvalidArgument`]: the world is not being recorded. [`Error::Io`], [`Error::OutOfMemory`]: the
+    /// recording ended earlier; the file has the steps until then. In every case recording is off afterwards.
     pub fn stop_recording(&mut self) -> Result<u64> {
         let Some(mut recorder) = self.recorder.take() else {
             return Err(Error::invalid("world is not recorded"));

@@ -165,15 +165,16 @@ impl FrameReader {
 }
 
 impl World {
-    /// Replays a recording and compares the state after each step with the recorded one, until the first difference. `thread_count` is as in
-    /// [`WorldDefinition`](crate::WorldDefinition). A last step without a recorded end is replayed too.
+    /// Replays a recording and compares the state after each step with the recorded one, until the first difference.
+    /// `thread_count` is as in [`WorldDefinition`](crate::WorldDefinition). A last step without a recorded end is
+    /// replayed too.
     ///
     /// The replay is bitwise identical with the version of the library and the SIMD level of the recording.
     ///
     /// # Errors
-    /// [`Error::Io`]: the file cannot be read. [`Error::InvalidArgument`]: the file is not a recording or damaged, or `thread_count` is too large.
-    /// [`Error::Unsupported`]: the recording is of another version of the library, or this processor does not support its SIMD level.
-    /// [`Error::OutOfMemory`].
+    /// [`Error::Io`]: the file cannot be read. [`Error::InvalidArgument`]: the file is not a recording or damaged, or
+    /// `thread_count` is too large. [`Error::Unsupported`]: the recording is of another version of the library, or this
+    /// processor does not support its SIMD level. [`Error::OutOfMemory`].
     pub fn replay(path: &Path, thread_count: u32) -> Result<ReplayReport> {
         let mut frames = FrameReader::open(path)?;
         let mut report = ReplayReport::default();
@@ -185,7 +186,8 @@ impl World {
                 break;
             };
             let mut bytes = apply(&before, &begin.difference, begin.size)?;
-            // A loaded world can reserve other capacities than the recorded one, so the checksum is computed again. The first snapshot is checked as it is.
+            // A loaded world can reserve other capacities than the recorded one, so the checksum is computed again. The
+            // first snapshot is checked as it is.
             if !before.is_empty() {
                 seal(&mut bytes);
             }
