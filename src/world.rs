@@ -124,7 +124,7 @@ pub struct World {
     /// The dynamic tools in the current step.
     dynamic: Vec<DynamicTool>,
     /// Deformable contact and attachments between bodies; `None` while no body uses them.
-    pub(crate) tissue: Option<Box<DeformableContact>>,
+    pub(crate) deformable_contact: Option<Box<DeformableContact>>,
     /// The step state of coupled bodies, by slot; empty while no body can be coupled.
     coupled: Vec<Option<CoupledBody>>,
     /// The outcome of the current step for each body, by slot.
@@ -180,7 +180,7 @@ impl World {
             tools: Slots::new("tool", tag),
             paths: Vec::new(),
             dynamic: Vec::new(),
-            tissue: None,
+            deformable_contact: None,
             coupled: Vec::new(),
             outcomes: Vec::new(),
             attachments: Slots::new("attachment", tag),
@@ -236,9 +236,9 @@ impl World {
             hasher.write_u64(slot as u64);
             tool.hash_state(&mut hasher);
         }
-        if let Some(tissue) = &self.tissue {
-            tissue.attachments.hash(&mut hasher);
-            tissue.warm_start.hash(&mut hasher);
+        if let Some(deformable_contact) = &self.deformable_contact {
+            deformable_contact.attachments.hash(&mut hasher);
+            deformable_contact.warm_start.hash(&mut hasher);
         }
         for (slot, blade) in self.blades.iter() {
             hasher.write_u64(slot as u64);

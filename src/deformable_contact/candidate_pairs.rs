@@ -425,7 +425,11 @@ pub(super) mod tests {
     }
 
     fn candidate_pairs(world: &mut World) -> &mut CandidatePairs {
-        &mut world.tissue.as_mut().expect("it meets itself").candidate_pairs
+        &mut world
+            .deformable_contact
+            .as_mut()
+            .expect("it meets itself")
+            .candidate_pairs
     }
 
     #[test]

@@ -295,7 +295,11 @@ mod tests {
     use crate::{Solver, World};
 
     fn pair_contacts(world: &mut World) -> &mut Vec<PairContact> {
-        &mut world.tissue.as_mut().expect("it meets itself").pair_contacts
+        &mut world
+            .deformable_contact
+            .as_mut()
+            .expect("it meets itself")
+            .pair_contacts
     }
 
     #[test]

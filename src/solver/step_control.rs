@@ -43,7 +43,7 @@ impl System {
             return;
         };
         let state = self.state.substep();
-        let meeting = ContactInput {
+        let contact_input = ContactInput {
             kernel: self.kernel,
             tools,
             origin: self.origin,
@@ -71,7 +71,7 @@ impl System {
             profile: None,
         };
         let forces = &self.forces;
-        contacts.add_pinned_forces(meeting, substeps, |node| forces.stiffness_at(node, 0.0));
+        contacts.add_pinned_forces(contact_input, substeps, |node| forces.stiffness_at(node, 0.0));
     }
 
     /// Reports how the solver took the last step.

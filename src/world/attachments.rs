@@ -254,7 +254,7 @@ impl World {
         for place in places {
             reserve_coupling(&mut self.coupled, place)?;
         }
-        memory::get_or_box(&mut self.tissue)?.reserve_attachments(places, pairs.len())?;
+        memory::get_or_box(&mut self.deformable_contact)?.reserve_attachments(places, pairs.len())?;
         for id in bodies {
             self.bodies.get_mut(id.0)?.system_mut().reserve_tissue_attachments()?;
         }
@@ -316,7 +316,9 @@ impl World {
     }
 
     pub(super) fn point_attachments_mut(&mut self) -> Option<&mut PointAttachments> {
-        self.tissue.as_mut().map(|tissue| &mut tissue.attachments)
+        self.deformable_contact
+            .as_mut()
+            .map(|deformable_contact| &mut deformable_contact.attachments)
     }
 
     /// Refuses a body that is attached to another.
@@ -324,9 +326,9 @@ impl World {
         let place = self.bodies.slot(body.0)?;
         ensure!(
             !self
-                .tissue
+                .deformable_contact
                 .as_ref()
-                .is_some_and(|tissue| tissue.attachments.has_body(place)),
+                .is_some_and(|deformable_contact| deformable_contact.attachments.has_body(place)),
             "body is attached to a body: what holds it there moves with that one"
         );
         Ok(())
@@ -338,8 +340,10 @@ impl World {
     /// [`Error::StaleId`]: it was already released or broken, or a body or the tool was destroyed.
     pub fn release(&mut self, attachment: AttachmentId) -> Result<()> {
         let Attachment { body, holder } = self.attachments.remove(attachment.0)?;
-        match (holder, &mut self.tissue) {
-            (Holder::Body(_), Some(tissue)) => tissue.attachments.remove(&mut self.bodies, attachment.0),
+        match (holder, &mut self.deformable_contact) {
+            (Holder::Body(_), Some(deformable_contact)) => {
+                deformable_contact.attachments.remove(&mut self.bodies, attachment.0)
+            }
             _ => self.bodies.get_mut(body.0)?.system_mut().detach(attachment.0),
         }
         Ok(())
@@ -352,8 +356,8 @@ impl World {
     /// [`Error::StaleId`].
     pub fn attachment_force(&self, attachment: AttachmentId) -> Result<Vec3> {
         let Attachment { body, holder } = self.attachments.get(attachment.0)?;
-        if let (Holder::Body(_), Some(tissue)) = (holder, &self.tissue) {
-            return Ok(tissue.attachments.force_of(attachment.0));
+        if let (Holder::Body(_), Some(deformable_contact)) = (holder, &self.deformable_contact) {
+            return Ok(deformable_contact.attachments.force_of(attachment.0));
         }
         let body = self.bodies.get(body.0)?;
         let grasp = body
@@ -378,8 +382,8 @@ impl World {
                 }
             }
         }
-        if let Some(tissue) = &self.tissue {
-            tissue
+        if let Some(deformable_contact) = &self.deformable_contact {
+            deformable_contact
                 .attachments
                 .visit_points(&self.bodies, |ends| visit(ends.map(|end| end.as_vec3())));
         }
@@ -437,8 +441,8 @@ impl World {
                 body.system_mut().break_overloaded(&mut end);
             }
         }
-        if let Some(tissue) = &mut self.tissue {
-            tissue.attachments.remove_broken(&mut self.bodies, end);
+        if let Some(deformable_contact) = &mut self.deformable_contact {
+            deformable_contact.attachments.remove_broken(&mut self.bodies, end);
         }
     }
 }

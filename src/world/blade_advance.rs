@@ -144,9 +144,13 @@ impl World {
 
     /// Finds the holds of a proxy, and its position that follows from them.
     fn find_holds(&self, proxy: &Proxy, approach: &mut Approach) {
-        let Some(tissue) = &self.tissue else { return };
+        let Some(deformable_contact) = &self.deformable_contact else {
+            return;
+        };
         let points = proxy.holds.iter().filter_map(|hold| {
-            let position = tissue.attachments.first_point_position(&self.bodies, hold.id)?;
+            let position = deformable_contact
+                .attachments
+                .first_point_position(&self.bodies, hold.id)?;
             Some(EdgePoint::next_to(position - hold.offset, approach.end))
         });
         approach.count = approach

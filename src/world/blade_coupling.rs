@@ -23,9 +23,9 @@ impl World {
         };
         body.system_mut().reserve_tissue_attachments()?;
         reserve_coupling(&mut self.coupled, slot)?;
-        let tissue = memory::get_or_box(&mut self.tissue)?;
-        tissue.attachments.reserve_rebinding(slot)?;
-        tissue.reserve_attachments([slot; 2], count)
+        let deformable_contact = memory::get_or_box(&mut self.deformable_contact)?;
+        deformable_contact.attachments.reserve_rebinding(slot)?;
+        deformable_contact.reserve_attachments([slot; 2], count)
     }
 
     /// Holds a proxy at these points, or at its previous holds if there are none. All holds together act as a spring of
@@ -55,11 +55,14 @@ impl World {
         }
         let Self {
             bodies,
-            tissue,
+            deformable_contact,
             holds_made,
             ..
         } = self;
-        let Some(point_attachments) = tissue.as_mut().map(|tissue| &mut tissue.attachments) else {
+        let Some(point_attachments) = deformable_contact
+            .as_mut()
+            .map(|deformable_contact| &mut deformable_contact.attachments)
+        else {
             return Ok(());
         };
         if count > 0 {
@@ -101,10 +104,14 @@ impl World {
 
     /// Removes all holds of a proxy: no tissue resists any more.
     pub(super) fn remove_holds(&mut self, proxy: &mut Proxy) {
-        let Self { bodies, tissue, .. } = self;
+        let Self {
+            bodies,
+            deformable_contact,
+            ..
+        } = self;
         for hold in proxy.holds.drain(..) {
-            if let Some(tissue) = tissue {
-                tissue.attachments.remove(bodies, hold.id);
+            if let Some(deformable_contact) = deformable_contact {
+                deformable_contact.attachments.remove(bodies, hold.id);
             }
         }
         proxy.last = None;

@@ -127,7 +127,11 @@ impl World {
 
     /// Sets the motion of all holds over the next step.
     pub(super) fn move_holds(&mut self) {
-        let Some(point_attachments) = self.tissue.as_mut().map(|tissue| &mut tissue.attachments) else {
+        let Some(point_attachments) = self
+            .deformable_contact
+            .as_mut()
+            .map(|deformable_contact| &mut deformable_contact.attachments)
+        else {
             return;
         };
         for (_, blade) in self.blades.iter_mut() {
@@ -188,7 +192,10 @@ impl World {
         for proxy in &mut blade.proxies {
             (proxy.force_on_blade, proxy.force_point) = (DVec3::ZERO, DVec3::ZERO);
             for hold in &proxy.holds {
-                let point_attachments = self.tissue.as_ref().map(|tissue| &tissue.attachments);
+                let point_attachments = self
+                    .deformable_contact
+                    .as_ref()
+                    .map(|deformable_contact| &deformable_contact.attachments);
                 let on_tissue = point_attachments
                     .map_or(Vec3::ZERO, |point_attachments| point_attachments.force_of(hold.id))
                     .as_dvec3();

@@ -53,7 +53,7 @@ impl World {
         }
         body.system_mut().reserve_contact_history()?;
         reserve_coupling(&mut self.coupled, slot)?;
-        memory::get_or_box(&mut self.tissue)?.add_body(slot, body.system())
+        memory::get_or_box(&mut self.deformable_contact)?.add_body(slot, body.system())
     }
 
     /// Removes a body and its attachments.
@@ -63,8 +63,8 @@ impl World {
     pub fn destroy_body(&mut self, body: BodyId) -> Result<()> {
         let slot = self.bodies.slot(body.0)?;
         self.bodies.remove(body.0)?;
-        if let Some(tissue) = &mut self.tissue {
-            tissue.remove_body(&mut self.bodies, slot);
+        if let Some(deformable_contact) = &mut self.deformable_contact {
+            deformable_contact.remove_body(&mut self.bodies, slot);
         }
         self.forget_attachments_of(body);
         self.remove_from_blades(body);
@@ -133,7 +133,10 @@ impl World {
         let mut moved = crate::base::memory::reserved(carried.len())?;
         let content = self.bodies.get_mut(body.0)?;
         let before = content.topology_version();
-        let skin = self.tissue.as_mut().and_then(|tissue| tissue.surface_mut(slot));
+        let skin = self
+            .deformable_contact
+            .as_mut()
+            .and_then(|deformable_contact| deformable_contact.surface_mut(slot));
         let changed = change(content, skin)?;
         if content.topology_version() == before {
             return Ok(changed);
@@ -160,11 +163,11 @@ impl World {
     fn attached_points(&mut self, body: BodyId, slot: usize) -> Result<Vec<(Anchor, Option<MaterialPoint>)>> {
         let mut points = Vec::new();
         let content = self.bodies.get(body.0)?;
-        let Some(tissue) = &mut self.tissue else {
+        let Some(deformable_contact) = &mut self.deformable_contact else {
             return Ok(points);
         };
-        tissue.attachments.reserve_rebinding(slot)?;
-        for bound in tissue.attachments.points_of(slot) {
+        deformable_contact.attachments.reserve_rebinding(slot)?;
+        for bound in deformable_contact.attachments.points_of(slot) {
             let Some(anchor) = bound.anchor else { continue };
             let at = match &anchor {
                 Anchor::Point(point) => content.material_point(point),

@@ -96,12 +96,12 @@ impl World {
             ..before
         };
         content.wake();
-        if let Some(tissue) = self
-            .tissue
+        if let Some(deformable_contact) = self
+            .deformable_contact
             .as_mut()
             .filter(|_| !content.system().collides_with_tissue())
         {
-            tissue.remove_surface(slot);
+            deformable_contact.remove_surface(slot);
         }
         let joined = self.join_tissue(body.0);
         if joined.is_err() {

@@ -114,7 +114,7 @@ impl World {
             tools,
             paths: _,
             dynamic: _,
-            tissue,
+            deformable_contact,
             coupled,
             outcomes: _,
             attachments,
@@ -145,7 +145,7 @@ impl World {
         write_section(to, *b"TOOL", |to| tools.save(to));
         write_section(to, *b"ATTA", |to| attachments.save(to));
         write_section(to, *b"BLAD", |to| blades.save(to));
-        write_section(to, *b"TISS", |to| tissue.save(to));
+        write_section(to, *b"TISS", |to| deformable_contact.save(to));
     }
 
     /// Restores a world from a snapshot, with this number of threads or the caller's job system, as in
@@ -196,7 +196,7 @@ impl World {
             Slots::load("attachment", tag, from)
         })?;
         world.blades = read_section(&mut bytes, *b"BLAD", kernel, |from| Slots::load("blade", tag, from))?;
-        world.tissue = read_section(&mut bytes, *b"TISS", kernel, Saved::load)?;
+        world.deformable_contact = read_section(&mut bytes, *b"TISS", kernel, Saved::load)?;
         ensure!(
             bytes.is_empty(),
             "bytes are no world: something is behind its last section"

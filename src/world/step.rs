@@ -118,7 +118,7 @@ impl World {
             paths,
             dynamic,
             outcomes,
-            tissue,
+            deformable_contact,
             coupled,
             profile,
             work,
@@ -146,15 +146,15 @@ impl World {
             neighbor_speed: None,
             profile,
         };
-        let Some(tissue) = tissue else {
+        let Some(deformable_contact) = deformable_contact else {
             attempt_bodies(bodies, outcomes, &request, |_| true, team);
             return refuse_unstable(bodies, outcomes).map(|()| 0);
         };
         let watch = Stopwatch::start(profile);
-        wake_groups_near_tools(tissue, bodies, request.tools);
-        tissue.plan(bodies, dt);
+        wake_groups_near_tools(deformable_contact, bodies, request.tools);
+        deformable_contact.plan(bodies, dt);
         watch.stop(profile, Stage::BroadPhase);
-        let islands = &tissue.islands;
+        let islands = &deformable_contact.islands;
         attempt_bodies(
             bodies,
             outcomes,
@@ -164,31 +164,31 @@ impl World {
         );
         loop {
             let watch = Stopwatch::start(profile);
-            wake_islands(tissue, bodies, outcomes);
-            tissue.find_crossings(bodies, false);
+            wake_islands(deformable_contact, bodies, outcomes);
+            deformable_contact.find_crossings(bodies, false);
             watch.stop(profile, Stage::NarrowPhase);
             let mut group = CoupledGroup {
-                contact: tissue,
+                contact: deformable_contact,
                 coupled_bodies: coupled,
                 request: &request,
                 team,
             };
             group.attempt(bodies, outcomes);
-            if !tissue.replan(bodies, dt) {
+            if !deformable_contact.replan(bodies, dt) {
                 break;
             }
         }
         refuse_unstable(bodies, outcomes)?;
         let watch = Stopwatch::start(profile);
-        let crossings = tissue.find_crossings(bodies, true);
+        let crossings = deformable_contact.find_crossings(bodies, true);
         watch.stop(profile, Stage::NarrowPhase);
         Ok(crossings)
     }
 
     /// The body with most interpenetrating edges, if there are any.
     fn most_crossing(&self, crossings: u32) -> Option<BodyId> {
-        let tissue = self.tissue.as_ref().filter(|_| crossings > 0)?;
-        self.bodies.id_at(tissue.most_crossing()?).map(BodyId)
+        let deformable_contact = self.deformable_contact.as_ref().filter(|_| crossings > 0)?;
+        self.bodies.id_at(deformable_contact.most_crossing()?).map(BodyId)
     }
 
     /// Applies the forces of pinned tissue to the tools that have moved into it in the attempted step.
@@ -234,8 +234,8 @@ impl World {
 
     /// Keeps the contact events of the last step after a refused one.
     fn keep_touching(&mut self) {
-        if let Some(tissue) = &mut self.tissue {
-            tissue.touching_pairs.keep_previous();
+        if let Some(deformable_contact) = &mut self.deformable_contact {
+            deformable_contact.touching_pairs.keep_previous();
         }
         for proxy in self.blades.iter_mut().flat_map(|(_, blade)| &mut blade.proxies) {
             proxy.touched = [proxy.touched[0]; 2];
@@ -247,7 +247,10 @@ impl World {
         self.clock.tick(dt);
         self.bodies.iter_mut().for_each(|(_, body)| body.set_clock(self.clock));
         let motion = (&*self.paths, self.definition.gravity);
-        let islands = self.tissue.as_ref().map(|tissue| &tissue.islands);
+        let islands = self
+            .deformable_contact
+            .as_ref()
+            .map(|deformable_contact| &deformable_contact.islands);
         let is_uncoupled = |body_index: usize| islands.is_none_or(|islands| !islands.contains(body_index));
         commit_bodies(&mut self.bodies, &self.outcomes, motion, (dt, is_uncoupled), team);
         for (index, (_, tool)) in self.tools.iter_mut().enumerate() {
@@ -261,15 +264,15 @@ impl World {
             tool.limit_search = None;
         }
         self.end_flights(dt);
-        if let Some(tissue) = &mut self.tissue {
-            tissue.attachments.commit(&self.outcomes, dt);
-            tissue.warm_start.commit();
-            tissue.contact_reports.commit();
+        if let Some(deformable_contact) = &mut self.deformable_contact {
+            deformable_contact.attachments.commit(&self.outcomes, dt);
+            deformable_contact.warm_start.commit();
+            deformable_contact.contact_reports.commit();
             let is_asleep = |body_index: usize| matches!(self.outcomes.get(body_index), Some(Some(Outcome::Asleep)));
-            tissue.touching_pairs.commit(is_asleep);
+            deformable_contact.touching_pairs.commit(is_asleep);
             let was_taken =
                 |body_index: usize| matches!(self.outcomes.get(body_index), Some(Some(Outcome::Done { .. })));
-            put_islands_to_sleep(tissue, &mut self.bodies, was_taken);
+            put_islands_to_sleep(deformable_contact, &mut self.bodies, was_taken);
         }
         self.end_slipped();
     }

@@ -141,7 +141,10 @@ impl World {
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the attachment is not a suture.
     pub fn suture_report(&self, suture: AttachmentId) -> Result<SutureReport> {
         self.attachments.get(suture.0)?;
-        let point_attachments = self.tissue.as_ref().map(|tissue| &tissue.attachments);
+        let point_attachments = self
+            .deformable_contact
+            .as_ref()
+            .map(|deformable_contact| &deformable_contact.attachments);
         let found = point_attachments.and_then(|point_attachments| point_attachments.thread(&self.bodies, suture.0));
         let (thread, distance) = found.ok_or_else(no_suture)?;
         Ok(SutureReport {

@@ -203,7 +203,10 @@ impl World {
     /// [`Error::StaleId`](crate::Error::StaleId).
     pub fn tissue_contacts(&self, body: BodyId) -> Result<impl Iterator<Item = Contact>> {
         let slot = self.bodies.slot(body.0)?;
-        let touches = self.tissue.iter().flat_map(|tissue| tissue.contact_reports.iter());
+        let touches = self
+            .deformable_contact
+            .iter()
+            .flat_map(|deformable_contact| deformable_contact.contact_reports.iter());
         Ok(touches.flat_map(move |touch| {
             let sides = [(0, 1.0), (1, -1.0)].into_iter();
             sides.filter_map(move |(own, sign)| {
@@ -260,7 +263,10 @@ impl World {
     /// The pairs of bodies whose contact began or ended in the last step. Sleeping bodies stay in contact. Destroying a
     /// body ends no contact.
     pub fn body_contact_changes(&self) -> impl Iterator<Item = BodyContactChange> {
-        let pairs = self.tissue.iter().flat_map(|tissue| tissue.touching_pairs.changes());
+        let pairs = self
+            .deformable_contact
+            .iter()
+            .flat_map(|deformable_contact| deformable_contact.touching_pairs.changes());
         pairs.filter_map(|pair| {
             let [one, other] = pair.bodies.map(|slot| self.bodies.id_at(slot).map(BodyId));
             Some(BodyContactChange {

@@ -97,9 +97,9 @@ impl Substep<'_> {
         let per_mass = 1.0 / (self.step * self.step);
         let is_long = self.is_long();
         let mut are_predicted = true;
-        self.with_contacts(body, mean_velocities, |contacts, meeting, stiffness_of| {
-            let inverse_masses = meeting.mobility.inverse_masses;
-            are_predicted = contacts.predict_contacts(meeting, is_long, |node| {
+        self.with_contacts(body, mean_velocities, |contacts, contact_input, stiffness_of| {
+            let inverse_masses = contact_input.mobility.inverse_masses;
+            are_predicted = contacts.predict_contacts(contact_input, is_long, |node| {
                 if inverse_masses[node] == 0.0 {
                     return f32::INFINITY;
                 }
@@ -213,7 +213,7 @@ impl Substep<'_> {
             .map(|tile| tile_stats(body.kernel, velocities.slices(tile_nodes(tile, node_count)), None).velocities)
             .fold(Aabb::EMPTY, |bounds, other| bounds.and(&other));
         let state = body.state.substep();
-        let meeting = ContactInput {
+        let contact_input = ContactInput {
             kernel: body.kernel,
             tools: self.request.tools,
             origin: body.origin,
@@ -241,7 +241,7 @@ impl Substep<'_> {
             profile,
         };
         let (forces, masses) = (&body.forces, &body.masses);
-        act(contacts, meeting, &|node, per_mass| {
+        act(contacts, contact_input, &|node, per_mass| {
             forces.stiffness_at(node, (f64::from(masses[node]) * per_mass) as f32)
         });
         watch.subtract_from(profile, Stage::Solver);
@@ -256,11 +256,11 @@ impl Substep<'_> {
         let (per_step, step) = ((1.0 / self.step) as f32, self.step as f32);
         scaled(&implicit.solution.next().displacements, per_step, mean_velocities);
         let may_drop_holds = self.is_forced && self.is_long();
-        self.with_contacts(body, mean_velocities, |contacts, meeting, _| {
+        self.with_contacts(body, mean_velocities, |contacts, contact_input, _| {
             if may_drop_holds {
-                contacts.discard_uncertain_contacts(&meeting);
+                contacts.discard_uncertain_contacts(&contact_input);
             }
-            contacts.resolve(meeting);
+            contacts.resolve(contact_input);
         });
         let Some(contacts) = &body.contacts else {
             return SubstepOutcome::Accepted;
