@@ -1,12 +1,12 @@
-// sinew for C++17: what sinew.h has, with owners that end what they own, values returned, and errors thrown. Nothing is allocated here.
+// C++17 wrapper of sinew.h: RAII owners, return values and exceptions. It allocates nothing itself.
 //
-// - Owners (world, mesh, reader, haptic, detector, embedding) are moved, not copied. Moved from, they are empty: every call on them fails.
-// - body, tool, blade and attachment are ids with the world they belong to: copied freely, ended by their world or by destroy(). They
-//   must not be used after the world's end. After their own they are refused, as in C.
-// - Threads, units, and how long views live: as sinew/base.h says. Any number of threads may call functions that are const here at the
-//   same time. Other functions, and constructors of reader and haptic, need exclusive access to the world.
-// - Errors: sinew::error. Programs without exceptions define SINEW_ON_ERROR(status, message), before they include this, as
-//   something that does not return. Where a status is an answer like any other, call the C function with get() or with world() and id.
+// - Owners (world, mesh, reader, haptic, detector, embedding) are move-only. After a move they are empty, and every call on them fails.
+// - body, tool, blade and attachment are copyable ids with a pointer to their world. The world or destroy() destroys the object. Do not
+//   use an id after the world was destroyed. The id of a destroyed object is refused, as in C.
+// - Threads, units and lifetimes of views are as in sinew/base.h. Several threads can call const functions at the same
+//   time. Other functions, and constructors of reader and haptic, need exclusive access to the world.
+// - Errors throw sinew::error. Programs without exceptions define SINEW_ON_ERROR(status, message) before they include this file; it
+//   must not return. To handle a status as a value, call the C function with get(), or with world() and id.
 #ifndef SINEW_HPP
 #define SINEW_HPP
 
@@ -27,7 +27,7 @@ using vec3 = std::array<float, 3>;
 using quat = std::array<float, 4>; // x y z w
 constexpr float no_limit = std::numeric_limits<float>::infinity();
 
-// Why a call was refused, in the library's words, kept within.
+// An error with the message of the library, stored inside.
 class error : public std::exception {
 public:
   error(sinew_status status, const char *message) noexcept : status_(status) {
@@ -62,7 +62,7 @@ inline void expect(bool fits, const char *otherwise) {
   if (!fits) fail(SINEW_STATUS_INVALID_ARGUMENT, otherwise);
 }
 
-// A pointer and a count; from arrays and from whatever has data() and size().
+// A pointer and a count; converts from arrays and from types with data() and size().
 template <class T> class span {
 public:
   constexpr span() = default;
@@ -80,7 +80,7 @@ private:
   std::size_t size_ = 0;
 };
 
-// Borrowed vectors with any stride.
+// Borrowed vectors with a stride.
 template <class View> struct vectors : View {
   std::size_t size() const { return this->count; }
   auto operator[](std::size_t i) const {
@@ -90,7 +90,7 @@ template <class View> struct vectors : View {
 using vec3_view = vectors<sinew_vec3_view>;
 using dvec3_view = vectors<sinew_dvec3_view>;
 
-// A definition with its defaults, to be changed and given to what it defines.
+// A definition, initialized with its defaults.
 template <class Def, sinew_status (*Init)(Def *, std::size_t)> struct definition : Def {
   definition() : Def() { check(Init(this, sizeof(Def))); }
 };
@@ -107,7 +107,7 @@ using picture_def = definition<sinew_picture_def, sinew_picture_def_init>;
 using detector_def = definition<sinew_detector_def, sinew_detector_def_init>;
 using embedding_def = definition<sinew_embedding_def, sinew_embedding_def_init>;
 
-// What the library fills in, which must know how large it is.
+// A struct that the library fills; its size is set.
 template <class Report> Report sized() {
   Report report{};
   report.struct_size = sizeof report;
@@ -132,7 +132,7 @@ private:
   Raw *raw_ = nullptr;
 };
 
-// Something of a world, by its id.
+// An object of a world, by its id.
 template <class Id> class part {
 public:
   part() = default;
@@ -177,18 +177,18 @@ public:
   static mesh organ(float length, float spacing) {
     return made([&](auto out) { return sinew_mesh_create_organ(length, spacing, out); });
   }
-  // From memory, welded and cleaned.
+  // Copies a mesh from memory, welded and cleaned.
   static mesh create(span<const float> positions, span<const std::uint32_t> triangles, span<const std::uint32_t> tetrahedra = {}) {
     return made([&](auto out) {
       return sinew_mesh_create(positions.data(), positions.size() / 3, triangles.data(), triangles.size() / 3, tetrahedra.data(),
                                tetrahedra.size() / 4, out);
     });
   }
-  // Of tetrahedra that fill the closed surface of this mesh.
+  // Fills the closed surface of this mesh with tetrahedra.
   mesh filled(float spacing) const {
     return made([&](auto out) { return sinew_mesh_create_filled(get(), spacing, out); });
   }
-  // Gives a definition the nodes and elements of this mesh, which must outlive its use.
+  // Sets the nodes and elements of a definition to those of this mesh, which must outlive its use.
   void set(body_def &def) const { check(sinew_body_def_set_mesh(&def, get())); }
   sinew_mesh_view view() const {
     auto out = sized<sinew_mesh_view>();
@@ -211,7 +211,7 @@ public:
     vec3 out{};
     return check(sinew_attachment_get_force(world(), id, out.data())), out;
   }
-  // Of a suture:
+  // For sutures:
   void set_length(float length) { check(sinew_suture_set_length(world(), id, length)); }
   sinew_suture_report suture_report() const {
     auto out = sized<sinew_suture_report>();
@@ -341,7 +341,7 @@ public:
   void set_user_data(void *data) { check(sinew_body_set_user_data(world(), id, data)); }
   void *user_data() const { return viewed<void *>(sinew_body_get_user_data); }
 
-  // Turned about the pivot, then moved; without a pivot about the middle of its box.
+  // Rotates about the pivot, then translates; the default pivot is the center of the bounding box.
   void transform(vec3 translation, quat rotation = {0, 0, 0, 1}, const vec3 *pivot = nullptr) {
     check(sinew_body_transform(world(), id, translation.data(), rotation.data(), pivot ? pivot->data() : nullptr));
   }
@@ -349,7 +349,7 @@ public:
     box out{};
     return check(sinew_body_get_bounds(world(), id, out.min.data(), out.max.data())), out;
   }
-  // Into 3 floats for each node.
+  // Writes 3 floats for each node.
   void normals(span<float> into) const {
     expect(into.size() % 3 == 0, "3 floats for each node");
     check(sinew_body_get_normals(world(), id, into.data(), into.size() / 3));
@@ -392,7 +392,7 @@ public:
     std::size_t count = 0;
     return check(sinew_body_unpin_box(world(), id, min.data(), max.data(), &count)), count;
   }
-  // Into 3 floats for each node.
+  // Writes 3 floats for each node.
   void pin_forces(span<float> into) const {
     expect(into.size() % 3 == 0, "3 floats for each node");
     check(sinew_body_get_pin_forces(world(), id, into.data(), into.size() / 3));
@@ -429,7 +429,7 @@ public:
     check(sinew_body_add_spring(world(), id, a, b, stiffness, rest_length));
   }
   void remove_spring(std::uint32_t a, std::uint32_t b) { check(sinew_body_remove_spring(world(), id, a, b)); }
-  // Springs between pairs of two nodes each. Of two arrays of numbers one may be left out: it is not written, or stays.
+  // Springs are pairs of two nodes each. One of two arrays of numbers can be empty: it is then not written, or not changed.
   void spring_pairs(span<std::uint32_t> into) const { // 2 for each spring of the storage report
     check(sinew_body_get_spring_pairs(world(), id, into.data(), halves(nodes(into.data(), into.size()))));
   }
@@ -449,7 +449,7 @@ public:
     const auto count = halves(pairs, strains.size(), forces.size());
     check(sinew_body_set_tear_limits(world(), id, pairs.data(), strains.data(), forces.data(), count));
   }
-  // Against these lengths, or where they are left out against those of the springs.
+  // Relative to these rest lengths, or to those of the springs if they are empty.
   void spring_strains(nodes pairs, span<float> into, floats rest_lengths = {}) const {
     const auto count = halves(pairs, into.size(), rest_lengths.size());
     check(sinew_body_get_spring_strains(world(), id, pairs.data(), rest_lengths.data(), count, into.data()));
@@ -507,7 +507,7 @@ public:
     sinew_attachment_id made{};
     return attach(def, {&made, 1}), attachment(world(), made);
   }
-  // An attachment for each node, whose ids `out` has room for: sinew::attachment(world(), id).
+  // Creates an attachment for each node and writes their ids to `out`; use them as sinew::attachment(world(), id).
   void attach(nodes held, const tool &to, span<sinew_attachment_id> out, float force_limit = no_limit) {
     attachment_def def;
     def.nodes = held.data(), def.count = held.size(), def.tool = to.id, def.force_limit = force_limit;
@@ -520,7 +520,7 @@ public:
     def.force_limit = force_limit;
     attach(def, out);
   }
-  // Nodes or points, to a tool or to a body, as the definition says; its body is this one.
+  // Attaches nodes or points of this body to a tool or a body, by a definition.
   void attach(attachment_def def, span<sinew_attachment_id> out) {
     expect(out.size() == def.count, "out: as many as there are attachments");
     def.body = id;
@@ -530,7 +530,7 @@ public:
                     const suture_def &def = {}) {
     return suture(point(id, triangle, weights), point(other.id, other_triangle, other_weights), def);
   }
-  // As rays and queries return them.
+  // For points that rays and queries return.
   attachment suture(const sinew_surface_point &one, const sinew_surface_point &other, const suture_def &def = {}) {
     sinew_attachment_id made{};
     return check(sinew_suture_create(world(), &one, &other, &def, &made)), attachment(world(), made);
@@ -541,7 +541,7 @@ private:
     expect(given.size() % 3 == 0, "3 floats for each node");
     return given.size() / 3;
   }
-  // How many pairs there are, with as many numbers or none in each array.
+  // The number of pairs; each array has as many numbers, or none.
   std::size_t halves(nodes pairs, std::size_t first = 0, std::size_t second = 0) const {
     const std::size_t count = pairs.size() / 2;
     expect(pairs.size() % 2 == 0, "pairs: 2 nodes each");
@@ -564,7 +564,7 @@ private:
   }
 };
 
-// A body as another thread sees it.
+// Access to a body from another thread.
 class reader : public owner<sinew_reader, sinew_reader_destroy> {
 public:
   reader() = default;
@@ -581,7 +581,7 @@ private:
   }
 };
 
-// A fine surface that goes with a coarse body.
+// A fine render surface bound to a coarse body.
 class embedding : public owner<sinew_embedding, sinew_embedding_destroy> {
 public:
   using owner::owner;
@@ -610,7 +610,7 @@ private:
   }
 };
 
-// The device's side of a tool, for the device's thread.
+// The device thread's access to a tool.
 class haptic : public owner<sinew_haptic, sinew_haptic_destroy> {
 public:
   haptic() = default;
@@ -633,7 +633,7 @@ private:
   }
 };
 
-// What two bodies have in common.
+// The overlap of two bodies.
 class detector : public owner<sinew_detector, sinew_detector_destroy> {
 public:
   detector() = default;
@@ -735,10 +735,10 @@ public:
     std::size_t out = 0;
     return check(sinew_world_get_snapshot_size(get(), &out)), out;
   }
-  // Into as many bytes as snapshot_size.
+  // Writes snapshot_size() bytes.
   void save_snapshot(span<std::uint8_t> bytes) const { check(sinew_world_save_snapshot(get(), bytes.data(), bytes.size())); }
-  // Bodies and tools of it: sinew::body(world.get(), id).
-  // Of the definition its threads apply.
+  // Its bodies and tools are sinew::body(world.get(), id) and so on.
+  // Uses the threads of the definition.
   static world load_snapshot(span<const std::uint8_t> bytes, const world_def &def = {}) {
     sinew_world *raw = nullptr;
     return check((sinew_world_load_snapshot)(bytes.data(), bytes.size(), &def, &raw)), world(raw); // no macro of compat_0_1.h
@@ -800,7 +800,7 @@ private:
   }
 };
 
-// Messages up to a level, from all threads; nullptr: none.
+// Sets the log callback, for messages up to a level from all threads; nullptr turns it off.
 inline void set_log_callback(std::uint32_t level, sinew_log callback, void *context = nullptr) {
   check(sinew_set_log_callback(level, callback, context));
 }
@@ -814,7 +814,7 @@ inline log_callback get_log_callback() {
   return check(sinew_get_log_callback(&out.level, &out.callback, &out.context)), out;
 }
 
-// All memory of the library, in a build that has it; before any other call.
+// Sets the allocator of the library, in a build with that feature; call it before any other function.
 struct allocator {
   sinew_alloc alloc;
   sinew_dealloc dealloc;
@@ -835,7 +835,7 @@ inline sinew_replay_report replay(const char *path, std::uint32_t thread_count =
 inline std::uint32_t version() { return sinew_version(); } // of the library; SINEW_VERSION is that of the header
 inline const char *status_name(sinew_status status) { return sinew_status_name(status); }
 
-// At each node the mean over the elements that have it, of so many corners each.
+// For each node the mean over its elements, which have this number of corners.
 inline void average_to_nodes(span<const std::uint32_t> elements, std::uint32_t corners, span<const float> values, span<float> into) {
   expect(elements.size() == corners * values.size(), "values: one for each element");
   check(sinew_util_average_to_nodes(elements.data(), corners, values.data(), values.size(), into.data(), into.size()));

@@ -21,10 +21,10 @@ const CHANGE: f64 = 0.02;
 /// The fraction of the allowed change that is used, because of rounding.
 const SAFETY: f64 = 0.99;
 
-/// The largest rotation interval proxy and device, rad. The local model is valid for small rotations.
+/// The largest rotation between proxy and device, rad. The local model is valid for small rotations.
 const MAX_ROTATION: f64 = 1.0;
 
-/// The longest time interval ticks, s.
+/// The longest time between ticks, s.
 const MAX_INTERVAL: f32 = 1.0;
 
 /// The pose of the proxy, sent to the simulation thread.
@@ -87,8 +87,8 @@ pub struct HapticTick {
 ///
 /// A spring and a damper couple the device to a proxy of the tool (virtual coupling: Colgate, Stanley, Brown 1995). The
 /// massless proxy is where the spring and the tissue balance. A local model from the last step stands for the tissue:
-/// the wrench on the tool and its change with the tool's motion, learned from the last motions. The difference interval
-/// two models fades in over the time interval them. A tick changes the force by at most `stiffness * displacement +
+/// the wrench on the tool and its change with the tool's motion, learned from the last motions. The difference between
+/// two models fades in over the time between them. A tick changes the force by at most `stiffness * displacement +
 /// damping * change of velocity`, plus 0.02 N or 2 %.
 ///
 /// Dropping the handle ends the coupling.
@@ -118,7 +118,7 @@ pub struct HapticHandle {
     /// The remaining difference to earlier models, and the time in which it fades, s.
     remainder: Vector6,
     fades_in: f64,
-    /// The time interval the last two models, s.
+    /// The time between the last two models, s.
     interval: f64,
     /// The wrench on the device before limits.
     unlimited: Vector6,
@@ -162,7 +162,7 @@ impl HapticHandle {
         }
     }
 
-    /// Returns the force on the device until the next tick, on_device its pose and velocity, m/s and rad/s, world axes,
+    /// Returns the force on the device until the next tick, given its pose and velocity, m/s and rad/s, world axes,
     /// `dt` seconds after the last tick. With `None` the velocity is computed from the displacement since the last
     /// tick.
     ///

@@ -56,7 +56,7 @@ pub(crate) struct Cone {
     pub axis: DVec3,
     /// The tangent of the largest angle between a force and the axis.
     pub max_tangent: f64,
-    /// The largest torque relative to the force along the axis, at the lever max_torque_ratio.
+    /// The largest torque relative to the force along the axis, at the lever arm.
     pub max_torque_ratio: f64,
 }
 
@@ -104,7 +104,7 @@ impl WrenchModel {
         }
     }
 
-    /// The motion from the model's pose to this one. Rotations are scaled by the lever max_torque_ratio.
+    /// The motion from the model's pose to this one. Rotations are scaled by the lever arm.
     pub fn motion_to(&self, position: DVec3, orientation: DQuat, lever: f64) -> Vector6 {
         six::joined(
             position - self.position,

@@ -278,7 +278,7 @@ impl World {
         proxy.forward = lag;
         proxy.size = size_of(met);
         report.lag = report.lag.max(distance * (1.0 - part));
-        // Where tissue is open already it is last_force by what it was.
+        // In open tissue the proxy keeps its holds.
         for (hold, point) in proxy.holds.iter_mut().zip(&approach.points) {
             hold.offset -= part * point.lag;
         }

@@ -58,7 +58,7 @@ impl HapticLink {
     /// Adopts the mean wrench of a step, which applies at its middle. `inertia` is the mass of the touched nodes over
     /// the square of the step, N/m. Where this exceeds the stiffness of the coupling, a change of the tool's speed
     /// gives a jolt from which the massless proxy would rebound. Therefore only a fraction of the prediction error is
-    /// adopted in each step, and at max_share `max_share`.
+    /// adopted in each step, and at most `max_share`.
     fn adopt(&mut self, middle: (DVec3, DQuat), wrench: &Vector6, (inertia, max_share): (f64, f64)) -> Vector6 {
         let turned = rotation::rotation_between(self.middle.1, middle.1) * self.coupling.lever;
         let displacement = joined(middle.0 - self.middle.0, turned);

@@ -19,7 +19,7 @@ use crate::threads::{Items, Team};
 /// saves.
 const SHARED_FROM: usize = 8192;
 
-/// The least number of nodes of all small bodies group for which other threads are woken.
+/// The least number of nodes of all small bodies together for which other threads are woken.
 const WORTH_SHARING: usize = 1024;
 
 impl World {
