@@ -304,7 +304,7 @@ sinew_status sinew_body_set_collision(sinew_world *world, sinew_body_id body, ui
 sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
     uint32_t *out_category, uint32_t *out_mask);
 
-/// Wakes all nodes of a body until they come to rest again; whatever affects a body does too.
+/// Wakes all nodes of a body until they come to rest; anything that affects it does too.
 sinew_status sinew_body_wake(sinew_world *world, sinew_body_id body);
 
 /// Writes the fraction of the nodes that are awake; 1 for a body that never sleeps.

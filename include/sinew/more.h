@@ -165,7 +165,7 @@ typedef struct sinew_body_settings {
 } sinew_body_settings;
 
 /// Changes the settings of a body from the next step on; start from sinew_body_get_settings.
-/// What is closer than a new contact_thickness is pushed off. A new sleep wakes the body.
+/// Surfaces closer than a new contact_thickness are pushed apart. New sleep settings wake the body.
 /// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a cut body change, except both to 0.
 sinew_status sinew_body_set_settings(sinew_world *world, sinew_body_id body,
     const sinew_body_settings *settings);

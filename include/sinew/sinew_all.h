@@ -661,7 +661,7 @@ sinew_status sinew_body_set_collision(sinew_world *world, sinew_body_id body, ui
 sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
     uint32_t *out_category, uint32_t *out_mask);
 
-/// Wakes all nodes of a body until they come to rest again; whatever affects a body does too.
+/// Wakes all nodes of a body until they come to rest; anything that affects it does too.
 sinew_status sinew_body_wake(sinew_world *world, sinew_body_id body);
 
 /// Writes the fraction of the nodes that are awake; 1 for a body that never sleeps.
@@ -1693,7 +1693,7 @@ typedef struct sinew_body_settings {
 } sinew_body_settings;
 
 /// Changes the settings of a body from the next step on; start from sinew_body_get_settings.
-/// What is closer than a new contact_thickness is pushed off. A new sleep wakes the body.
+/// Surfaces closer than a new contact_thickness are pushed apart. New sleep settings wake the body.
 /// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a cut body change, except both to 0.
 sinew_status sinew_body_set_settings(sinew_world *world, sinew_body_id body,
     const sinew_body_settings *settings);

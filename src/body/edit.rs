@@ -58,7 +58,7 @@ impl Body {
                 None => add_force(own, force),
             }
         }
-        if self.system.sleeps() {
+        if self.system.any_tile_asleep() {
             for &node in nodes {
                 let own = self.system.order.own(node);
                 self.system.movers(own).for_each(|(node, _)| self.system.wake_at(node));

@@ -67,7 +67,7 @@ impl Body {
         highest
     }
 
-    /// Adds the stiffness of springs at each copy. Springs that did not fall apart stay with the source.
+    /// Adds the stiffness of springs at each copy. Springs that were not split stay with the source.
     fn add_spring_stiffness(&self, pieces: &[PieceOfNode], springs: &[PieceOfSpring], stiffnesses: &mut [f64]) -> f64 {
         let source = self.system.order.own(pieces[0].source);
         let mut highest = 0.0_f64;
@@ -76,7 +76,7 @@ impl Body {
             let ends = [a.min(b), a.max(b)];
             let first = springs.partition_point(|piece| piece.source < ends);
             let parts = springs[first..].iter().take_while(|piece| piece.source == ends);
-            // With masses m of both ends and half a bound for each, a squared frequency is at most sum 2 k / m.
+            // Each end is bounded separately and carries half of the spring: with masses m of both ends, a squared frequency is at most sum 2 k / m.
             let stiffness = 2.0 * f64::from(link.stiffness);
             for (piece, sum) in pieces.iter().zip(&mut *stiffnesses) {
                 let mut link_pieces = parts.clone().peekable();

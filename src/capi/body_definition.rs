@@ -72,11 +72,9 @@ impl sinew_body_def {
         let law = match self.element_law {
             SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF => ElementLaw::StVenantKirchhoff,
             SINEW_ELEMENT_LAW_NEO_HOOKEAN => ElementLaw::NeoHookean,
-            SINEW_ELEMENT_LAW_MOONEY_RIVLIN => {
-                return Ok(ElementLaw::MooneyRivlin {
-                    ratio: self.mooney_ratio,
-                });
-            }
+            SINEW_ELEMENT_LAW_MOONEY_RIVLIN => ElementLaw::MooneyRivlin {
+                ratio: self.mooney_ratio,
+            },
             unknown => {
                 return Err(Error::invalid(format!(
                     "element_law is {unknown}: no SINEW_ELEMENT_LAW_..."
@@ -84,7 +82,7 @@ impl sinew_body_def {
             }
         };
         ensure!(
-            self.mooney_ratio == 0.0,
+            self.mooney_ratio == 0.0 || matches!(law, ElementLaw::MooneyRivlin { .. }),
             "mooney_ratio is {} while element_law is not SINEW_ELEMENT_LAW_MOONEY_RIVLIN: must be 0",
             self.mooney_ratio
         );

@@ -15,7 +15,7 @@ pub unsafe extern "C" fn sinew_body_get_awake_share(
     with_body(world, body, |body| memory::write("out", out, body.awake_share()))
 }
 
-/// Wakes all nodes of a body until they come to rest again. Anything that affects a body also wakes it.
+/// Wakes all nodes of a body until they come to rest; anything that affects it does too.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_wake(world: *mut sinew_world, body: sinew_body_id) -> sinew_status {
     with_body_mut(world, body, |body| {

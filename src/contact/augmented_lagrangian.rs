@@ -128,8 +128,8 @@ impl ContactMultipliers {
         });
     }
 
-    /// Visits the force on each tool at the end of the last equation: the tool's index in the world, the force (N)
-    /// and its offset from the tool's position (m).
+    /// Visits the force on each tool at the end of the last equation: the tool's index in the world, the force, N
+    /// and its offset from the tool's position, m.
     pub(super) fn visit_warm_starts(&self, mut visit: impl FnMut(usize, DVec3, Vec3)) {
         for start in &self.warm_starts {
             visit(
@@ -217,7 +217,7 @@ impl ContactMultipliers {
                 min_gap: -f64::from(constraint.depth.max(0.0)),
                 stiffness: 0.0,
                 multiplier: 0.0,
-                retention: f64::from(1.0 - constraint.compliance),
+                retention: f64::from(1.0 - constraint.softness),
                 may_pull: false,
                 was_active: false,
                 response: ContactResponse::default(),
@@ -289,7 +289,7 @@ impl ContactMultipliers {
         self.order.sort_unstable();
     }
 
-    /// Evaluates all contacts for these displacements of the nodes (m).
+    /// Evaluates all contacts for these displacements of the nodes, m.
     pub fn evaluate(&mut self, displacement_of: impl Fn(usize) -> DVec3) {
         for contact in &mut self.contacts {
             contact.response = contact.respond(&displacement_of);
@@ -355,7 +355,7 @@ impl ContactMultipliers {
         if all > 0.0 { off / all } else { 0.0 }
     }
 
-    /// Returns true if the set of pushing contacts has changed since the last call; the equation is then another one.
+    /// True if the set of pushing contacts has changed since the last call; the equation is then another one.
     pub fn active_set_changed(&mut self) -> bool {
         let mut changed = false;
         for contact in &mut self.contacts {
@@ -366,7 +366,7 @@ impl ContactMultipliers {
         changed
     }
 
-    /// Returns true if contact `index` is part of the equation and pushed in the last one too.
+    /// True if contact `index` is part of the equation and pushed in the last one too.
     pub(super) fn was_active(&self, index: usize) -> bool {
         self.contacts.get(index).is_some_and(|contact| contact.was_active)
     }
@@ -379,12 +379,12 @@ impl ContactMultipliers {
             .filter(|(_, contact)| contact.response.force > 0.0)
     }
 
-    /// Returns true if any contact pushed at the end of the last equation.
+    /// True if any contact pushed at the end of the last equation.
     pub(super) fn had_active(&self) -> bool {
         !self.warm_starts.is_empty()
     }
 
-    /// Returns true if any contact is active.
+    /// True if any contact is active.
     pub fn has_active(&self) -> bool {
         self.contacts.iter().any(|contact| contact.response.force != 0.0)
     }
@@ -510,7 +510,7 @@ impl ContactMultipliers {
         active.map(work).sum::<f64>() + self.friction_multipliers.work(displacement_of)
     }
 
-    /// Returns the gap of contact `index` as last evaluated, its force (N) and how far it is open (m).
+    /// Returns the gap of contact `index` as last evaluated, its force (N) and how far it is open, m.
     pub(super) fn gap_state(&self, index: usize) -> (Gap, f64, f64) {
         let EquationContact { response, min_gap, .. } = &self.contacts[index];
         (response.gap, response.force, response.gap.distance - min_gap)
@@ -534,7 +534,7 @@ impl ContactMultipliers {
         forces.sum()
     }
 
-    /// Returns true if friction of contact `index` is part of the equation.
+    /// True if friction of contact `index` is part of the equation.
     pub(super) fn has_friction(&self, index: usize) -> bool {
         self.contacts[index].friction.iter().any(Option::is_some)
     }
@@ -551,7 +551,7 @@ impl ContactMultipliers {
         (contact.min_gap - gap.distance).max(0.0)
     }
 
-    /// Returns true if a contact of this tool, feature and tip is part of the equation.
+    /// True if a contact of this tool, feature and tip is part of the equation.
     pub(super) fn contains(&self, key: (usize, Feature, u8)) -> bool {
         self.order.binary_search(&key).is_ok()
     }

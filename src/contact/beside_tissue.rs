@@ -6,7 +6,7 @@
 use glam::{Vec3, Vec3A};
 
 use super::contacts::Contacts;
-use super::impulses::PgsPass;
+use super::sweep_control::PgsPass;
 use crate::geometry::Aabb;
 use crate::soa::Vectors;
 

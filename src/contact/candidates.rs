@@ -21,7 +21,7 @@ const MIN_REUSED_SUBSTEPS: f32 = 4.0;
 
 /// Features that can touch a tool before anything moves further than the slack.
 ///
-/// A feature in the list is only tested; the list has no other effect. Results may still differ in the last bits with
+/// Listing a feature only causes it to be tested. Results may still differ in the last bits with
 /// the time at which the list was built: planes through a mesh's closest points live as long as the list, and nodes of
 /// one tool are solved in batches.
 #[derive(Debug)]
@@ -35,7 +35,7 @@ pub(super) struct Candidates {
     slack: f32,
     /// Distance from a zone within which features are listed, m.
     reach: f32,
-    /// Distance per substep in excess of the allowance of a usual list, m.
+    /// How much further bodies can move per substep than a usual list allows for, m.
     pub excess_travel: f32,
     /// Slack of the list when it was built, m, and the node positions at that time. A negative value means that they
     /// are unknown.

@@ -6,8 +6,8 @@ use super::corner_weights::{FeatureNodes, MAX_FEATURE_NODES};
 use super::dynamic_tools::SolverTool;
 use super::features::Feature;
 use super::gap::{Gap, GapSurface};
-use super::impulses::{LEVERAGE, depth_correction};
 use super::pgs::ContactRow;
+use super::sweep_control::{LEVERAGE, depth_correction};
 use crate::codec::saved;
 use crate::nodes::Mobility;
 use crate::soa::Vectors;
@@ -52,8 +52,8 @@ pub(super) struct Constraint {
     tangent_mass: f32,
     /// Fraction of the impulse that is dropped in each iteration, 0 to 1. It is positive only near pinned nodes, where
     /// a rigid contact would fling the free nodes away.
-    pub compliance: f32,
-    /// Fraction of the stopping impulse that one iteration applies; 1 without compliance.
+    pub softness: f32,
+    /// Fraction of the stopping impulse that one iteration applies; 1 without softness.
     pub relaxation: f32,
     /// Accumulated normal impulse, N s; at least 0.
     impulse: f32,
@@ -68,7 +68,7 @@ pub(super) struct Constraint {
 
 saved! { Constraint {
     feature, weights, nodes, count, starts, shares, inv_mass_weights, normal, target_velocity, surface_velocity,
-    arm, depth, friction, tool, dynamic_index, tip, effective_mass, tangent_mass, compliance, relaxation, impulse,
+    arm, depth, friction, tool, dynamic_index, tip, effective_mass, tangent_mass, softness, relaxation, impulse,
     friction_impulse, counted_impulse, rounded,
 } }
 
@@ -125,7 +125,7 @@ impl Constraint {
             tip: 0,
             effective_mass: fading / inverse_mass,
             tangent_mass: 1.0 / leverage.max(free_inv_mass),
-            compliance: 1.0 - normal_inv_mass / inverse_mass,
+            softness: 1.0 - normal_inv_mass / inverse_mass,
             relaxation: fading * normal_inv_mass / inverse_mass,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
@@ -199,7 +199,7 @@ impl Constraint {
         }
         solved.impulse = impulse;
         solved.friction_impulse = friction_impulse;
-        solved.compliance = 0.0;
+        solved.softness = 0.0;
         let velocity = solved.velocity(velocities).dot(solved.normal);
         solved.target_velocity = velocity - open.max(0.0) / duration;
         solved
@@ -225,7 +225,7 @@ impl Constraint {
             friction: self.friction,
             effective_mass: self.effective_mass,
             tangent_mass: self.tangent_mass,
-            compliance: self.compliance,
+            softness: self.softness,
             impulse: self.impulse,
             friction_impulse: self.friction_impulse.into(),
         }

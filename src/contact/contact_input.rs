@@ -3,8 +3,8 @@
 use glam::{BVec3, DVec3, Vec3};
 
 use super::corner_weights::{FeatureNodes, MAX_FEATURE_NODES};
-use super::impulses::SWEEPS;
 use super::path::ToolPath;
+use super::sweep_control::SWEEPS;
 use crate::base::Profile;
 use crate::geometry::Aabb;
 use crate::nodes::{self, Bindings, Mobility, Pins};

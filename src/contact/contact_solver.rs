@@ -6,8 +6,8 @@ use super::constraint::Constraint;
 use super::contact_input::{ContactInput, SubSlice};
 use super::contacts::Contacts;
 use super::features::Feature;
-use super::impulses::depth_correction;
 use super::node_contacts::NodeContact;
+use super::sweep_control::depth_correction;
 
 impl Contacts {
     pub(super) fn solve(&mut self, input: &mut ContactInput, slice: &SubSlice) {

@@ -112,7 +112,7 @@ impl DistanceField {
         Self::of(&ExactSolid::new(surface)?, cell)
     }
 
-    /// Returns true if a sample is deeper inside than `depth`, m.
+    /// True if a sample is deeper inside than `depth`, m.
     pub(super) fn has_interior(&self, depth: f32) -> bool {
         self.distances.iter().any(|&distance| distance < -depth)
     }

@@ -60,7 +60,7 @@ pub(super) struct ContactResponse {
 saved! { ContactResponse { gap, force, shares, stiffness } }
 
 impl EquationContact {
-    /// Evaluates the contact for these displacements of the nodes (m).
+    /// Evaluates the contact for these displacements of the nodes, m.
     pub fn respond(&self, displacement_of: impl Fn(usize) -> DVec3) -> ContactResponse {
         let mut corners = self.free_corners;
         for (corner, displacement) in corners.iter_mut().zip(self.corner_vectors(displacement_of)) {

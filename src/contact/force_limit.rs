@@ -44,7 +44,7 @@ impl ForceLimitSearch {
         }
     }
 
-    /// Returns true if the last try is accepted, given its force. Otherwise sets the fraction of the next try. The
+    /// True if the last try is accepted, given its force. Otherwise sets the fraction of the next try. The
     /// `last` try goes no further than the lower bracket.
     pub fn accept(&mut self, force: f32, limit: f32, last: bool) -> bool {
         let fraction = self.fraction;

@@ -24,7 +24,6 @@ mod force_errors;
 mod force_limit;
 mod gap;
 pub(crate) mod image_space;
-pub(crate) mod impulses;
 mod mesh_solid;
 mod narrow_phase;
 mod nearest_plane;
@@ -38,6 +37,7 @@ mod report;
 mod ridges;
 mod rigid;
 mod surface;
+pub(crate) mod sweep_control;
 mod swept_bounds;
 pub(crate) mod time_of_impact;
 #[cfg(test)]

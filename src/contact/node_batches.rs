@@ -6,9 +6,9 @@
 
 use glam::{DVec3, Mat3, Quat, Vec3};
 
-use super::impulses::depth_correction;
 use super::nearest_plane::NearestPlane;
 use super::path::MeshPose;
+use super::sweep_control::depth_correction;
 use super::time_of_impact::{Segment, TOUCHING};
 use crate::geometry::Aabb;
 use crate::nodes::NodeDamping;

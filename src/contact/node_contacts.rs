@@ -11,10 +11,10 @@ use super::contact_geometry::{
 use super::contact_input::{ContactInput, SubSlice};
 use super::distance::closest_on_segment;
 use super::features::Feature;
-use super::impulses::{LEVERAGE, PgsLimits, PgsPass, depth_correction, relax};
 use super::mesh_solid::MeshSolid;
 use super::nearest_plane::NearestPlane;
 use super::path::{PosedShape, ToolMotion};
+use super::sweep_control::{LEVERAGE, PgsLimits, PgsPass, depth_correction, sweep_until_converged};
 use super::time_of_impact::{Corners, Segment, Separation, TOUCHING};
 use crate::base::{Result, memory};
 use crate::codec::saved;
@@ -202,7 +202,7 @@ pub(super) struct NodeContact {
     /// Effective mass along a free direction, kg.
     tangent_mass: f32,
     /// Fraction of the impulse that is dropped in each iteration; positive if the node is held near the normal.
-    compliance: f32,
+    softness: f32,
     /// Accumulated normal impulse, at least 0, and accumulated friction impulse, N s.
     impulse: f32,
     friction_impulse: Vec3,
@@ -212,7 +212,7 @@ pub(super) struct NodeContact {
 
 saved! { NodeContact {
     node, tool, start, normal, surface_velocity, arm, depth, friction, target_velocity, inv_mass, effective_mass,
-    tangent_mass, compliance, impulse, friction_impulse, counted_impulse,
+    tangent_mass, softness, impulse, friction_impulse, counted_impulse,
 } }
 
 impl NodeContact {
@@ -250,7 +250,7 @@ impl NodeContact {
             inv_mass,
             effective_mass: (normal_inv_mass / leverage).min(1.0) / inverse_mass,
             tangent_mass: 1.0 / node_inv_mass,
-            compliance: 1.0 - normal_inv_mass / inverse_mass,
+            softness: 1.0 - normal_inv_mass / inverse_mass,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
             counted_impulse: Vec3::ZERO,
@@ -291,7 +291,7 @@ impl NodeContact {
     #[inline]
     fn apply_impulse(&mut self, velocity: &mut Vec3) -> f32 {
         let velocity_error = self.target_velocity - velocity.dot(self.normal);
-        let impulse = (self.impulse * (1.0 - self.compliance) + velocity_error * self.effective_mass).max(0.0);
+        let impulse = (self.impulse * (1.0 - self.softness) + velocity_error * self.effective_mass).max(0.0);
         let change = impulse - self.impulse;
         self.impulse = impulse;
         if change == 0.0 && self.friction == 0.0 {
@@ -332,7 +332,7 @@ fn solve(contacts: &mut [NodeContact], velocities: &mut Vectors, sweeps: u32) {
         velocities.set(node, velocity);
         return;
     }
-    relax(PgsLimits::new(sweeps), None, |_| {
+    sweep_until_converged(PgsLimits::new(sweeps), None, |_| {
         let pressed = contacts.iter_mut().map(|contact| contact.apply_impulse(&mut velocity));
         pressed.fold(0.0, f32::max)
     });
@@ -408,7 +408,7 @@ impl NodeContacts {
             self.0.sort_unstable_by_key(|contact| (contact.node, contact.tool));
         }
         for contacts in self.0.chunk_by_mut(|one, other| one.node == other.node) {
-            let is_closed_form = contacts.len() == 1 && contacts[0].compliance == 0.0;
+            let is_closed_form = contacts.len() == 1 && contacts[0].softness == 0.0;
             let sweeps = if is_closed_form { 1 } else { sweeps };
             solve(contacts, velocities, sweeps);
         }

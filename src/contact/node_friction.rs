@@ -204,7 +204,7 @@ impl FrictionMultipliers {
         self.nodes.iter_mut().for_each(|entry| entry.may_exceed_limit = false);
     }
 
-    /// Evaluates all friction for these displacements of the nodes (m).
+    /// Evaluates all friction for these displacements of the nodes, m.
     pub fn evaluate(&mut self, displacement_of: impl Fn(usize) -> DVec3) {
         for entry in &mut self.nodes {
             entry.response = entry.evaluate(displacement_of(entry.node as usize));
@@ -376,7 +376,7 @@ impl NodeFriction {
         }
     }
 
-    /// Evaluates the friction for this displacement of the node (m).
+    /// Evaluates the friction for this displacement of the node, m.
     fn evaluate(&self, displacement: DVec3) -> FrictionResponse {
         let slip = self.tangential(self.slip + displacement);
         if self.limit == 0.0 {

@@ -117,7 +117,7 @@ impl ToolPath {
     }
 
     /// Sets the path: start and end pose, the rotation between them (rad), the fraction of the step at which it
-    /// begins and the largest distance from it (m).
+    /// begins and the largest distance from it, m.
     pub fn set(&mut self, [start, end]: [Pose; 2], turn: Vec3, begin: f64, max_deviation: f32) {
         (self.start, self.end, self.turn, self.begin, self.max_deviation) = (start, end, turn, begin, max_deviation);
     }
@@ -137,7 +137,7 @@ impl ToolPath {
         f64::from(dt) * (1.0 - self.begin)
     }
 
-    /// Returns true if the tool may come within `margin` of these bounds in the step. Conservative, by bounding
+    /// True if the tool may come within `margin` of these bounds in the step. Conservative, by bounding
     /// boxes.
     pub fn is_near(&self, bounds: &Aabb, origin: DVec3, margin: f32) -> bool {
         let bounds = bounds.extended(margin);
@@ -155,7 +155,7 @@ impl ToolPath {
             })
     }
 
-    /// Returns true if the pose changes in the step.
+    /// True if the pose changes in the step.
     pub fn moves(&self) -> bool {
         self.start != self.end || self.max_deviation > 0.0
     }

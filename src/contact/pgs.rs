@@ -7,7 +7,7 @@ use glam::{Vec3, Vec3A};
 use super::constraint::Constraint;
 use super::corner_weights::MAX_FEATURE_NODES;
 use super::dynamic_tools::SolverTool;
-use super::impulses::{PgsLimits, PgsPass, relax};
+use super::sweep_control::{PgsLimits, PgsPass, sweep_until_converged};
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::soa::Vectors;
@@ -36,7 +36,8 @@ pub(super) struct ContactRow {
     pub effective_mass: f32,
     /// kg
     pub tangent_mass: f32,
-    pub compliance: f32,
+    /// Fraction of the impulse that is lost per sweep.
+    pub softness: f32,
     /// Accumulated normal impulse, at least 0, and accumulated friction impulse, N s.
     pub impulse: f32,
     pub friction_impulse: Vec3A,
@@ -44,7 +45,7 @@ pub(super) struct ContactRow {
 
 saved! { ContactRow {
     dynamic_index, arm, is_backed, indices, shares, inv_mass_weights, normal, surface_velocity, target_velocity,
-    friction, effective_mass, tangent_mass, compliance, impulse, friction_impulse,
+    friction, effective_mass, tangent_mass, softness, impulse, friction_impulse,
 } }
 
 impl ContactRow {
@@ -61,7 +62,7 @@ impl ContactRow {
             velocity -= tool.velocity_change(self.arm);
         }
         let velocity_error = self.target_velocity - velocity.dot(self.normal);
-        let impulse = (self.impulse * (1.0 - self.compliance) + velocity_error * self.effective_mass).max(0.0);
+        let impulse = (self.impulse * (1.0 - self.softness) + velocity_error * self.effective_mass).max(0.0);
         let change = impulse - self.impulse;
         self.impulse = impulse;
         let is_idle = impulse == 0.0 && self.friction_impulse == Vec3A::ZERO;
@@ -85,8 +86,8 @@ impl ContactRow {
         applied.length() / self.tangent_mass
     }
 
-    /// Solves the row of a contact with nodes that are supported from behind. The support takes the velocity change
-    /// against it.
+    /// Solves the row of a contact with nodes that are supported from behind. The kinematic tool behind a node
+    /// absorbs the part of the velocity change that points into it.
     fn solve_backed(
         &mut self,
         velocities: &mut [Vec3A],
@@ -111,7 +112,7 @@ impl ContactRow {
 
     /// True for a pressing contact of a kinematic tool with a single node.
     fn is_back_support(&self) -> bool {
-        self.dynamic_index == u32::MAX && self.shares[0] == 1.0 && self.impulse > 0.0 && self.compliance == 0.0
+        self.dynamic_index == u32::MAX && self.shares[0] == 1.0 && self.impulse > 0.0 && self.softness == 0.0
     }
 
     /// True if the contact presses.
@@ -200,9 +201,9 @@ impl ContactRows {
 
         self.gather_velocities(|node| velocities.get(node).into());
         let limits = PgsLimits::new(sweeps);
-        let first = relax(limits, None, |sweep| self.sweep_rows(sweep));
+        let first = sweep_until_converged(limits, None, |sweep| self.sweep_rows(sweep));
         if !self.dynamic_tools.is_empty() && self.find_back_supports() {
-            relax(limits, Some(first), |sweep| self.sweep_backed(sweep));
+            sweep_until_converged(limits, Some(first), |sweep| self.sweep_backed(sweep));
         }
         for (&node, &velocity) in self.nodes.iter().zip(&self.velocities) {
             velocities.set(node as usize, velocity.into());
@@ -236,8 +237,8 @@ impl ContactRows {
     }
 
     /// Finds nodes that are held between a kinematic and a dynamic tool, and marks the rows of the dynamic tool.
-    /// Returns true if there are any. These rows stop the tool however heavy it is and however light the nodes are.
-    /// Plain sweeps need a number that grows with the mass ratio.
+    /// True if there are any. These rows stop the tool at any mass ratio.
+    /// Without them the number of sweeps would grow with that ratio.
     fn find_back_supports(&mut self) -> bool {
         let none = BackSupport {
             normal: Vec3A::ZERO,
@@ -270,7 +271,7 @@ impl ContactRows {
             });
             row.is_backed = true;
             row.effective_mass = 1.0 / (inverse_masses.sum::<f32>() + tool.response(row.arm, row.normal));
-            row.compliance = 0.0;
+            row.softness = 0.0;
         }
         has_supports
     }

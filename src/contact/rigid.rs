@@ -155,7 +155,7 @@ impl MassProperties {
 }
 
 /// Returns the moments of inertia of a capsule of density 1 about its axis and across it (kg m²), and its volume
-/// (m³).
+///, m³.
 fn mass_of_capsule(radius: f64, half_length: f64) -> [f64; 3] {
     use std::f64::consts::PI;
     let (square, length) = (radius * radius, 2.0 * half_length);
@@ -187,7 +187,7 @@ fn mass_of_mesh(positions: &[Vec3], triangles: &[[u32; 3]]) -> (f64, DVec3, DMat
     (volume, origin + center, inertia)
 }
 
-/// Returns true if all eigenvalues of a symmetric matrix are above `bound` (Sylvester).
+/// True if all eigenvalues of a symmetric matrix are above `bound` (Sylvester).
 fn is_positive(matrix: &DMat3, bound: f64) -> bool {
     let shifted = *matrix - DMat3::from_diagonal(DVec3::splat(bound));
     let minor = shifted.x_axis.x * shifted.y_axis.y - shifted.x_axis.y * shifted.y_axis.x;
@@ -325,13 +325,13 @@ impl Rigid {
         self.motion.angular_momentum = self.mass.momentum(self.motion.orientation, spin);
     }
 
-    /// Sets the velocity of the center of mass (m/s) and the angular velocity (rad/s).
+    /// Sets the velocity of the center of mass (m/s) and the angular velocity, rad/s.
     pub fn set_velocity(&mut self, velocity: Vec3, spin: Vec3) {
         self.motion.velocity = velocity.as_dvec3();
         self.motion.angular_momentum = self.mass.momentum(self.motion.orientation, spin.as_dvec3());
     }
 
-    /// Returns the velocity of the center of mass (m/s) and the angular velocity (rad/s).
+    /// Returns the velocity of the center of mass (m/s) and the angular velocity, rad/s.
     pub fn velocity(&self) -> (Vec3, Vec3) {
         let finite = |vector: DVec3| vector.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
         (finite(self.motion.velocity), finite(self.motion.spin(&self.mass)))

@@ -88,9 +88,9 @@ pub(crate) const MAX_ITERATIONS: u32 = 1_000_000;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct BodyDefinition<'a> {
-    /// The initial position of each node (m).
+    /// The initial position of each node, m.
     pub positions: &'a [Vec3],
-    /// The rest position of each node (m). `None`: the same as `positions`.
+    /// The rest position of each node, m. `None`: the same as `positions`.
     pub rest_positions: Option<&'a [Vec3]>,
     /// The mass of each node (kg), above 0. In [`Values::Each`] a mass of 0 pins a node permanently.
     /// [`Values::Uniform`] of 0 if the density of a material gives the masses.
@@ -177,7 +177,7 @@ pub struct BodyDefinition<'a> {
     /// those whose triangles it divides or separates. An open cavity has neither stiffness nor pressure, and its
     /// contents are lost. A cut elsewhere leaves the cavity closed.
     pub enclosed_stiffness: f32,
-    /// The overpressure in a cavity at its rest volume (Pa). Negative values are suction; 0: none. See
+    /// The overpressure in a cavity at its rest volume, Pa. Negative values are suction; 0: none. See
     /// [`Self::enclosed_stiffness`], and [`Body::set_pressure`](crate::Body::set_pressure) to change it. Without an
     /// `enclosed_stiffness` the pressure does not depend on the volume, and springs that do not stiffen may be unable
     /// to contain it.

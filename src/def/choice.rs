@@ -43,7 +43,7 @@ pub struct SolverChoice {
     pub reason: ChoiceReason,
     /// The explicit substeps of a step of `step` seconds at the initial positions; 0 if the solver was given.
     pub substeps: u32,
-    /// The assumed step length (s); 0 if the solver was given.
+    /// The assumed step length, s; 0 if the solver was given.
     pub step: f32,
 }
 

@@ -44,9 +44,9 @@ pub struct StorageReport {
 pub struct EnclosedReport {
     /// The number of cavities that have not been cut open.
     pub cavity_count: usize,
-    /// The volume at the current positions (m³); negative if the cavities are inverted.
+    /// The volume at the current positions, m³; negative if the cavities are inverted.
     pub volume: f64,
-    /// The volume at rest (m³).
+    /// The volume at rest, m³.
     pub rest_volume: f64,
     /// The overpressure (Pa), averaged by rest volume.
     pub pressure: f64,
@@ -68,12 +68,12 @@ pub struct EnclosedReport {
 pub struct SolverReport {
     /// The number of matrix-vector products in the step; 0 for explicit bodies.
     pub iterations: u32,
-    /// The estimated position error of the solve (m); 0 for explicit bodies.
+    /// The estimated position error of the solve, m; 0 for explicit bodies.
     /// [`Solver::Implicit`](crate::Solver::Implicit): root mean square, weighted by mass.
     /// [`Solver::Newton`](crate::Solver::Newton): the largest displacement of the last correction, of which about a
     /// hundredth remains. The error of the time step is not included.
     pub error: f32,
-    /// The total mass that mass scaling adds (kg); see
+    /// The total mass that mass scaling adds, kg; see
     /// [`BodyDefinition::mass_scaling`](crate::BodyDefinition::mass_scaling).
     pub added_mass: f64,
     /// The number of linearized equations that were solved; 0 for explicit bodies.
@@ -95,7 +95,7 @@ impl SolverReport {
     };
 }
 
-/// The energy of a body at the current positions (J).
+/// The energy of a body at the current positions, J.
 ///
 /// ```
 #[doc = include_str!("../doctest/cloth.txt")]

@@ -38,7 +38,7 @@ pub struct Tearing {
     /// The maximum number of tears per step; the most loaded springs tear first. 0: the body does not tear, and has no
     /// cost for it.
     pub most_per_step: u32,
-    /// The minimum fragment size at rest, at least 0: area (m²), or volume of solids (m³). A tear that would separate a
+    /// The minimum fragment size at rest, at least 0: area (m²), or volume of solids, m³. A tear that would separate a
     /// smaller fragment is not made.
     pub smallest_piece: f32,
 }

@@ -162,7 +162,7 @@ impl CandidatePairs {
         }
     }
 
-    /// Returns true if the list of a pair contains all that can touch in this search.
+    /// True if the list of a pair contains all that can touch in this search.
     pub fn covers(&self, pair: usize, search: &PairSearch) -> bool {
         let list = self.lists.get(pair).filter(|_| self.is_valid);
         list.is_some_and(|list| {
@@ -377,7 +377,7 @@ impl PairSearch<'_> {
         corners.separation(&Segment::still(ends), 0.0).offset.length()
     }
 
-    /// Returns true if two features of one surface never collide. `distance_bound` is the distance of their bounds, m.
+    /// True if two features of one surface never collide. `distance_bound` is the distance of their bounds, m.
     fn are_neighbors(&self, nodes: [u32; 2], others: &[u32], distance_bound: f32) -> bool {
         let surface = self.search_sides[0].surface;
         self.is_self_contact()

@@ -271,7 +271,7 @@ impl CollisionSurface {
             .then_some(distance.min(SELF_CONTACT_DISTANCE * self.short_edge))
     }
 
-    /// Returns true if a node is a corner, or moves one.
+    /// True if a node is a corner, or moves one.
     pub fn contains(&self, node: u32) -> bool {
         match &self.topology {
             Some(topology) => topology.contains(node),
@@ -279,7 +279,7 @@ impl CollisionSurface {
         }
     }
 
-    /// Returns true if the body is cuttable.
+    /// True if the body is cuttable.
     pub fn can_be_cut(&self) -> bool {
         self.topology.is_some()
     }
@@ -328,14 +328,14 @@ impl CollisionSurface {
         })
     }
 
-    /// Returns true if a node or edge and other features are all exposed by cuts. Such features collide only as parts
+    /// True if a node or edge and other features are all exposed by cuts. Such features collide only as parts
     /// of a wound.
     pub fn are_in_wound(&self, nodes: [u32; 2], others: &[u32]) -> bool {
         let wound = self.wound();
         wound.is_some_and(|wound| wound.contains(nodes.into_iter().chain(others.iter().copied())))
     }
 
-    /// Returns true if a corner or edge and others of the same body were initially nearer than `radius`, m, and so
+    /// True if a corner or edge and others of the same body were initially nearer than `radius`, m, and so
     /// never collide.
     pub fn are_neighbors(&self, nodes: [u32; 2], others: &[u32], radius: f32) -> bool {
         let may_touch = match &self.topology {

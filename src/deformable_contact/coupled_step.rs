@@ -325,7 +325,7 @@ fn stable_substep_for(request: &StepRequest, substeps: u32) -> f32 {
     request.dt / (RESERVE * substeps as f32)
 }
 
-/// Returns true if the step of these bodies ends with a comparison of their common energy.
+/// True if the step of these bodies ends with a comparison of their common energy.
 fn needs_energy_comparison(
     members: &[u32],
     coupled_bodies: &[Option<CoupledBody>],

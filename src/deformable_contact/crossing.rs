@@ -151,7 +151,7 @@ fn mark_crossing_edges(
     count
 }
 
-/// Returns true if an edge of `first` crosses a triangle of `second` by more than `depth`, m.
+/// True if an edge of `first` crosses a triangle of `second` by more than `depth`, m.
 fn crosses_deeper_than(first: &CollisionSurface, second: &CollisionSurface, depth: f32) -> bool {
     let shift = shift(first, second);
     let mut crossing = first

@@ -62,7 +62,7 @@ impl EdgeCurvature {
         0.5 * self.normal_spread * other.length * (other.length * self.inverse_length).max(1.0)
     }
 
-    /// Returns true if contact at corners keeps two surfaces `radius` apart near these edges, m, up to a fraction of
+    /// True if contact at corners keeps two surfaces `radius` apart near these edges, m, up to a fraction of
     /// it.
     pub fn is_flat_against(&self, other: &Self, radius: f32) -> bool {
         let max_penetration = MAX_PENETRATION * radius;

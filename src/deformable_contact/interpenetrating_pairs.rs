@@ -21,7 +21,7 @@ impl InterpenetratingPairs {
         memory::reserve_in_steps(&mut self.0, PAIRS_PER_SURFACE * (surfaces + 1))
     }
 
-    /// Returns true if the pair is listed.
+    /// True if the pair is listed.
     pub fn contains(&self, pair: [usize; 2]) -> bool {
         self.0.binary_search(&ordered(pair)).is_ok()
     }

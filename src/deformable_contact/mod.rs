@@ -7,6 +7,7 @@
 //! the same point, so momentum is conserved.
 
 mod attachments;
+mod body_broad_phase;
 mod candidate_pairs;
 mod clearances;
 mod collision_surface;
@@ -16,7 +17,6 @@ mod crossing;
 mod edge_curvature;
 mod images;
 mod interpenetrating_pairs;
-mod islands;
 mod narrow_phase;
 mod pair_contact;
 mod plan;
@@ -29,13 +29,13 @@ mod warm_start;
 mod wound;
 
 pub(crate) use self::attachments::{AttachmentPoint, LinearPath, PointAttachments, SutureThread, are_one, distance};
+use self::body_broad_phase::Islands;
 use self::candidate_pairs::CandidatePairs;
 use self::clearances::Clearances;
 pub(crate) use self::collision_surface::CollisionSurface;
 use self::contact_reports::ContactReports;
 pub(crate) use self::coupled_step::CoupledGroup;
 use self::interpenetrating_pairs::InterpenetratingPairs;
-use self::islands::Islands;
 use self::pair_contact::PairContact;
 use self::sleep_groups::SleepGroups;
 pub(crate) use self::topology_change::{NewCollisionSurface, PreparedSurfaceChange};
@@ -47,7 +47,7 @@ use glam::Vec3A;
 use crate::base::{Count, Result, Stage, Stopwatch, memory};
 use crate::codec::saved;
 use crate::contact::Contacts;
-use crate::contact::impulses::{PgsLimits, PgsPass, relax};
+use crate::contact::sweep_control::{PgsLimits, PgsPass, sweep_until_converged};
 use crate::geometry::Aabb;
 use crate::solver::{SubstepSpan, System, Systems};
 
@@ -56,7 +56,7 @@ const MAX_SEARCHES: u32 = 16;
 
 /// Solver effort of a substep. Sweeps begin with the impulses of the last substep, and the next substep corrects the
 /// remaining error.
-const EFFORT: PgsLimits = PgsLimits {
+const LIMITS: PgsLimits = PgsLimits {
     sweeps: 32,
     tolerance: 2.5e-4,
     defers_slow_tail: true,
@@ -69,10 +69,10 @@ const CORRECTION_SPEED: f32 = 0.3;
 /// Maximum number of retries in a substep, and their solver effort, for contacts whose sides would pass each other. The
 /// effort is higher because errors between nearly parallel sides converge slowly.
 const MAX_TUNNELING_RETRIES: u32 = 8;
-const RETRY_EFFORT: PgsLimits = PgsLimits {
+const RETRY_LIMITS: PgsLimits = PgsLimits {
     sweeps: 512,
     defers_slow_tail: false,
-    ..EFFORT
+    ..LIMITS
 };
 
 /// Passes of the position correction over all contacts. Each contact uses the positions that earlier contacts have
@@ -385,13 +385,13 @@ impl DeformableContact {
     fn solve_contacts(&mut self, island: usize, bodies: &mut impl Systems, span: &SubstepSpan) -> bool {
         let mut first_change = None;
         let mut has_begun = false;
-        let (mut retries, mut retry_effort) = (0, RETRY_EFFORT);
+        let (mut retries, mut retry_limits) = (0, RETRY_LIMITS);
         for _ in 0..MAX_SEARCHES {
             let known_count = self.pair_contacts.len();
             let (mut needs_search, mut is_retry) = (true, false);
             if has_begun {
                 self.update_motions(island, bodies, span);
-                is_retry = retries < MAX_TUNNELING_RETRIES && retry_effort.sweeps > 0 && self.prevent_tunneling(span);
+                is_retry = retries < MAX_TUNNELING_RETRIES && retry_limits.sweeps > 0 && self.prevent_tunneling(span);
                 retries += u32::from(is_retry);
                 needs_search = !self.is_search_complete(island, bodies, span);
             }
@@ -426,9 +426,9 @@ impl DeformableContact {
                 first_change =
                     Some(first_change.map_or(warm_started, |first_change: f32| first_change.max(warm_started)));
             }
-            let effort = if is_retry { retry_effort } else { EFFORT };
-            first_change = Some(relax(effort, first_change, |sweep| {
-                retry_effort.sweeps -= u32::from(is_retry);
+            let limits = if is_retry { retry_limits } else { LIMITS };
+            first_change = Some(sweep_until_converged(limits, first_change, |sweep| {
+                retry_limits.sweeps -= u32::from(is_retry);
                 let pair_contacts = pair_contacts
                     .iter_mut()
                     .filter(|contact| sweep == PgsPass::All || contact.is_pressing());
@@ -498,14 +498,14 @@ impl DeformableContact {
     }
 }
 
-/// Returns true if a body takes half kicks.
+/// True if a body takes half kicks.
 fn takes_half_kicks(bodies: &impl Systems, body_index: usize) -> bool {
     bodies
         .at(body_index)
         .is_none_or(|body| body.integrator.takes_half_kicks())
 }
 
-/// Returns true if any of these bodies takes half kicks.
+/// True if any of these bodies takes half kicks.
 fn any_takes_half_kicks(bodies: &impl Systems, body_indices: impl IntoIterator<Item = usize>) -> bool {
     body_indices
         .into_iter()
@@ -534,7 +534,7 @@ fn for_each_tool_contact(
     }
 }
 
-/// Returns true if an attachment joins simulation nodes that move these corners of two surfaces.
+/// True if an attachment joins simulation nodes that move these corners of two surfaces.
 fn share_attachment(
     attachments: &PointAttachments,
     bodies: &impl Systems,

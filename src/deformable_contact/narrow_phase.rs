@@ -47,7 +47,7 @@ impl DeformableContact {
         }
     }
 
-    /// Returns true if the first search of the substep found all that impulses may make touch.
+    /// True if the first search of the substep found all that impulses may make touch.
     pub(super) fn is_search_complete(&self, island: usize, bodies: &impl Systems, span: &SubstepSpan) -> bool {
         self.islands.searches(island).all(|pair| {
             let search = Self::pair_search((&self.surfaces, &self.interpenetrating_pairs), pair, bodies, span);
@@ -244,7 +244,7 @@ impl DeformableContact {
     }
 }
 
-/// Returns true if an attachment joins nodes of both sides.
+/// True if an attachment joins nodes of both sides.
 fn are_joined(attachments: &PointAttachments, bodies: &impl Systems, sides: &[ContactSide; 2]) -> bool {
     let [a, b] = sides;
     !attachments.is_empty() && share_attachment(attachments, bodies, [a.body, b.body], [&a.nodes, &b.nodes])
@@ -261,12 +261,12 @@ fn contact_distance(first: &SearchSide, second: &SearchSide, bodies: [&System; 2
     can_collide(bodies[0], bodies[1]).then_some(distance)
 }
 
-/// Returns true if two bodies that collide use images.
+/// True if two bodies that collide use images.
 fn find_in_images(first: &CollisionSurface, second: &CollisionSurface) -> bool {
     first.wants_images || second.wants_images
 }
 
-/// Returns true if one surface may be completely inside the other. Otherwise, without crossing edges, nothing is
+/// True if one surface may be completely inside the other. Otherwise, without crossing edges, nothing is
 /// inside.
 fn may_contain_each_other(first: &CollisionSurface, second: &CollisionSurface) -> bool {
     let (a, b) = (

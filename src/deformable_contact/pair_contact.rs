@@ -5,7 +5,7 @@ use glam::{BVec3, Vec3, Vec3A};
 use super::collision_surface::CollisionSurface;
 use crate::codec::saved;
 use crate::contact::corner_weights::MAX_FEATURE_NODES;
-use crate::contact::impulses::LEVERAGE;
+use crate::contact::sweep_control::LEVERAGE;
 use crate::solver::System;
 
 /// A point on a node, edge or face of a body.
@@ -35,7 +35,7 @@ pub(super) struct PairContact {
     pub normal: Vec3,
     /// Lower bound of the mean relative normal velocity of the first side, m/s.
     pub target_velocity: f32,
-    /// Penetration depth at the start of the step, m; negative is a gap.
+    /// Penetration depth at the start of the substep, m; negative is a gap.
     pub depth: f32,
     /// True if both sides were one before a cut separated them.
     pub is_cut_apart: bool,
@@ -191,7 +191,7 @@ impl PairContact {
         self.target_velocity = self.gap_velocity(duration) + lost_gap.max(0.0) / duration;
     }
 
-    /// Returns true if the contact has a normal impulse.
+    /// True if the contact has a normal impulse.
     pub fn is_pressing(&self) -> bool {
         self.impulse > 0.0
     }
@@ -236,8 +236,8 @@ impl PairContact {
         }
     }
 
-    /// Moves penetrating sides apart by at most `max_displacement`, m, in a substep of `duration` seconds. Other sides
-    /// come no closer than allowed. [`CollisionSurface::predicted_velocities`] contains the displacements of nodes so
+    /// Moves penetrating sides apart by at most `max_displacement`, m, in a substep of `duration` seconds. Sides that
+    /// do not penetrate come no closer than their gap allows. [`CollisionSurface::predicted_velocities`] contains the displacements of nodes so
     /// far.
     ///
     /// Sides that a cut separated begin too close. Their correction is limited by the contact impulse, so that sides

@@ -3,9 +3,9 @@
 use glam::{DVec3, FloatExt, Vec3};
 
 use super::DeformableContact;
+use super::body_broad_phase::SweptBody;
 use super::can_collide;
 use super::collision_surface::CollisionSurface;
-use super::islands::SweptBody;
 use super::pair_contact::ContactKey;
 use crate::geometry::Aabb;
 use crate::nodes::weighted_nodes;
@@ -96,12 +96,12 @@ impl DeformableContact {
             .map_or(DVec3::ZERO, |(_, body)| body.origin)
     }
 
-    /// Returns true if all bodies of an island sleep, so that nothing changes.
+    /// True if all bodies of an island sleep, so that nothing changes.
     pub fn is_asleep(&self, island: usize, bodies: &impl Systems) -> bool {
         are_asleep(self.islands.members(island), bodies)
     }
 
-    /// Returns true if all bodies of an island are at rest and may sleep. Attached bodies do not sleep.
+    /// True if all bodies of an island are at rest and may sleep. Attached bodies do not sleep.
     pub fn is_at_rest(&self, island: usize, bodies: &impl Systems) -> bool {
         let members = self.islands.members(island);
         let mut attached_bodies = self.attachments.bodies().flatten();
@@ -210,7 +210,7 @@ fn local_frequency(body: &System, nodes: [u32; 3]) -> Option<f32> {
     (mass > 0.0).then(|| (stiffness / mass).sqrt())
 }
 
-/// Returns true if all these bodies sleep.
+/// True if all these bodies sleep.
 pub(super) fn are_asleep(body_indices: &[u32], bodies: &impl Systems) -> bool {
     let mut body_indices = body_indices.iter();
     body_indices.all(|&body_index| bodies.at(body_index as usize).is_some_and(System::is_asleep))

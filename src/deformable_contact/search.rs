@@ -171,7 +171,7 @@ impl PairSearch<'_> {
         }
     }
 
-    /// Returns true if the first search of the substep found all that impulses may make touch. Wounds change with the
+    /// True if the first search of the substep found all that impulses may make touch. Wounds change with the
     /// motion and are never complete.
     pub fn is_search_complete(&self) -> bool {
         let max_deviation: f32 = self
@@ -183,19 +183,19 @@ impl PairSearch<'_> {
         !is_open && !self.curvature_changed() && max_deviation <= self.speculative_margin
     }
 
-    /// Returns true if the curvature was measured again, so that edges skipped as flat may touch now.
+    /// True if the curvature was measured again, so that edges skipped as flat may touch now.
     fn curvature_changed(&self) -> bool {
         self.search_sides
             .iter()
             .any(|search_side| search_side.surface.was_remeasured)
     }
 
-    /// Returns true if two edges need a test, like [`Self::needs_test`].
+    /// True if two edges need a test, like [`Self::needs_test`].
     fn edges_need_test(&self, edge: &[u32], other: &[u32]) -> bool {
         self.curvature_changed() || self.needs_test(self.search_sides, edge, other)
     }
 
-    /// Returns true if a search needs to test two features: it is the first of the substep, or impulses deflected them
+    /// True if a search needs to test two features: it is the first of the substep, or impulses deflected them
     /// beyond the margin.
     fn needs_test(&self, [a, b]: [SearchSide; 2], nodes: &[u32], others: &[u32]) -> bool {
         !self.is_repeated || a.surface.deviation_of(nodes) + b.surface.deviation_of(others) > self.speculative_margin
@@ -581,7 +581,7 @@ impl PairSearch<'_> {
         Ok((start, start.offset.length()))
     }
 
-    /// Returns true if the distance of an edge is recorded even if it cannot touch.
+    /// True if the distance of an edge is recorded even if it cannot touch.
     fn is_measured(&self, clearances: Option<&Clearances>, edge: usize) -> bool {
         match self.clearance_update {
             ClearanceUpdate::Nothing => false,

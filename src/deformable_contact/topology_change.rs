@@ -94,7 +94,7 @@ impl SurfaceTopology {
         })
     }
 
-    /// Returns true if a node or point is a corner, or moves one.
+    /// True if a node or point is a corner, or moves one.
     pub fn contains(&self, index: u32) -> bool {
         self.roles.get(index as usize).is_some_and(|role| role & USED != 0)
     }

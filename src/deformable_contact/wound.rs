@@ -119,17 +119,17 @@ impl Wound {
         }
     }
 
-    /// Returns true if any triangle is exposed.
+    /// True if any triangle is exposed.
     pub fn is_open(&self) -> bool {
         !self.faces.is_empty()
     }
 
-    /// Returns true if a triangle is exposed.
+    /// True if a triangle is exposed.
     pub fn is_exposed(&self, triangle: usize) -> bool {
         self.is_exposed[triangle]
     }
 
-    /// Returns true if all these nodes are corners of exposed triangles.
+    /// True if all these nodes are corners of exposed triangles.
     pub fn contains(&self, mut nodes: impl Iterator<Item = u32>) -> bool {
         nodes.all(|node| self.is_corner[node as usize])
     }
@@ -289,7 +289,7 @@ impl CollisionSurface {
         BORDER_WIDTH * self.short_edge
     }
 
-    /// Returns true if two edges of the body were initially apart along a direction. The tissue between them is then
+    /// True if two edges of the body were initially apart along a direction. The tissue between them is then
     /// their own, as in a thin wedge between two cuts.
     fn were_initially_apart(&self, edge: [u32; 2], other: [u32; 2], along: Vec3) -> bool {
         self.initial_positions.as_ref().is_some_and(|initial_positions| {
@@ -299,7 +299,7 @@ impl CollisionSurface {
         })
     }
 
-    /// Returns true if a node was initially behind a triangle within `max_distance`, m. The tissue behind the triangle
+    /// True if a node was initially behind a triangle within `max_distance`, m. The tissue behind the triangle
     /// is then its own.
     fn was_initially_behind(&self, node: u32, triangle: [u32; 3], max_distance: f32) -> bool {
         self.initial_positions.as_ref().is_some_and(|initial_positions| {

@@ -8,11 +8,12 @@
 //! for a regular tetrahedron and 1 for a flat one. So each element adds the stiffness `V c |g_a| sum |g_b|` to a node,
 //! with `c = lambda + 2 mu gamma`.
 //!
-//! An element with the deformation R U has the form of the displacements `U R^T u_a`, and of the cofactors of U in the
-//! volume term. `TetrahedronGroups::forces` computes c for it, with the stress. The stiffness of a node's elements and
+//! An element with the deformation R U has the same quadratic form, in `U R^T u_a` instead of `u_a`, and in the
+//! cofactors of U in the volume term. `TetrahedronGroups::forces` computes c for it, with the stress. The stiffness of a node's elements and
 //! springs over its mass bounds the squared frequencies. Pinned corners have no displacement and are left out.
 //!
-//! Springs do not stiffen with the elements, so all elements share a part P of the springs' bound. Let E be the bound
+//! Elements stiffen together, and springs do not, so their bounds are kept apart: all elements share a part P of the
+//! springs' bound. Let E be the bound
 //! of a node's elements and S that of its springs, with the elements s >= 1 times as stiff as at rest. Then `S + s E`
 //! is at most `P + s max(E, E + S - P)`. P is chosen such that this is exact at rest.
 

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3, Vec3};
 
 use super::definition::{Coupling, expanded};
 use super::model::{HapticContact, WrenchModel};
-use super::observer::Observer;
+use super::passivity::PassivityObserver;
 use super::six::{self, Vector6};
 #[cfg(doc)]
 use crate::base::Error;
@@ -127,7 +127,7 @@ pub struct HapticHandle {
     /// The last wrench of the tissue on the proxy.
     on_proxy: Vector6,
     gain: f64,
-    observer: Observer,
+    observer: PassivityObserver,
 }
 
 /// The motion of the device in a tick.
@@ -158,7 +158,7 @@ impl HapticHandle {
             on_device: six::ZERO,
             on_proxy: six::ZERO,
             gain: 1.0,
-            observer: Observer::default(),
+            observer: PassivityObserver::default(),
         }
     }
 

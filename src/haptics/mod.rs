@@ -1,13 +1,13 @@
 //! Haptic rendering at 1 kHz beside a simulation at 60 Hz.
 //!
 //! The simulation thread publishes a *local model* of the tissue at a tool (`model.rs`, `secant.rs`). The device thread
-//! renders it through a virtual coupling (`handle.rs`). A passivity observer limits its energy (`observer.rs`). The
+//! renders it through a virtual coupling (`handle.rs`). A passivity observer limits its energy (`passivity.rs`). The
 //! threads exchange models and poses without waiting.
 
 mod definition;
 mod handle;
 mod model;
-mod observer;
+mod passivity;
 mod secant;
 mod six;
 

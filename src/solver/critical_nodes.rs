@@ -11,7 +11,7 @@ use crate::springs::{Springs, spring_rates};
 /// The inverse of the fraction of critical nodes.
 const NODES_PER_CRITICAL: usize = 16;
 
-/// A node and its longest stable substep at all positions (s).
+/// A node and its longest stable substep at all positions, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CriticalNode {
     pub limit: f32,
@@ -33,7 +33,7 @@ pub(crate) struct CriticalNodes {
     /// Sorted by limit. The capacity is twice the number of critical nodes.
     candidates: Vec<CriticalNode>,
     max: usize,
-    /// A lower bound of the limit of all other nodes (s).
+    /// A lower bound of the limit of all other nodes, s.
     other_limit: f32,
 }
 
@@ -54,14 +54,14 @@ impl CriticalNodes {
         &self.candidates
     }
 
-    /// The longest substep that is stable at all positions (s).
+    /// The longest substep that is stable at all positions, s.
     pub fn limit(&self) -> f32 {
         // Springs of the first node may have become softer than those of others.
         let first = self.candidates.first();
         first.map_or(self.other_limit, |first| first.limit.min(self.other_limit))
     }
 
-    /// A lower bound of the limit of nodes that are not critical (s).
+    /// A lower bound of the limit of nodes that are not critical, s.
     pub(super) fn other_limit(&self) -> f32 {
         self.other_limit
     }

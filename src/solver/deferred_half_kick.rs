@@ -23,7 +23,7 @@ use crate::threads::{Items, Team};
 /// A half kick that the velocities lack.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct DeferredHalfKick {
-    /// The substep that it closes (s).
+    /// The substep that it closes, s.
     pub substep: f32,
     pub gravity: Vec3,
 }
@@ -31,12 +31,12 @@ pub(crate) struct DeferredHalfKick {
 saved! { DeferredHalfKick { substep, gravity } }
 
 impl DeferredHalfKick {
-    /// The velocity change by gravity (m/s).
+    /// The velocity change by gravity, m/s.
     pub fn gravity_change(&self) -> DVec3 {
         self.gravity.as_dvec3() * (0.5 * f64::from(self.substep))
     }
 
-    /// True if it can be merged with the half kick that opens a step with this `substep` (s). Applied forces belong to
+    /// True if it can be merged with the half kick that opens a step with this `substep`, s. Applied forces belong to
     /// one step only. Damping has a different factor for each substep.
     pub fn can_merge(&self, body: &System, substep: f32, gravity: Vec3) -> bool {
         let same = Self { substep, gravity } == *self;
@@ -175,7 +175,7 @@ pub(crate) fn preview_flush(body: &mut System) -> Option<FlushPreview> {
 }
 
 impl FlushPreview {
-    /// The mean reaction of each pin over the last step (N). Springs and masses must still be those of the step.
+    /// The mean reaction of each pin over the last step, N. Springs and masses must still be those of the step.
     pub fn forces(&self, body: &System) -> Result<Vec<Vec3>> {
         let mut forces = memory::reserved(body.pins.iter().count())?;
         forces.extend(body.pins.iter().map(|pin| body.mean_force(pin)));
@@ -231,7 +231,7 @@ pub(crate) fn visit_flushed(body: &System, deferred: &DeferredHalfKick, visit: &
 }
 
 /// Corrects the velocity of `node` so that the deferred half kick gives the same result as with an additional `force`
-/// (N). Pass the force of a removed spring, or the negated force of an added one.
+///, N. Pass the force of a removed spring, or the negated force of an added one.
 pub(crate) fn correct_deferred_kick(body: &mut System, node: u32, mut force: Vec3) {
     let Some(deferred) = body.carry.deferred_kick else {
         return;
@@ -257,7 +257,7 @@ pub(crate) fn correct_deferred_kick(body: &mut System, node: u32, mut force: Vec
 }
 
 impl System {
-    /// The mean reaction of a pin over the last step (N).
+    /// The mean reaction of a pin over the last step, N.
     pub(crate) fn mean_force(&self, pin: &Pin) -> Vec3 {
         let Some(deferred) = self.carry.deferred_kick.filter(|_| pin.deferred_share > 0.0) else {
             return pin.force;

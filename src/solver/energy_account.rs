@@ -16,7 +16,7 @@ const MIN_COMPARISONS: u32 = 3;
 /// The tolerated excess as a fraction of the kinetic energy: the shadow energy of nonlinear motion fluctuates.
 const TOLERANCE: f64 = 5e-4;
 
-/// The decay time of older comparisons (s).
+/// The decay time of older comparisons, s.
 const MEMORY: f64 = 5.0;
 
 /// Substeps are halved when more than this fraction of the kinetic energy was removed recently.
@@ -29,7 +29,7 @@ const COARSEN_FRACTION: f64 = 0.5;
 /// The same fraction for the kinetic energy of the last second. It detects the end of a blow that set a body in motion.
 const COARSEN_RECENT_FRACTION: f64 = 1.0 / 16.0;
 
-/// The decay time of the recent kinetic energy (s). It is longer than the oscillation period of tissue.
+/// The decay time of the recent kinetic energy, s. It is longer than the oscillation period of tissue.
 const RECENT: f64 = 1.0;
 
 /// The maximum refinement of substeps relative to the stability limit.
@@ -38,25 +38,25 @@ const MAX_REFINEMENT: u32 = 8;
 /// The energy budget and its history.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EnergyAccount {
-    /// The energy budget at the last comparison (J). `None` after a change from outside.
+    /// The energy budget at the last comparison, J. `None` after a change from outside.
     reference: Option<f64>,
-    /// The work since the last comparison (J).
+    /// The work since the last comparison, J.
     work: f64,
-    /// The gravity of the last step (m/s²).
+    /// The gravity of the last step, m/s².
     gravity: Vec3,
     /// Substeps and seconds since the last comparison.
     substeps: u32,
     time: f64,
     /// The number of comparisons since a change from outside.
     comparisons: u32,
-    /// The decaying maximum of the kinetic energy with decay times `MEMORY` and `RECENT` (J).
+    /// The decaying maximum of the kinetic energy with decay times `MEMORY` and `RECENT`, J.
     kinetic: f64,
     recent: f64,
     /// The recently removed energy as a fraction of `kinetic`.
     removed: f64,
     /// The refinement factor of substeps relative to the stability limit.
     refinement: u32,
-    /// The value of `kinetic` when `refinement` last changed (J).
+    /// The value of `kinetic` when `refinement` last changed, J.
     refined_at: f64,
     /// The group of bodies that share the account; 0 for a single body.
     group: u64,
@@ -118,7 +118,7 @@ impl EnergyAccount {
         self.reference.is_none() && self.substeps == 0 && self.group == 0
     }
 
-    /// Starts the account of an uncoupled body with a kinetic and potential energy of `energy` (J).
+    /// Starts the account of an uncoupled body with a kinetic and potential energy of `energy`, J.
     pub(super) fn start(&mut self, gravity: Vec3, energy: f64) {
         self.gravity = gravity;
         self.reference = energy.is_finite().then_some(energy);
@@ -127,7 +127,7 @@ impl EnergyAccount {
         self.reset_interval();
     }
 
-    /// Records a step of `dt` seconds in which `work` was done (J).
+    /// Records a step of `dt` seconds in which `work` was done, J.
     pub(super) fn record_step(&mut self, gravity: Vec3, substeps: u32, dt: f32, work: f64) {
         if self.gravity != gravity {
             self.forget();
@@ -138,12 +138,12 @@ impl EnergyAccount {
         self.work += work;
     }
 
-    /// Records `energy` that was added from outside (J). A value that is not finite discards the reference.
+    /// Records `energy` that was added from outside, J. A value that is not finite discards the reference.
     pub fn gain(&mut self, energy: f64) {
         self.lose(energy.is_finite().then_some(-energy));
     }
 
-    /// Records `energy` that was removed with mass (J). `None` discards the reference.
+    /// Records `energy` that was removed with mass, J. `None` discards the reference.
     pub(super) fn lose(&mut self, energy: Option<f64>) {
         match energy {
             Some(energy) => self.work -= energy,
@@ -170,7 +170,7 @@ impl EnergyAccount {
         self.refinement
     }
 
-    /// Compares the energies with the reference. Returns the kinetic energy to remove (J).
+    /// Compares the energies with the reference. Returns the kinetic energy to remove, J.
     pub fn compare(&mut self, energies: &Energies) -> f64 {
         let Energies {
             all: energy,
@@ -198,7 +198,7 @@ impl EnergyAccount {
         (energy - allowed - TOLERANCE * self.kinetic - rounding).max(0.0)
     }
 
-    /// Updates the refinement after `removed` kinetic energy was taken off (J).
+    /// Updates the refinement after `removed` kinetic energy was taken off, J.
     pub fn refine(&mut self, removed: f64) {
         if removed > 0.0 {
             self.removed += removed / self.kinetic;

@@ -43,7 +43,7 @@ pub(crate) struct EnergyMonitor<'a> {
 impl<'a> EnergyMonitor<'a> {
     pub fn new(body: &System, carry: &IntegratorState, request: &'a StepRequest<'a>, substeps: u32) -> Self {
         // Partly sleeping bodies exchange energy with sleeping tiles. Fixed substeps are not monitored.
-        let is_monitored = request.substeps == 0 && !body.sleeps();
+        let is_monitored = request.substeps == 0 && !body.any_tile_asleep();
         Self {
             request,
             substeps,
@@ -97,7 +97,7 @@ impl<'a> EnergyMonitor<'a> {
         sums.map(|sums| sums.after_flush(body, carry, substep, team))
     }
 
-    /// The work of applied forces, moving pins and moving tools (J).
+    /// The work of applied forces, moving pins and moving tools, J.
     fn work(&self, body: &System) -> f64 {
         let mut work = 0.0;
         let (first, (last, _)) = (body.state.positions(), body.state.newest());

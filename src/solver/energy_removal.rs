@@ -7,7 +7,7 @@ use super::energy_account::EnergyAccount;
 use crate::base::{outer, trace};
 use crate::soa::Vectors;
 
-/// Removes `energy` from the kinetic energy of deformation, at the newest velocities (J). Returns the removed energy
+/// Removes `energy` from the kinetic energy of deformation, at the newest velocities, J. Returns the removed energy
 /// (J), which is at most all of it. An unconstrained body keeps its linear and angular momentum. `at_next`: the
 /// velocities belong to the next positions.
 pub(crate) fn remove_kinetic_energy(body: &mut System, energy: f64, at_next: bool) -> f64 {

@@ -12,7 +12,7 @@ use crate::simd::Loops;
 use crate::soa::{TILE, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
-/// A body with a lower mean speed is at rest up to rounding (m/s).
+/// A body with a lower mean speed is at rest up to rounding, m/s.
 const REST_SPEED: f64 = 1e-4;
 
 /// A body whose nodes move by less than this fraction of its extent per substep is at rest too. Rounding of
@@ -22,7 +22,7 @@ const REST_DISPLACEMENT: f64 = 4.0 * f32::EPSILON as f64;
 /// Rounding errors, as fractions of the total energy and of the kinetic energy of rigid motion.
 const ROUNDING: [f64; 2] = [1e-6, 1e-4];
 
-/// The energies that the monitor compares, of one body or several (J).
+/// The energies that the monitor compares, of one body or several, J.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Energies {
     pub all: f64,
@@ -48,16 +48,16 @@ impl Energies {
 /// Sums over the nodes of a tile or a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TileSums {
-    /// Kinetic energy of free nodes (J).
+    /// Kinetic energy of free nodes, J.
     kinetic: f64,
-    /// Momentum of free nodes (kg m/s).
+    /// Momentum of free nodes, kg m/s.
     momentum: DVec3,
-    /// Sum of `m x` over the mass that gravity acts on (kg m).
+    /// Sum of `m x` over the mass that gravity acts on, kg m.
     moment: DVec3,
     mass: f64,
     free_mass: f64,
     /// Kinetic part of the shadow energy. It contains first the part of the velocities before the closing half kick,
-    /// then the part of those after it (J).
+    /// then the part of those after it, J.
     shadow: f64,
     elastic: f64,
 }
@@ -129,7 +129,7 @@ impl TileSums {
         sums
     }
 
-    /// The kinetic plus potential energy at the beginning of a step, with velocities at the time of the positions (J).
+    /// The kinetic plus potential energy at the beginning of a step, with velocities at the time of the positions, J.
     /// `None` if less than half of it is kinetic.
     pub(super) fn at_start(
         body: &mut System,
@@ -152,7 +152,7 @@ impl TileSums {
     }
 
     /// The kinetic energy without rigid motion, and the kinetic energy of the rigid translation of an unconstrained
-    /// body (J).
+    /// body, J.
     fn kinetic_parts(&self, constrained: BVec3) -> [f64; 2] {
         let translation =
             DVec3::select(constrained, DVec3::ZERO, self.momentum).length_squared() / (2.0 * self.free_mass);
@@ -195,7 +195,7 @@ struct AxisSums<'a> {
 /// The number of independent accumulators, which hides the latency of additions.
 const LANES: usize = 8;
 
-/// The mass of a node; 0 if it is pinned (kg).
+/// The mass of a node; 0 if it is pinned, kg.
 #[inline(always)]
 fn free_mass(inverse_mass: f32) -> f64 {
     if inverse_mass > 0.0 {
@@ -267,7 +267,7 @@ impl Loops for Product<'_> {
     }
 }
 
-/// Returns two energies (J): the part of the shadow energy that depends on velocities after the closing half kick, and
+/// Returns two energies, J: the part of the shadow energy that depends on velocities after the closing half kick, and
 /// the potential energy of internal forces at the newest positions. The work of a constant pressure is subtracted from
 /// the second one.
 fn flush_contribution(body: &mut System, carry: &IntegratorState, team: &Team) -> [f64; 2] {

@@ -1,6 +1,6 @@
 //! Flushes subnormal numbers to zero: processors may take a hundred times as long for them.
 
-/// Returns a velocity, or 0 if its square would be subnormal (m/s).
+/// Returns a velocity, or 0 if its square would be subnormal, m/s.
 #[inline(always)]
 pub(super) fn flush_velocity(velocity: f32) -> f32 {
     /// 2^-63 m/s.

@@ -12,7 +12,7 @@ use crate::geometry::Aabb;
 /// The state of gravity's kicks over a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GravityKicks {
-    /// The velocity change that was not applied yet (m/s).
+    /// The velocity change that was not applied yet, m/s.
     residual: DVec3,
     /// The bounding box of all velocities after the last kick.
     pub velocities: Aabb,
@@ -29,7 +29,7 @@ impl GravityKicks {
         }
     }
 
-    /// Returns the velocity change to apply for a requested `change` (m/s).
+    /// Returns the velocity change to apply for a requested `change`, m/s.
     pub fn next(&mut self, change: DVec3) -> Vec3 {
         let requested = change + self.residual;
         let fastest = self.velocities.magnitudes().as_dvec3() + requested.abs();

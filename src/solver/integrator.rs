@@ -161,7 +161,7 @@ pub(crate) struct CoupledStep<'a> {
 }
 
 impl CoupledStep<'_> {
-    /// The length of a substep (s).
+    /// The length of a substep, s.
     pub fn substep(&self) -> f32 {
         (f64::from(self.request.dt) / f64::from(self.substeps)) as f32
     }
@@ -176,7 +176,7 @@ pub(crate) struct CoupledBody {
     pub(super) substep_kick: SubstepKick,
     /// The energy sums before the closing half kick, if the step ends with an energy comparison.
     pub sums: Option<TileSums>,
-    /// The kinetic energy that can be removed (J).
+    /// The kinetic energy that can be removed, J.
     pub internal_kinetic: f64,
     /// The number of substeps that it would take on its own.
     pub uncoupled_substeps: u32,

@@ -15,7 +15,7 @@ use crate::nodes::NodeDamping;
 use crate::simd::{ChosenKernel, Loops};
 use crate::soa::{TileForces, Vectors};
 
-/// The inverse masses of free nodes (1/kg).
+/// The inverse masses of free nodes, 1/kg.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum InverseMasses<'a> {
     /// One value for all nodes, including pinned ones, which are constrained elsewhere.
@@ -45,17 +45,17 @@ impl<'a> Inertia<'a> {
 /// One kick of a body.
 #[derive(Clone, Copy)]
 pub(super) struct Kick<'a> {
-    /// The time that the forces act (s).
+    /// The time that the forces act, s.
     pub duration: f32,
-    /// The duration of the drift after it (s).
+    /// The duration of the drift after it, s.
     pub substep: f32,
     /// True for a half kick.
     pub half: bool,
     pub gravity: Vec3,
-    /// The velocity change by gravity of a node without damping (m/s).
+    /// The velocity change by gravity of a node without damping, m/s.
     pub gravity_change: Vec3,
     pub inertia: Inertia<'a>,
-    /// Applied forces (N).
+    /// Applied forces, N.
     pub applied: Option<&'a Vectors>,
     pub damping: Option<&'a NodeDamping>,
 }

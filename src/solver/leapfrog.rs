@@ -15,7 +15,7 @@ use crate::geometry::Aabb;
 use crate::soa::per_node;
 use crate::threads::Team;
 
-/// The maximum number of restarts with shorter substeps in a step whose own motion requires them.
+/// The maximum number of restarts of a step because its motion makes the substeps too long.
 const MAX_ATTEMPTS: u32 = 4;
 
 /// The maximum number of mass updates within a step for elements that its motion stiffens.

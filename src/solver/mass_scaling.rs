@@ -37,7 +37,7 @@ const MAX_MARGIN: f32 = 10.0;
 /// the body.
 const STIFFENED_BOUND_FACTOR: f64 = 10.0;
 
-/// The time after which masses are those of elements at rest again (s).
+/// The time after which masses are those of elements at rest again, s.
 const STIFFENED_TIME: f32 = 0.25;
 
 /// The number of nodes between two tests of the mass bound.
@@ -49,19 +49,19 @@ pub(crate) struct AddedMass {
     pub node: u32,
     /// The bounds of elements, terms and cavities at the node.
     non_spring: NodalStiffness,
-    /// The sum over springs and `non_spring` (N/m).
+    /// The sum over springs and `non_spring`, N/m.
     stiffness: f32,
-    /// The sum of damping along springs (N s/m).
+    /// The sum of damping along springs, N s/m.
     damping: f32,
     /// The stiffness of its elements relative to the rest shape.
     stiffening: f32,
     /// The value of `stiffening` at the end of the last step. `None` if the node was not in the list.
     committed_stiffening: Option<f32>,
-    /// Its damping over its unscaled mass (1/s).
+    /// Its damping over its unscaled mass, 1/s.
     rate: f32,
-    /// The added mass (kg).
+    /// The added mass, kg.
     pub added: f32,
-    /// The value of `added` at the end of the last step (kg).
+    /// The value of `added` at the end of the last step, kg.
     committed: f32,
 }
 
@@ -84,19 +84,19 @@ impl AddedMass {
     }
 
     /// The mass for which a substep of `step` seconds is stable, if elements stiffen further by the factor `margin`
-    /// (kg).
+    ///, kg.
     fn required_mass(&self, step: f64, margin: f32) -> f64 {
         let extra_stiffness =
             (f64::from(margin * self.stiffening) - 1.0).max(0.0) * f64::from(self.non_spring.stiffness);
         step * (0.5 * step * (f64::from(self.stiffness) + extra_stiffness) + f64::from(self.damping))
     }
 
-    /// The change of added mass since the end of the last step (kg).
+    /// The change of added mass since the end of the last step, kg.
     pub fn change(&self) -> f32 {
         self.added - self.committed
     }
 
-    /// The longest stable substep with this mass (s).
+    /// The longest stable substep with this mass, s.
     fn stable_step(&self, mass: f64) -> f64 {
         let damping = f64::from(self.damping);
         2.0 * mass / (damping + (damping * damping + 2.0 * mass * f64::from(self.stiffness)).sqrt())
@@ -124,21 +124,21 @@ pub(crate) struct MassScaleTarget<'a> {
 /// The mass scaling of a body.
 #[derive(Debug)]
 pub(crate) struct MassScaling {
-    /// The bound of the added mass (kg).
+    /// The bound of the added mass, kg.
     max_added: f64,
-    /// The mass of the body (kg).
+    /// The mass of the body, kg.
     body_mass: f64,
     /// The used fraction of the stable substep.
     reserve: f64,
-    /// The longest stable substep without added mass (s). It holds at all positions, or at rest if there are elements.
+    /// The longest stable substep without added mass, s. It holds at all positions, or at rest if there are elements.
     unscaled_substep: f64,
     /// The common inverse mass of all nodes without added mass, if there is one.
     pub uniform_inverse_mass: Option<f32>,
     /// Sorted by node.
     candidates: Vec<AddedMass>,
-    /// The longest substep for which no other node needs mass (s).
+    /// The longest substep for which no other node needs mass, s.
     complete_up_to: f64,
-    /// The substep that masses are computed for (s); 0 without added mass.
+    /// The substep that masses are computed for, s; 0 without added mass.
     step: f32,
     /// The fraction of the mass that gravity acts on, equal for all nodes of an unconstrained body, so that it does not
     /// rotate. `None`: gravity acts on the unscaled mass.
@@ -147,7 +147,7 @@ pub(crate) struct MassScaling {
     stiffenings: Vec<f32>,
     /// The factor of further stiffening that masses allow for; 1 at rest.
     pub margin: f32,
-    /// The time since masses were computed for deformed elements (s).
+    /// The time since masses were computed for deformed elements, s.
     stiffened_age: Option<f32>,
     /// The values at the end of the last step.
     committed_stiffened_age: Option<f32>,
@@ -237,12 +237,12 @@ impl MassScaling {
         }))
     }
 
-    /// The substep that masses are computed for (s); 0 without added mass.
+    /// The substep that masses are computed for, s; 0 without added mass.
     pub fn step(&self) -> f32 {
         self.step
     }
 
-    /// The total added mass (kg).
+    /// The total added mass, kg.
     pub fn added_mass(&self) -> f64 {
         self.candidates.iter().map(|candidate| f64::from(candidate.added)).sum()
     }
@@ -467,7 +467,7 @@ impl MassScaling {
             (is_free && damping.is_none() && added > 0.0).then(|| (self.body_mass / (self.body_mass + added)) as f32);
     }
 
-    /// Sets the damping rates of nodes at their unscaled mass (1/s).
+    /// Sets the damping rates of nodes at their unscaled mass, 1/s.
     pub fn set_rates(&mut self, rates: &[f32]) {
         for candidate in &mut self.candidates {
             candidate.rate = rates[candidate.node as usize];

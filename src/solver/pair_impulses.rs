@@ -10,7 +10,7 @@ use crate::nodes::{Bindings, weighted_nodes};
 /// The interval that impulses act in.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SubstepSpan<'a> {
-    /// The length of the substep or step (s).
+    /// The length of the substep or step, s.
     pub duration: f32,
     /// True if positions change. False for the closing half kick of a step.
     pub drifts: bool,
@@ -58,7 +58,7 @@ impl System {
         (self.inverse_masses[node] > 0.0).then_some(constrained)
     }
 
-    /// Sets the mean velocity of a node in a substep (m/s) after an `impulse` (N s). The constrained part of the
+    /// Sets the mean velocity of a node in a substep (m/s) after an `impulse`, N s. The constrained part of the
     /// impulse goes to the pin.
     pub fn set_mean_velocity(&mut self, node: usize, velocity: Vec3, impulse: Vec3, span: &SubstepSpan) {
         let Some(constrained) = self.apply_to_pin(node, impulse, span) else {
@@ -118,7 +118,7 @@ impl System {
         weighted_nodes(self.bindings.as_ref(), self.order.own(node))
     }
 
-    /// The inverse mass of a node along each axis; 0 along constrained axes (1/kg).
+    /// The inverse mass of a node along each axis; 0 along constrained axes, 1/kg.
     pub fn inverse_mass_along_axes(&self, node: u32) -> Vec3 {
         let constrained = self.pins.axes_of(node);
         Vec3::select(constrained, Vec3::ZERO, Vec3::splat(self.inverse_masses[node as usize]))
@@ -135,7 +135,7 @@ impl System {
         }
     }
 
-    /// The mean velocity of a node in a substep (m/s).
+    /// The mean velocity of a node in a substep, m/s.
     pub fn mean_velocity(&mut self, node: usize) -> Vec3 {
         match self.integrator.solution() {
             None => self.state.substep().velocities.get(node),
@@ -144,7 +144,7 @@ impl System {
     }
 
     /// Returns the bindings of its points, and a function from a node to its position at the start of a substep and its
-    /// mean velocity (m/s).
+    /// mean velocity, m/s.
     pub fn motion(&mut self) -> (Option<&Bindings>, impl Fn(usize) -> (Vec3, Vec3)) {
         let (state, solution) = (self.state.substep(), self.integrator.solution());
         let motion_of = move |node| {
@@ -154,7 +154,7 @@ impl System {
         (self.bindings.as_ref(), motion_of)
     }
 
-    /// Replaces the applied force on a node (N).
+    /// Replaces the applied force on a node, N.
     pub fn set_applied_force(&mut self, node: usize, force: Vec3) {
         if let Some(applied) = &mut self.applied {
             applied.set(node, force);
@@ -162,7 +162,7 @@ impl System {
         }
     }
 
-    /// Sets the mean velocity of an attached node in a substep (m/s) after a total `impulse` (N s). The constrained
+    /// Sets the mean velocity of an attached node in a substep (m/s) after a total `impulse`, N s. The constrained
     /// part of the impulse goes to the pin.
     pub fn set_attached_velocity(&mut self, node: usize, velocity: Vec3, impulse: Vec3, span: &SubstepSpan) {
         let Some(constrained) = self.apply_to_pin(node, impulse, span) else {
@@ -211,7 +211,7 @@ impl System {
         });
     }
 
-    /// Passes a contact impulse on a node to the next equation of an implicit body (N s).
+    /// Passes a contact impulse on a node to the next equation of an implicit body, N s.
     pub fn record_contact_impulse(&mut self, node: u32, impulse: Vec3) {
         let free = self.inverse_mass_along_axes(node).cmpgt(Vec3::ZERO);
         if let Some(solution) = self.integrator.solution_mut() {

@@ -24,8 +24,7 @@ const HYSTERESIS: f32 = 0.5;
 /// The mean rounding error of the forces on a tile, relative to that on one node.
 const ROUNDING: f32 = 0.05;
 
-/// The displacement of a node's equilibrium relative to the displacement of one neighbor. A node has at least about
-/// four neighbors.
+/// How far the equilibrium of a node moves if one neighbor moves by 1. A node has at least about four neighbors.
 const NEIGHBOR_RESPONSE: f32 = 0.25;
 
 /// The distance at which tools wake tissue, as a fraction of the body's extent.
@@ -33,7 +32,7 @@ const WAKE_DISTANCE: f32 = 0.02;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct SleepTile {
-    /// The time at rest (s).
+    /// The time at rest, s.
     rest_time: f32,
     /// True if a tool is near.
     is_touched: bool,
@@ -56,10 +55,10 @@ pub(crate) struct SleepState {
     starts: Vec<u32>,
     /// True if single tiles may sleep. A body whose solver or forces couple all nodes sleeps as a whole.
     by_tile: bool,
-    /// The box in which tools wake the body, and the distance at which they wake a tile (m).
+    /// The box in which tools wake the body, and the distance at which they wake a tile, m.
     bounds: Aabb,
     margin: f32,
-    /// The length of the last step (s). Tools keep the wrench of that step while the body sleeps.
+    /// The length of the last step, s. Tools keep the wrench of that step while the body sleeps.
     step: f32,
     /// The rest time and sleep flag of each tile before an attempted step woke tiles. Empty if it woke none.
     saved: Vec<(f32, bool)>,
@@ -234,7 +233,7 @@ impl System {
     }
 
     /// True if any tile sleeps.
-    pub(crate) fn sleeps(&self) -> bool {
+    pub(crate) fn any_tile_asleep(&self) -> bool {
         self.sleep_state
             .as_ref()
             .is_some_and(|sleep_state| sleep_state.asleep_count > 0)
@@ -248,7 +247,7 @@ impl System {
         }
     }
 
-    /// The length of the last step of a sleeping body (s).
+    /// The length of the last step of a sleeping body, s.
     pub(crate) fn last_step(&self) -> f32 {
         self.sleep_state.as_ref().map_or(0.0, |sleep_state| sleep_state.step)
     }
@@ -300,7 +299,7 @@ impl System {
 
     /// Wakes the tiles near moving tools at the beginning of a step.
     pub(crate) fn wake_near_tools(&mut self, tools: &[ToolPath]) {
-        if !self.sleeps() {
+        if !self.any_tile_asleep() {
             return;
         }
         if self.has_tool_attachments() {
@@ -318,7 +317,9 @@ impl System {
     /// True if a tool collides with the body and is near a sleeping part.
     fn may_touch(&self, tool: &ToolPath) -> bool {
         let is_near = |sleep_state: &SleepState| tool.is_near(&sleep_state.bounds, self.origin, 0.0);
-        tool.filter.meets(self.contact.filter) && self.sleeps() && self.sleep_state.as_deref().is_some_and(is_near)
+        tool.filter.meets(self.contact.filter)
+            && self.any_tile_asleep()
+            && self.sleep_state.as_deref().is_some_and(is_near)
     }
 
     /// Wakes the tiles near a tool that collides with the body.

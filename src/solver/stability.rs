@@ -37,13 +37,13 @@ const FEW_NODES: usize = 8;
 /// The longest stable substep of a body with unscaled masses, as far as it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stability {
-    /// The limit at the positions of the last estimate (s). `None` if masses or pins have changed since.
+    /// The limit at the positions of the last estimate, s. `None` if masses or pins have changed since.
     current: Option<f32>,
-    /// The limit at all positions (s).
+    /// The limit at all positions, s.
     anywhere: f32,
-    /// The result of the last estimate (s).
+    /// The result of the last estimate, s.
     last_estimate: f32,
-    /// The relative displacement of neighbors for which the estimate remains valid (m).
+    /// The relative displacement of neighbors for which the estimate remains valid, m.
     valid_travel: f32,
 }
 
@@ -57,17 +57,17 @@ impl Stability {
         valid_travel: 0.0,
     };
 
-    /// The longest stable substep, if it is known (s).
+    /// The longest stable substep, if it is known, s.
     pub fn limit(&self) -> Option<f32> {
         self.current
     }
 
-    /// The longest substep that is stable at all positions (s). Valid if `limit` is known.
+    /// The longest substep that is stable at all positions, s. Valid if `limit` is known.
     pub fn limit_anywhere(&self) -> f32 {
         self.anywhere
     }
 
-    /// The result of the last estimate at its positions (s).
+    /// The result of the last estimate at its positions, s.
     pub fn last_estimate(&self) -> f32 {
         self.last_estimate
     }
@@ -79,7 +79,7 @@ impl Stability {
     }
 
     /// The number of substeps for which the estimate is valid, if neighbors move relative to each other by `travel` in
-    /// each (m).
+    /// each, m.
     pub fn valid_substeps(&self, travel: f32) -> f32 {
         if travel > 0.0 {
             self.valid_travel / travel
@@ -107,7 +107,7 @@ impl Stability {
         self.last_estimate > WORTH_LENGTHENING * self.anywhere
     }
 
-    /// Returns a copy with the limit reduced to at most `limit` (s).
+    /// Returns a copy with the limit reduced to at most `limit`, s.
     pub fn shortened_to(self, limit: f32) -> Self {
         Self {
             current: self.current.map(|current| current.min(limit)),
@@ -153,7 +153,7 @@ impl Stability {
     }
 
     /// Finds the node with the shortest stable substep at these positions, the other end of its stiffest spring, and
-    /// that substep (s). `None` if no free node has springs.
+    /// that substep, s. `None` if no free node has springs.
     pub fn tightest(springs: &dyn Springs, masses: NodalMasses, positions: &Vectors) -> Option<([usize; 2], f32)> {
         let mut tightest = None;
         let mut shortest = f32::INFINITY;
@@ -260,9 +260,9 @@ impl Stability {
 
 /// The bound of the visited nodes.
 struct Tightest {
-    /// The shortest stable substep (s).
+    /// The shortest stable substep, s.
     limit: f32,
-    /// The shortest length over which the matrix of a critical node changes (m).
+    /// The shortest length over which the matrix of a critical node changes, m.
     shortest: f32,
 }
 
@@ -287,15 +287,15 @@ impl Tightest {
 
 /// The sums over the springs of a node.
 struct NodeBound {
-    /// The directional part of the stiffness matrices (1/s²).
+    /// The directional part of the stiffness matrices, 1/s².
     along: Symmetric,
-    /// The isotropic part (1/s²).
+    /// The isotropic part, 1/s².
     across: f32,
-    /// The damping matrices (1/s).
+    /// The damping matrices, 1/s.
     damping: Symmetric,
     /// The bounds of stiffness and damping at all positions.
     anywhere: FrequencyBound,
-    /// The shortest length over which one of the matrices changes (m).
+    /// The shortest length over which one of the matrices changes, m.
     shortest: f32,
 }
 
@@ -342,7 +342,7 @@ impl NodeBound {
         Some(sums)
     }
 
-    /// The longest stable substep of the node (s). Returns `known` if it is not shorter.
+    /// The longest stable substep of the node, s. Returns `known` if it is not shorter.
     fn limit_below(&self, known: f32) -> f32 {
         let bound = FrequencyBound {
             omega_sq: self.along.eigenvalue_bound() + self.across,

@@ -30,7 +30,7 @@ pub(crate) fn attempt(body: &mut System, request: &StepRequest, team: &Team) -> 
 }
 
 impl System {
-    /// The longest stable substep at the positions that an attempted step ended with, if known (s).
+    /// The longest stable substep at the positions that an attempted step ended with, if known, s.
     pub fn newest_limit(&self, carry: &IntegratorState) -> Option<f32> {
         carry
             .limit()
@@ -121,7 +121,7 @@ fn run_to_tolerance(
     }
 }
 
-/// The distance between the results of the last two attempts (m).
+/// The distance between the results of the last two attempts, m.
 fn compare(body: &mut System, request: &StepRequest, carry: &IntegratorState) -> f32 {
     let (positions, velocities) = body.state.newest();
     // The inverse of the highest frequency.

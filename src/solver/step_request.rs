@@ -20,18 +20,18 @@ const MAX_PARTS: u32 = 1 << 12;
 /// The input of a step.
 #[derive(Clone, Copy)]
 pub(crate) struct StepRequest<'a> {
-    /// The step length, above 0 (s).
+    /// The step length, above 0, s.
     pub dt: f32,
     pub gravity: Vec3,
     /// The number of substeps; 0 selects as many as stability requires.
     pub substeps: u32,
     pub max_substeps: u32,
-    /// The position tolerance (m); 0 disables it.
+    /// The position tolerance, m; 0 disables it.
     pub tolerance: f32,
     pub tools: &'a [ToolPath],
     /// The tools that are rigid bodies.
     pub dynamic: &'a [DynamicTool],
-    /// The maximum node speed of all coupled bodies (m/s). `None` for an uncoupled body.
+    /// The maximum node speed of all coupled bodies, m/s. `None` for an uncoupled body.
     pub neighbor_speed: Option<f32>,
     /// Collects the times of stages, if present.
     pub profile: Option<&'a Profile>,
@@ -113,7 +113,7 @@ pub(crate) struct IntegratorState {
     pub gravity: GravityKicks,
     /// The half kick that the velocities lack.
     pub deferred_kick: Option<DeferredHalfKick>,
-    /// The substep that masses are computed for (s). 0: masses are unscaled, and `stability` belongs to the current
+    /// The substep that masses are computed for, s. 0: masses are unscaled, and `stability` belongs to the current
     /// positions.
     pub scaling_substep: f32,
     pub energy: EnergyAccount,
@@ -134,7 +134,7 @@ impl IntegratorState {
         limit.min(self.substep_history.shortest() / RESERVE) / self.energy.refinement() as f32
     }
 
-    /// The longest stable substep with the present masses, if it is known (s).
+    /// The longest stable substep with the present masses, if it is known, s.
     pub fn limit(&self) -> Option<f32> {
         if self.scaling_substep > 0.0 {
             Some(self.scaling_substep)
@@ -159,9 +159,9 @@ pub(crate) enum Outcome {
     NotFinite,
     /// The step would need more substeps than allowed.
     Unstable {
-        /// The longest stable substep (s).
+        /// The longest stable substep, s.
         stable_substep: f32,
-        /// The error reached under a tolerance (m). Infinite if even twice the substeps are not allowed. 0 if stability
+        /// The error reached under a tolerance, m. Infinite if even twice the substeps are not allowed. 0 if stability
         /// is the limit.
         error: f32,
     },

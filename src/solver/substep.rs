@@ -39,16 +39,16 @@ pub(crate) struct SubstepKick {
     pub drifts: bool,
     /// True for a half kick.
     pub half: bool,
-    /// The time that forces act on nodes without damping (s).
+    /// The time that forces act on nodes without damping, s.
     pub duration: f32,
     /// The part of `duration` that belongs to this step, in substeps.
     pub step_share: f64,
-    /// The velocity change by gravity (m/s).
+    /// The velocity change by gravity, m/s.
     pub gravity_change: Vec3,
     /// Fractions of the step at which the drift starts and ends.
     pub start: f64,
     pub end: f64,
-    /// The length of the substep (s).
+    /// The length of the substep, s.
     pub substep: f32,
 }
 
@@ -113,7 +113,7 @@ impl SubstepKick {
     }
 }
 
-/// Rounding remainders of positions are tracked in shorter substeps (s). At 0.1 m from a body's origin, coordinates are
+/// Rounding remainders of positions are tracked in shorter substeps, s. At 0.1 m from a body's origin, coordinates are
 /// rounded by up to 4 nm. That is 0.015 mm/s over this substep and 1.5 mm/s over a hundredth of it.
 const REMAINDER_SUBSTEP: f32 = 2.5e-4;
 

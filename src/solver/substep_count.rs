@@ -16,7 +16,7 @@ const WORTH_ESTIMATING: f32 = 8.0;
 const BLADE_SUBSTEP_RATIO: f64 = 1.25;
 
 /// Returns the state that a step of VERLET begins with, and the longest stable substep of all forces except springs
-/// (s).
+///, s.
 pub(super) fn prepare(body: &mut System, request: &StepRequest, team: &Team) -> (IntegratorState, f32) {
     if body.forces.has_non_spring_forces() {
         // The limits of elements, terms and cavities depend on the masses of the step.
@@ -68,7 +68,7 @@ pub(crate) struct StepPlan {
 }
 
 impl StepPlan {
-    /// Plans a step from `start`, given the longest stable substep and that of all forces except springs (s).
+    /// Plans a step from `start`, given the longest stable substep and that of all forces except springs, s.
     pub fn new(
         body: &System,
         request: &StepRequest,
@@ -96,7 +96,7 @@ fn as_count(substeps: f64) -> u32 {
     substeps.clamp(1.0, f64::from(u32::MAX)) as u32
 }
 
-/// Returns `start` with the stable substep of springs limited to `stable_substep` (s).
+/// Returns `start` with the stable substep of springs limited to `stable_substep`, s.
 fn with_limit(start: IntegratorState, stable_substep: f32) -> IntegratorState {
     let stability = start.stability.shortened_to(stable_substep);
     IntegratorState { stability, ..start }
@@ -109,7 +109,7 @@ pub(super) fn refined(substeps: u32, start: &IntegratorState, request: &StepRequ
         .min(request.max_substeps.max(substeps))
 }
 
-/// The longest stable substep that is known before the step (s).
+/// The longest stable substep that is known before the step, s.
 pub(super) fn first_substep(body: &System, start: &IntegratorState, non_spring_limit: f32) -> f32 {
     let is_anywhere = start.stability.is_coarse() || is_better_anywhere(body, &start.stability);
     let of_springs = if is_anywhere {
@@ -128,17 +128,17 @@ fn is_better_anywhere(body: &System, stability: &Stability) -> bool {
 }
 
 /// Returns the substep of which `RESERVE` equals `RESERVE_ANYWHERE` of the limit at all positions, at most the last
-/// estimate (s).
+/// estimate, s.
 fn reduced_reserve_anywhere(stability: &Stability) -> f32 {
     (RESERVE_ANYWHERE / RESERVE * stability.limit_anywhere()).min(stability.last_estimate())
 }
 
-/// The number of substeps of a step with this stable substep (s).
+/// The number of substeps of a step with this stable substep, s.
 pub(crate) fn substeps_needed(request: &StepRequest, stable_substep: f32) -> f64 {
     (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil()
 }
 
-/// The smallest number of substeps with added mass, and the substep that masses are computed for (s). `None` if mass
+/// The smallest number of substeps with added mass, and the substep that masses are computed for, s. `None` if mass
 /// must not be added or saves too little.
 pub(super) fn fewer_substeps(body: &System, request: &StepRequest, stable_substep: f32) -> Option<(u32, f32)> {
     // A tolerance does not measure the error of added mass.

@@ -8,7 +8,7 @@
 use crate::base::StateHasher;
 use crate::codec::saved;
 
-/// The minimum time that a shortest substep is remembered (s). The maximum is twice that.
+/// The minimum time that a shortest substep is remembered, s. The maximum is twice that.
 const WINDOW: f32 = 1.0;
 
 /// Counts of substeps that differ by less than this are equal up to `f32` rounding.
@@ -17,9 +17,9 @@ const ROUNDING: f64 = 1e-3;
 /// The shortest substeps of recent steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SubstepHistory {
-    /// The shortest substep of the current window and of the previous one (s).
+    /// The shortest substep of the current window and of the previous one, s.
     shortest: [f32; 2],
-    /// The age of the current window (s).
+    /// The age of the current window, s.
     age: f32,
 }
 
@@ -32,7 +32,7 @@ impl SubstepHistory {
         age: 0.0,
     };
 
-    /// The shortest recent substep (s). Infinity if none is known.
+    /// The shortest recent substep, s. Infinity if none is known.
     pub fn shortest(&self) -> f32 {
         let [one, other] = self.shortest;
         one.min(other)

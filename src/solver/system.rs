@@ -43,9 +43,9 @@ pub(crate) struct System {
     pub order: NodeOrder,
     pub forces: Forces,
     pub kernel: ChosenKernel,
-    /// Masses (kg); 0 for permanently pinned nodes.
+    /// Masses, kg; 0 for permanently pinned nodes.
     pub masses: Vec<f32>,
-    /// Inverse masses with added mass (1/kg); 0 for pinned nodes.
+    /// Inverse masses with added mass, 1/kg; 0 for pinned nodes.
     pub inverse_masses: Vec<f32>,
     /// The common inverse mass of all free nodes, if there is one.
     pub uniform_inverse_mass: Option<f32>,
@@ -68,7 +68,7 @@ pub(crate) struct System {
     /// Velocities at the time of the positions, for springs with damping.
     pub predicted_velocities: Option<Vectors>,
     pub integrator: Box<dyn Integrator>,
-    /// Applied forces for the next step (N). Allocated with the first force.
+    /// Applied forces for the next step, N. Allocated with the first force.
     pub applied: Option<Vectors>,
     /// Velocities before the last half kick, of the committed and the attempted step. Present if the body may press
     /// other bodies.
@@ -96,7 +96,7 @@ pub(crate) struct System {
     pub cut_properties: Option<CutProperties>,
     /// The factor of the world's gravity.
     pub gravity_scale: f32,
-    /// Acceleration of all nodes in addition to gravity (m/s²).
+    /// Acceleration of all nodes in addition to gravity, m/s².
     pub acceleration: Vec3,
 }
 
@@ -251,7 +251,7 @@ impl System {
         self.pins.iter().fold(BVec3::FALSE, |axes, pin| axes | pin.axes)
     }
 
-    /// The longest stable substep of elements, terms and cavities at the current positions (s). Infinity if there are
+    /// The longest stable substep of elements, terms and cavities at the current positions, s. Infinity if there are
     /// none.
     pub fn non_spring_dt_limit(&mut self, team: &Team) -> f32 {
         let masses = NodalMasses {
@@ -302,12 +302,12 @@ impl System {
         }
     }
 
-    /// The acceleration that acts on all mass of the body, for the world's gravity (m/s²).
+    /// The acceleration that acts on all mass of the body, for the world's gravity, m/s².
     pub fn body_acceleration(&self, gravity: Vec3) -> Vec3 {
         gravity * self.gravity_scale + self.acceleration
     }
 
-    /// The acceleration of a node by gravity on its unscaled mass (m/s²). `gravity` is that of the body.
+    /// The acceleration of a node by gravity on its unscaled mass, m/s². `gravity` is that of the body.
     pub fn gravity_at(&self, node: usize, gravity: Vec3) -> Vec3 {
         match self.weight_share() {
             None => gravity * (self.masses[node] * self.inverse_masses[node]),
@@ -336,7 +336,7 @@ impl System {
         self.boxes.iter().fold(Aabb::EMPTY, Aabb::and)
     }
 
-    /// The largest side of the bounding box (m).
+    /// The largest side of the bounding box, m.
     pub fn extent(&self) -> f32 {
         let bounds = self.local_bounds();
         (bounds.max - bounds.min).max_element()

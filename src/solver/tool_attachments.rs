@@ -26,9 +26,9 @@ pub(crate) struct ToolAttachment {
     nodes: [u32; MAX_NODES],
     /// The weight of each node; 0 for unused entries.
     weights: [f32; MAX_NODES],
-    /// The mean force over a step at which the attachment breaks (N).
+    /// The mean force over a step at which the attachment breaks, N.
     limit: f32,
-    /// The force of the tool on the tissue, mean over the last step (N).
+    /// The force of the tool on the tissue, mean over the last step, N.
     pub force: Vec3,
 }
 
@@ -45,12 +45,12 @@ pub(crate) struct AttachedNode {
     pub tool: usize,
     /// The sum of the weights of its attachments in fixed point, so that adding and removing is exact.
     weight_sum: u64,
-    /// Its position in the tool frame (m). `None`: its position at the start of the next step.
+    /// Its position in the tool frame, m. `None`: its position at the start of the next step.
     offset: Option<DVec3>,
     /// The force and the torque about the tool's position, mean over the last step (N, N m).
     pub force: Vec3,
     pub torque: Vec3,
-    /// The velocity change at the last substep (m/s).
+    /// The velocity change at the last substep, m/s.
     velocity_change: Vec3,
     motion: HeldMotion,
 }
@@ -76,10 +76,10 @@ pub(crate) struct AttachPoint {
 #[derive(Clone, Copy, Debug, Default)]
 struct HeldMotion {
     offset: DVec3,
-    /// The distance between the node and its position in the tool frame at the start of the step (m). It is zero unless
+    /// The distance between the node and its position in the tool frame at the start of the step, m. It is zero unless
     /// the body was rolled back.
     gap: DVec3,
-    /// The velocity of the node and its change in the last substep (m/s).
+    /// The velocity of the node and its change in the last substep, m/s.
     velocity: Vec3,
     velocity_change: Vec3,
     /// The part of the pin's force sum that is already accounted for.
@@ -638,7 +638,7 @@ impl System {
 }
 
 impl HeldMotion {
-    /// Adds the reaction of a pinned node with this mass (kg), drag (N s/m) and lever arm (m).
+    /// Adds the reaction of a pinned node with this mass (kg), drag (N s/m) and lever arm, m.
     fn add_reaction(
         &mut self,
         pin: &Pin,

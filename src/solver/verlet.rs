@@ -25,10 +25,10 @@ use crate::geometry::Aabb;
 use crate::nodes::Mobility;
 use crate::threads::Team;
 
-/// The error of a substep that is unstable, initially or because of the motion during the step.
+/// The error that a substep is too long, at the start of a step or after its motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SubstepTooLong {
-    /// The longest stable substep (s).
+    /// The longest stable substep, s.
     pub stable_substep: f32,
 }
 
@@ -62,7 +62,7 @@ pub(super) fn run(
         check(&start.carry.stability, step.substep)?;
     }
     // A pipeline cannot do work between substeps.
-    if start.substeps > 2 && can_defer_half_kick(body) && !body.has_tool_attachments() && !body.sleeps() {
+    if start.substeps > 2 && can_defer_half_kick(body) && !body.has_tool_attachments() && !body.any_tile_asleep() {
         step.pipeline = PipelinePlan::of(&*body.forces.springs, body.node_count());
     }
     if let Some(result) = step.take(body, start)? {
@@ -93,10 +93,10 @@ pub(super) fn check_beside_springs(body: &System, substep: f32) -> Stepped<()> {
 pub(super) struct Step<'a> {
     request: &'a StepRequest<'a>,
     substeps: u32,
-    /// The length of a substep (s).
+    /// The length of a substep, s.
     substep: f32,
     middle: u32,
-    /// The substep that masses are computed for (s); 0 without added mass.
+    /// The substep that masses are computed for, s; 0 without added mass.
     scaling_substep: f32,
     team: &'a Team<'a>,
     pipeline: Option<PipelinePlan>,
@@ -308,12 +308,12 @@ impl<'a> Step<'a> {
     }
 }
 
-/// The bound of node speeds (m/s).
+/// The bound of node speeds, m/s.
 fn fastest(velocities: &Aabb) -> f32 {
     velocities.magnitudes().length()
 }
 
-/// The bound of the relative speed of two nodes (m/s).
+/// The bound of the relative speed of two nodes, m/s.
 fn diagonal(velocities: &Aabb) -> f32 {
     (velocities.max - velocities.min).length()
 }

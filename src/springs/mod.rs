@@ -161,8 +161,8 @@ pub(crate) trait Springs: Debug + Send + Sync {
         false
     }
 
-    /// Writes the spring forces on the nodes of `tile`, in newtons. With velocities, the damping along springs is
-    /// included.
+    /// Writes the spring forces on all nodes of `tile`, N; 0 for a node without springs. With velocities, the damping
+    /// along springs is included.
     fn forces(&self, tile: usize, input: &ForceInput, forces: &mut TileForces);
 
     /// Writes the first-order changes of the spring forces on the nodes of `tile`, N: the tangent times the

@@ -429,7 +429,7 @@ impl World {
     }
 
     /// Destroys the attachments that broke in the last step.
-    pub(super) fn end_slipped(&mut self) {
+    pub(super) fn remove_broken_attachments(&mut self) {
         self.slipped.clear();
         let mut end = |id| {
             if self.attachments.remove(id).is_ok() {

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::resistance::Knot;
+use super::blade_resistance::Knot;
 use crate::base::{BodyId, Error, Result, SlotId, StateHasher, above_zero, ensure, memory};
 use crate::body::{BladeStroke, CutReport};
 use crate::codec::saved;

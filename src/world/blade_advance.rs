@@ -5,8 +5,8 @@ use glam::{DVec3, Vec3};
 use super::World;
 use super::blade::{Blade, BladeReport, EdgePoint, Proxy, lagging_edge};
 use super::blade_coupling::{NOWHERE, fill, points_at};
+use super::blade_resistance::{Advance, Resistance};
 use super::proxy_motion::Approach;
-use super::resistance::{Advance, Resistance};
 use crate::base::{BodyId, Result};
 use crate::cutting::{BladeContact, Sweep};
 

@@ -160,7 +160,7 @@ impl World {
     }
 
     /// Begins a step: divides the mass of each dynamic tool among the bodies that it pressed in the last step.
-    pub(super) fn divide_masses(&mut self) {
+    pub(super) fn divide_tool_masses(&mut self) {
         self.dynamic.clear();
         for (index, (slot, tool)) in self.tools.iter().enumerate() {
             let Some(rigid) = &tool.rigid else { continue };

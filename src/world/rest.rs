@@ -38,7 +38,7 @@ pub(super) fn wake_islands(
         }
         for &slot in deformable_contact.islands.members(island) {
             let slot = slot as usize;
-            if let Some(body) = bodies.at_mut(slot).filter(|body| body.system().sleeps()) {
+            if let Some(body) = bodies.at_mut(slot).filter(|body| body.system().any_tile_asleep()) {
                 body.system_mut().wake_for_step();
                 // It has not attempted the step yet.
                 outcomes[slot] = None;

@@ -67,7 +67,7 @@ impl World {
             world.tools.iter_mut().for_each(|(_, tool)| tool.begin_step());
             world.move_holds();
         });
-        self.divide_masses();
+        self.divide_tool_masses();
         let (mut tries_left, mut attempts) = (MAX_FORCE_LIMIT_TRIES, 0);
         let crossings = loop {
             self.timed(Stage::Plan, |world| {
@@ -82,12 +82,12 @@ impl World {
                         break crossings;
                     }
                     attempts += 1;
-                    self.put_back();
+                    self.rollback();
                 }
                 Err(report) => {
-                    self.put_back();
+                    self.rollback();
                     self.keep_touching();
-                    let limit = self.limit(dt);
+                    let limit = self.refusal(dt);
                     return Err(Error::Unstable {
                         report: StepReport { limit, ..report },
                         allowed: match self.definition.substeps {
@@ -201,7 +201,7 @@ impl World {
     }
 
     /// Why the attempted step failed, for the body that needs most substeps.
-    fn limit(&self, dt: f32) -> Option<StepLimit> {
+    fn refusal(&self, dt: f32) -> Option<StepLimit> {
         let failed = self.bodies.iter_ids().filter_map(|(id, body)| {
             let Some(Outcome::Unstable { stable_substep, error }) = self.outcomes[id.index()] else {
                 return None;
@@ -226,7 +226,7 @@ impl World {
     }
 
     /// Discards the attempted step of all bodies.
-    fn put_back(&mut self) {
+    fn rollback(&mut self) {
         self.bodies
             .iter_mut()
             .for_each(|(_, body)| body.system_mut().rollback());
@@ -274,7 +274,7 @@ impl World {
                 |body_index: usize| matches!(self.outcomes.get(body_index), Some(Some(Outcome::Done { .. })));
             put_islands_to_sleep(deformable_contact, &mut self.bodies, was_taken);
         }
-        self.end_slipped();
+        self.remove_broken_attachments();
     }
 
     /// True if no tool exceeds its force limit. A tool that does moves less far in the next attempt; `last` is true if

@@ -77,7 +77,7 @@ pub(super) fn deepest(
     }
 }
 
-/// Returns true if a point with these weights lies in its feature's interior.
+/// True if a point with these weights lies in its feature's interior.
 pub(super) fn is_interior(weights: &[f64]) -> bool {
     weights.iter().all(|&weight| weight > BORDER)
 }

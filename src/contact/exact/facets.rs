@@ -208,7 +208,7 @@ impl Facets {
         }
     }
 
-    /// Returns true if the pseudonormals may give the wrong side.
+    /// True if the pseudonormals may give the wrong side.
     pub fn are_normals_unreliable(&self) -> bool {
         self.unreliable
     }
@@ -251,7 +251,7 @@ impl Facets {
         self.edges[edge as usize].nodes.map(|node| self.position(node))
     }
 
-    /// Returns true if `offset`, perpendicular to an edge, lies in its normal cone.
+    /// True if `offset`, perpendicular to an edge, lies in its normal cone.
     pub fn is_in_edge_cone(&self, edge: u32, offset: DVec3) -> bool {
         let edge = &self.edges[edge as usize];
         let from = self.position(edge.nodes[0]);
@@ -260,7 +260,7 @@ impl Facets {
             .all(|&node| points_away(offset, self.position(node) - from))
     }
 
-    /// Returns true if `offset` lies in the normal cone of a node.
+    /// True if `offset` lies in the normal cone of a node.
     pub fn is_in_node_cone(&self, node: u32, offset: DVec3) -> bool {
         let from = self.position(node);
         let [start, end] = [0, 1].map(|on| self.starts[node as usize + on] as usize);

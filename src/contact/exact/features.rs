@@ -381,7 +381,7 @@ fn point_of(corners: &[Vec3], weights: [f64; 3]) -> Vec3 {
         .as_vec3()
 }
 
-/// Returns true if all of the first triangle lies on one side of the second's plane.
+/// True if all of the first triangle lies on one side of the second's plane.
 fn is_on_one_side(triangle: [DVec3; 3], [a, b, c]: [DVec3; 3]) -> bool {
     let normal = (b - a).cross(c - a);
     let heights = triangle.map(|corner| normal.dot(corner - a));

@@ -113,7 +113,7 @@ impl ExactSolid {
         self.tree.bounds()
     }
 
-    /// Returns true if a point lies within the solid.
+    /// True if a point lies within the solid.
     pub fn is_inside(&self, point: Vec3) -> bool {
         let range = self.distance_range(point);
         if range.min > 0.0 || range.max < 0.0 {
@@ -253,7 +253,7 @@ impl ExactSolid {
         }
     }
 
-    /// Returns true if a ray to a point far outside leaves the solid once more than it enters.
+    /// True if a ray to a point far outside leaves the solid once more than it enters.
     fn has_positive_winding(&self, point: Vec3) -> bool {
         let bounds = self.tree.bounds();
         let length = (bounds.max - bounds.min).length() + point.distance(bounds.min);

@@ -179,7 +179,7 @@ impl Exact {
         Ok(())
     }
 
-    /// Returns true if a point lies inside the solid.
+    /// True if a point lies inside the solid.
     pub fn is_inside(&self, point: Vec3) -> bool {
         self.solid.is_inside(point)
     }

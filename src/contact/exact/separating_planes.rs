@@ -53,7 +53,7 @@ impl SeparatingPlanes {
         self.normals[0] * offset.x + self.normals[1] * offset.y + self.normals[2] * offset.z
     }
 
-    /// Returns true if a plane separates a triangle from the feature by more than `distance`.
+    /// True if a plane separates a triangle from the feature by more than `distance`.
     #[inline]
     pub fn separates(&self, triangle: &[Vec3; 3], distance: f32) -> bool {
         let offsets = triangle.map(|corner| Vec3A::from(corner) - self.origin);

@@ -201,7 +201,7 @@ impl LayeredImage {
         (distance <= within).then_some((distance, normal))
     }
 
-    /// Returns true if a point may be inside: at least two images are not empty.
+    /// True if a point may be inside: at least two images are not empty.
     pub(in crate::contact) fn has_interior(&self) -> bool {
         let images = self.images.iter();
         images.filter(|image| !image.layers.is_empty()).count() >= 2
@@ -212,7 +212,7 @@ impl LayeredImage {
         self.pixel
     }
 
-    /// Returns true if a point is certainly further outside than `within`.
+    /// True if a point is certainly further outside than `within`.
     #[inline]
     pub(super) fn is_beyond(&self, point: Vec3, within: f32) -> bool {
         self.cache.distance_range(point).is_some_and(|range| range.min > within)
@@ -304,7 +304,7 @@ impl LayeredImage {
         });
     }
 
-    /// Returns true if the point is inside: by the distance bounds, or else by a majority of the images.
+    /// True if the point is inside: by the distance bounds, or else by a majority of the images.
     fn is_inside(&self, point: Vec3) -> bool {
         match self.cache.distance_range(point) {
             Some(range) if range.min > 0.0 => false,

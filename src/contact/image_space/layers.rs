@@ -125,7 +125,7 @@ impl Layers {
         }
     }
 
-    /// Returns true if there are no crossings.
+    /// True if there are no crossings.
     pub fn is_empty(&self) -> bool {
         self.crossings.is_empty()
     }

@@ -125,7 +125,7 @@ impl Overlap {
         })
     }
 
-    /// Returns true if the memory is sufficient for these two surfaces.
+    /// True if the memory is sufficient for these two surfaces.
     pub(super) fn fits(&self, surfaces: [&Surface; 2]) -> bool {
         let nodes = self.gradients[0].capacity().min(self.gradients[1].capacity());
         let edges = self.inside[0].edges.capacity().min(self.inside[1].edges.capacity()) / 4;
@@ -147,7 +147,7 @@ impl Overlap {
         (self.volume, self.normal, self.depth, self.pixel) = (0.0, Vec3::ZERO, 0.0, pixel);
     }
 
-    /// Returns true if no overlap was found.
+    /// True if no overlap was found.
     pub fn is_empty(&self) -> bool {
         self.volume == 0.0 && self.inside.iter().all(|i| i.points.is_empty() && i.edges.is_empty())
     }

@@ -93,7 +93,7 @@ impl Projection {
         })
     }
 
-    /// Returns true if an image of the box from `low` to `high` has at most `pixels` pixels, and all corners between
+    /// True if an image of the box from `low` to `high` has at most `pixels` pixels, and all corners between
     /// `lowest` and `highest` can be drawn.
     pub fn fits([low, high]: [DVec3; 2], [lowest, highest]: [DVec3; 2], pixel: f64, pixels: usize) -> bool {
         let [columns, rows] = [high.x - low.x, high.y - low.y].map(|length| (length / pixel).ceil().max(1.0));
@@ -147,7 +147,7 @@ impl Projection {
         DVec2::new((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5)
     }
 
-    /// Returns true if a projected point lies within the image.
+    /// True if a projected point lies within the image.
     pub fn contains(&self, vertex: &PixelVertex) -> bool {
         let (width, height) = (f64::from(self.width), f64::from(self.height));
         vertex.x >= 0.0 && vertex.y >= 0.0 && vertex.x < width && vertex.y < height

@@ -34,7 +34,7 @@ pub(super) fn draw_triangles(
     }
 }
 
-/// Returns true if the center of a column or row may lie between the least and the largest coordinate.
+/// True if the center of a column or row may lie between the least and the largest coordinate.
 fn may_cover([a, b, c]: [f64; 3], count: u32) -> bool {
     let first = (a.min(b).min(c) + 0.5 - ROUNDING).max(0.0) as u32;
     let past = (a.max(b).max(c) + 0.5 + ROUNDING) as u32;

@@ -83,7 +83,7 @@ impl Surface {
         })
     }
 
-    /// Returns true if other bodies can be inside.
+    /// True if other bodies can be inside.
     pub fn is_closed(&self) -> bool {
         self.closed
     }

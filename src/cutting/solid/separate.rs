@@ -374,7 +374,7 @@ impl SolidCut<'_> {
     }
 
     /// Finds the side of a vertex from the planes of adjacent vertices on the blade. Near ones have more weight.
-    /// Returns true if the side has changed.
+    /// True if the side has changed.
     fn classify_side(&mut self, vertex: u32, star: &[(u32, usize)]) -> Result<bool> {
         let position = self.solid.rest_place(vertex);
         let (mut flat, mut bent, mut size) = (0.0, 0.0, 0.0);

@@ -46,18 +46,18 @@ pub(crate) struct PointAttachments {
 
 saved! { PointAttachments { attachments, attached_nodes, is_first_substep } }
 
-/// Returns true if two points are the same point of one body.
+/// True if two points are the same point of one body.
 pub(crate) fn are_one(points: &[AttachmentPoint; 2]) -> bool {
     corners_of(points).iter().all(|corner| corner.weight == 0.0)
 }
 
 impl PointAttachments {
-    /// Returns true if any attachment acts in this span.
+    /// True if any attachment acts in this span.
     pub(super) fn any_active(&self) -> bool {
         self.attachments.iter().any(|attachment| attachment.is_active)
     }
 
-    /// Returns true if there are no attachments.
+    /// True if there are no attachments.
     pub(super) fn is_empty(&self) -> bool {
         self.attachments.is_empty()
     }
@@ -269,7 +269,7 @@ impl PointAttachments {
         Some((attachment.thread.as_ref()?, distance(bodies, &attachment.points)))
     }
 
-    /// Returns true if a body has attachments.
+    /// True if a body has attachments.
     pub fn has_body(&self, body: usize) -> bool {
         let first = self
             .attached_nodes
@@ -279,7 +279,7 @@ impl PointAttachments {
             .is_some_and(|attached_node| attached_node.body == body)
     }
 
-    /// Returns true if an attachment joins any of these nodes of one body with any of those of the other.
+    /// True if an attachment joins any of these nodes of one body with any of those of the other.
     pub(super) fn join_nodes(&self, bodies: [usize; 2], nodes: [&[u32]; 2]) -> bool {
         let has_attached = |side: usize| nodes[side].iter().any(|&node| self.find(bodies[side], node).is_ok());
         if self.attachments.is_empty() || !(has_attached(0) && has_attached(1)) {

@@ -132,7 +132,7 @@ impl SutureThread {
         }
     }
 
-    /// Returns true if the thread only stretched elastically in the step in progress.
+    /// True if the thread only stretched elastically in the step in progress.
     pub fn is_elastic(&self) -> bool {
         let max_compliance = self
             .effective_compliance

@@ -23,7 +23,7 @@ pub(super) fn depth_correction(substep: f32) -> f32 {
 /// it. There the tool penetrates instead.
 pub(crate) const LEVERAGE: f32 = 4.0;
 
-/// Number of sweeps over pressing contacts between two sweeps over all. A contact that does not press seldom begins to.
+/// Number of sweeps over pressing contacts between two sweeps over all. Few contacts begin to press between two full sweeps.
 const PRESSING_SWEEPS: u32 = 3;
 
 /// Convergence is slow if the change of a full sweep exceeds `STALL_RATIO` times that of the last full sweep and is
@@ -63,7 +63,11 @@ impl PgsLimits {
 
 /// Sweeps until a full sweep changes velocities by a negligible fraction of `first`, m/s, or of the first sweep's
 /// change if that is `None`. Returns that reference change.
-pub(crate) fn relax(limits: PgsLimits, first: Option<f32>, mut sweep: impl FnMut(PgsPass) -> f32) -> f32 {
+pub(crate) fn sweep_until_converged(
+    limits: PgsLimits,
+    first: Option<f32>,
+    mut sweep: impl FnMut(PgsPass) -> f32,
+) -> f32 {
     let mut first = first;
     let mut sweeps_left = limits.sweeps;
     let mut last = f32::INFINITY;

@@ -20,7 +20,7 @@ const MEMORY_TIME: f64 = 0.2;
 const MAX_DAMPING: f64 = 2.0;
 
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Observer {
+pub(crate) struct PassivityObserver {
     /// The work of the hand, and of the proxy on the tissue, J.
     by_hand: f64,
     pub by_proxy: f64,
@@ -36,7 +36,7 @@ pub(crate) struct Observer {
     max_supplied: f64,
 }
 
-impl Observer {
+impl PassivityObserver {
     /// Adds the hand's work over a displacement against a wrench.
     pub fn hand_moved(&mut self, felt: &Vector6, displacement: &Vector6) {
         self.by_hand -= six::dot(felt, displacement);
@@ -47,7 +47,7 @@ impl Observer {
         self.by_proxy -= 0.5 * (six::dot(on_proxy[0], displacement) + six::dot(on_proxy[1], displacement));
     }
 
-    /// Updates the energy balance. `work` is the tool's work on the tissue until the local model, and `sent_work` the
+    /// Updates the energy balance. `work` is the tool's work on the tissue up to the last local model, and `sent_work` the
     /// proxy's until then.
     pub fn balance(&mut self, (work, sent_work): (f64, f64), on_proxy: &Vector6, coupling: &Coupling, dt: f64) {
         let on_tissue = work + self.by_proxy - sent_work;
@@ -115,7 +115,7 @@ impl Observer {
         ((generated / DISSIPATION_TIME.max(dt) + unpaid) / square).min(MAX_DAMPING * coupling.critical)
     }
 
-    /// The fraction of that energy that was never supplied, by the hand's own balance. It counts if the energy would be
+    /// The fraction of the releasable energy that was never supplied, by the hand's own balance. It counts if the energy would be
     /// released within the delay.
     fn unsupplied_share(&self, power: f64, releasable: f64, delay: f64) -> f64 {
         let soon = (power * delay / releasable).min(1.0);

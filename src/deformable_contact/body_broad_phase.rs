@@ -189,7 +189,7 @@ impl Islands {
         is_changed
     }
 
-    /// Returns true if the first `sorted_count` pairs, which are sorted, contain this pair.
+    /// True if the first `sorted_count` pairs, which are sorted, contain this pair.
     fn contains_pair(&self, sorted_count: usize, first: u32, second: u32) -> bool {
         let (low, high) = (first.min(second), first.max(second));
         let Some(root) = self.root(low).filter(|&root| self.root(high) == Some(root)) else {

@@ -4,7 +4,8 @@ use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::cutting::BladeContact;
 
-/// Snapping opens a cut ahead of the proxy. A gap of at most this fraction of a cell resists as the tissue before it.
+/// Snapping opens a cut ahead of the proxy. A gap shorter than this fraction of a cell keeps the
+/// resistance of the tissue in front of it.
 const MAX_GAP: f64 = 0.1;
 
 /// An edge parallel to a triangle's side opens the triangle over at least this fraction of its size.
