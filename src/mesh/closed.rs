@@ -219,7 +219,7 @@ impl ClosedSurface {
             let [c, a, b] = rotate(self.triangles[triangle], side);
             let [_, _, d] = rotate(self.triangles[neighbor], neighbor_side as usize);
             let flipped = [[a, b, d], [b, c, d]];
-            let new_edge = (u64::from(b.min(d)) << 32) | u64::from(b.max(d));
+            let new_edge = super::pack(&flipped[0], [1, 2]);
             let exists = sides.binary_search_by_key(&new_edge, |other| other.0).is_ok();
             let height = |nodes: [u32; 3]| relative_height(nodes.map(|node| self.positions[node as usize]));
             let min_height = |pair: [[u32; 3]; 2]| height(pair[0]).min(height(pair[1]));

@@ -1,8 +1,10 @@
-//! A name stands for one type of `src`.
+//! A name stands for one type of `src`, and files that are named exist.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+
+use crate::words::texts;
 
 /// Names that several types have, in modules that do not meet.
 const SHARED: [&str; 9] = [
@@ -18,13 +20,10 @@ const SHARED: [&str; 9] = [
 ];
 
 /// Counts the types that each name stands for, but for associated types.
-fn count_types(folder: &Path, counts: &mut BTreeMap<String, usize>) {
-    for entry in fs::read_dir(folder).expect("a folder") {
-        let path = entry.expect("a file").path();
-        if path.is_dir() {
-            count_types(&path, counts);
-            continue;
-        }
+fn count_types(folder: &Path) -> BTreeMap<String, usize> {
+    let (mut paths, mut counts) = (Vec::new(), BTreeMap::new());
+    texts(folder, &["rs"], &mut paths);
+    for path in paths {
         let text = fs::read_to_string(&path).expect("text");
         for line in text.lines() {
             let mut words = line
@@ -37,12 +36,12 @@ fn count_types(folder: &Path, counts: &mut BTreeMap<String, usize>) {
             }
         }
     }
+    counts
 }
 
 #[test]
 fn a_name_stands_for_one_type() {
-    let mut counts = BTreeMap::new();
-    count_types(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut counts);
+    let counts = count_types(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
     assert!(counts["World"] == 1 && counts.len() > 500, "{}", counts.len());
     let shared: Vec<_> = counts
         .iter()
@@ -52,36 +51,25 @@ fn a_name_stands_for_one_type() {
     assert_eq!(shared, SHARED);
 }
 
-/// Rust files of the repository, by their paths.
-fn rust_files(folder: &Path, files: &mut Vec<String>) {
-    for entry in fs::read_dir(folder).expect("a folder") {
-        let path = entry.expect("a file").path();
-        let name = path.file_name().expect("a name").to_string_lossy();
-        if path.is_dir() && name != "target" && !name.starts_with('.') {
-            rust_files(&path, files);
-        } else if name.ends_with(".rs") || name.ends_with(".md") {
-            files.push(path.to_string_lossy().into_owned());
-        }
-    }
-}
-
 #[test]
 fn source_files_named_in_documents_and_comments_exist() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut files = Vec::new();
-    rust_files(root, &mut files);
+    let mut paths = Vec::new();
+    texts(Path::new(env!("CARGO_MANIFEST_DIR")), &["rs", "md"], &mut paths);
+    let is_history =
+        |path: &Path| path.ends_with("CHANGELOG.md") || path.components().any(|c| c.as_os_str() == "decisions");
     let mut named = 0;
-    for file in files
-        .iter()
-        .filter(|file| !file.ends_with("CHANGELOG.md") && !file.contains("/docs/decisions/"))
-    {
-        let text = fs::read_to_string(file).expect("text");
+    for path in paths.iter().filter(|path| !is_history(path)) {
+        let text = fs::read_to_string(path).expect("text");
         for name in text.split('`').skip(1).step_by(2).filter(|name| name.ends_with(".rs")) {
             let is_path = name
                 .chars()
                 .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '/' | '.'));
-            let exists = || files.iter().any(|file| file.ends_with(&format!("/{name}")));
-            assert!(!is_path || exists(), "{file} names {name}, which does not exist");
+            let exists = || paths.iter().any(|path| path.ends_with(name));
+            assert!(
+                !is_path || exists(),
+                "{} names {name}, which does not exist",
+                path.display()
+            );
             named += usize::from(is_path);
         }
     }

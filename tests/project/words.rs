@@ -41,14 +41,14 @@ const REPLACED: [(&str, &str); 30] = [
 const FOLDERS: [&str; 4] = ["docs", "include", "c_examples", "packaging"];
 const ENDINGS: [&str; 5] = ["md", "h", "hpp", "c", "cpp"];
 
-/// Collects the texts below a folder.
-fn texts(folder: &Path, found: &mut Vec<PathBuf>) {
+/// Collects the files with these endings below a folder, but for build folders.
+pub fn texts(folder: &Path, endings: &[&str], found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("a file").path();
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        if path.is_dir() {
-            texts(&path, found);
-        } else if ENDINGS.contains(&ending) {
+        if path.is_dir() && !path.ends_with("target") {
+            texts(&path, endings, found);
+        } else if endings.contains(&ending) {
             found.push(path);
         }
     }
@@ -81,7 +81,7 @@ fn documents_headers_and_examples_use_the_standard_terms() {
     .map(|name| root.join(name))
     .to_vec();
     for folder in FOLDERS {
-        texts(&root.join(folder), &mut paths);
+        texts(&root.join(folder), &ENDINGS, &mut paths);
     }
     assert!(paths.len() > 80, "{} texts", paths.len());
     let found: Vec<String> = paths
