@@ -98,6 +98,9 @@ impl Elements {
         for values in [&mut self.stiffnesses, &mut self.node_rates] {
             memory::reserve(values, count)?;
         }
+        if let Some(rates) = &mut self.deformed_rates {
+            rates.reserve(count, 0)?;
+        }
         if let Some(nodal_volumes) = &mut self.nodal_volumes {
             memory::reserve(&mut nodal_volumes.volumes, count)?;
             self.pressure_offsets.resize(nodal_volumes.volumes.len(), count)?;
@@ -135,6 +138,9 @@ impl Elements {
             };
             memory::push(&mut cells.spare, part)?;
         }
+        if let Some(rates) = &mut self.deformed_rates {
+            rates.reserve(node_count, added_parts)?;
+        }
         self.parts.try_reserve(added_parts)?;
         self.starts.try_reserve(added_parts)?;
         let pressure_count = if self.nodal_volumes.is_some() { node_count } else { 0 };
@@ -158,6 +164,9 @@ impl Elements {
     pub fn rewire(&mut self, pieces: &[ElementPiece], node_count: usize, mut other_sums: Option<&mut Sums>) {
         self.stiffnesses.resize(node_count, 0.0);
         self.node_rates.resize(node_count, 0.0);
+        if let Some(rates) = &mut self.deformed_rates {
+            rates.grow(node_count);
+        }
         self.grow_nodal_pressures(node_count, other_sums.as_deref_mut());
         // A source changes after its copies are created.
         for piece in pieces.iter().filter(|piece| piece.is_copy()) {
@@ -234,6 +243,10 @@ impl Elements {
             self.damping_rate = self.damping_rate.max(spring_rates.damping_rate);
             self.node_rates[node as usize] =
                 corner_stiffness as f32 * masses.inverse(node as usize) + self.rate_beyond_shared(spring_rates);
+            self.max_rest_rate = self.max_rest_rate.max(self.node_rates[node as usize]);
+        }
+        if let Some(rates) = &mut self.deformed_rates {
+            rates.forget_rest_rate();
         }
         for &node in nodes {
             for cell in cells_at(node) {
@@ -317,6 +330,9 @@ impl Elements {
             }
             if let Some(history) = &mut self.history {
                 history.add_part();
+            }
+            if let Some(rates) = &mut self.deformed_rates {
+                rates.add_part();
             }
             cells.used = 0;
         }

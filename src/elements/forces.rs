@@ -22,12 +22,16 @@ impl ElementForces<'_> {
     /// Adds the sums over the copies of the tile's nodes to `forces`.
     pub fn add(&self, tile: usize, forces: &mut TileForces) {
         let mut sums = [Record::default(); TILE];
-        for copy in self.copies.in_tile(tile) {
-            let Record(sum) = &mut sums[usize::from(copy.tile_slot)];
-            for (sum, value) in sum.iter_mut().zip(self.sums[copy.index as usize].0) {
-                *sum += value;
+        // `for_each`, because a loop over a chain tests each time which half it is in.
+        self.copies.in_tile(tile).for_each(|copy| {
+            let (Record(sum), Record(value)) = (
+                &mut sums[usize::from(copy.tile_slot) % TILE],
+                &self.sums[copy.index as usize],
+            );
+            for axis in 0..4 {
+                sum[axis] += value[axis];
             }
-        }
+        });
         for (axis, forces) in forces.axes_mut().into_iter().enumerate() {
             for (force, Record(sum)) in forces.iter_mut().zip(&sums) {
                 *force += sum[axis];
@@ -65,6 +69,30 @@ impl Elements {
             .part_totals
             .iter()
             .fold(0.0, |highest: f64, &bound| highest.max(bound)) as f32;
+        self.rate_bound = self.rate_bound.max(self.least_rate());
+    }
+
+    /// Assembles the tangent at `positions` for the following products, unless nodal pressures couple more nodes than
+    /// those of a tetrahedron.
+    pub fn assemble(&self, kernel: ChosenKernel, positions: &[Record], sums: &mut Sums, team: &Team) {
+        if sums.matrices.is_empty() {
+            return;
+        }
+        let (law, parts) = (self.stiffened(), &self.parts);
+        let history = self.history.as_deref();
+        let written = (
+            Ragged::new(&mut sums.positions, &self.starts),
+            Items::new(&mut sums.matrices),
+        );
+        team.pass(parts.len(), written, |part, (copies, matrix)| {
+            if let Some(matrix) = matrix {
+                let part_data = &parts[part];
+                part_data.copy(positions, copies);
+                let extra = extra_stresses(history, part);
+                part_data.groups.assemble(kernel, law, extra, copies, matrix);
+            }
+        });
+        sums.are_assembled = true;
     }
 
     /// Computes the force differentials at `positions` for these displacements, to first order.
@@ -100,10 +128,16 @@ impl Elements {
             Ragged::new(&mut sums.sums, starts),
         );
         let pressures = &sums.pressures.at_nodes;
+        let matrices = if sums.are_assembled { &sums.matrices[..] } else { &[] };
         team.pass(parts.len(), written, |part, (copies, displacement_copies, sums)| {
             let part_data = &parts[part];
-            part_data.copy(positions, copies);
             part_data.copy(displacements, displacement_copies);
+            if let Some(Some(matrix)) = matrices.get(part) {
+                sums.fill(Record::default());
+                matrix.multiply(kernel, displacement_copies, sums);
+                return;
+            }
+            part_data.copy(positions, copies);
             part_data.copy_pressures(pressures, displacement_copies);
             sums.fill(Record::default());
             part_data.groups.force_differentials(
@@ -269,6 +303,6 @@ impl Elements {
 }
 
 /// The extra stresses of the tetrahedra of a part; empty without history.
-fn extra_stresses(history: Option<&ElementHistory>, part: usize) -> &[Stresses] {
+pub(super) fn extra_stresses(history: Option<&ElementHistory>, part: usize) -> &[Stresses] {
     history.map_or(&[], |history| history.parts[part].extra_stresses())
 }

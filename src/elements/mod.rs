@@ -5,6 +5,7 @@
 //! No force is computed twice, and results do not depend on the number of threads.
 
 mod cut;
+mod deformed_rates;
 mod forces;
 mod history;
 mod law;
@@ -26,6 +27,7 @@ use crate::simd::{ChosenKernel, Record};
 use crate::soa::{PerNode, Vectors};
 use crate::threads::{Items, Team};
 pub(crate) use cut::ElementPiece;
+use deformed_rates::DeformedRates;
 pub(crate) use forces::ElementForces;
 use history::ElementHistory;
 pub(crate) use law::{DeformedTet, ElasticLaw, RestTet, TetStress};
@@ -33,6 +35,7 @@ use nodal_pressure::{NodalPressures, NodalVolumes};
 use parts::{FemPart, NodeCopies};
 use pressure_offset::PressureOffsets;
 pub(crate) use rates::LEAST_SHEAR;
+use tetrahedra::TangentMatrix;
 
 /// The finite elements of a body.
 #[derive(Debug)]
@@ -61,15 +64,19 @@ pub(crate) struct Elements {
     stiffnesses: Vec<f32>,
     /// The bound at rest of each node, without `spring_rate`, 1/s².
     node_rates: Vec<f32>,
+    /// The highest bound at rest, without `spring_rate`, 1/s².
+    max_rest_rate: f32,
     /// True if the bounds at rest match the current masses and springs.
     rates_known: bool,
+    /// Tight bounds, for explicit solvers only.
+    deformed_rates: Option<Box<DeformedRates>>,
     /// The volume offsets of nodes that a cut has duplicated.
     pressure_offsets: PressureOffsets,
 }
 
 saved! { Elements {
     law, count, parts, cells, starts, copies, forces, nodal_volumes, history, rate_bound, committed_rate_bound,
-    damping_rate, spring_rate, stiffnesses, node_rates, rates_known, pressure_offsets,
+    damping_rate, spring_rate, stiffnesses, node_rates, max_rest_rate, rates_known, deformed_rates, pressure_offsets,
 } }
 
 /// Per-node sums over the tetrahedra of each part, one entry for each node copy.
@@ -82,9 +89,14 @@ pub(crate) struct Sums {
     part_totals: Vec<f64>,
     /// Empty without average nodal pressure.
     pressures: NodalPressures,
+    /// The tangent of each part, for force differentials only. Empty with average nodal pressure, and `None` for parts
+    /// that a cut has added.
+    matrices: Vec<Option<TangentMatrix>>,
+    /// True while the matrices hold the tangent of the equation that is being solved.
+    are_assembled: bool,
 }
 
-saved! { Sums { positions, displacements, sums, part_totals, pressures } }
+saved! { Sums { positions, displacements, sums, part_totals, pressures, matrices } leaves { are_assembled: false } }
 
 impl Sums {
     fn new(copies: usize, parts: usize, with_displacements: bool, pressure_count: usize) -> Result<Self> {
@@ -95,6 +107,8 @@ impl Sums {
             sums: records(copies)?,
             part_totals: memory::filled(0.0, parts)?,
             pressures: NodalPressures::new(pressure_count)?,
+            matrices: Vec::new(),
+            are_assembled: false,
         })
     }
 
@@ -106,6 +120,9 @@ impl Sums {
         }
         for records in [&mut self.positions, &mut self.sums] {
             records.try_reserve(copies)?;
+        }
+        if !self.matrices.is_empty() {
+            self.matrices.try_reserve(parts)?;
         }
         Ok(self.part_totals.try_reserve(parts)?)
     }
@@ -126,6 +143,14 @@ impl Sums {
         self.positions.resize(copies, Record::default());
         self.sums.resize(copies, Record::default());
         self.part_totals.resize(parts, 0.0);
+        if !self.matrices.is_empty() {
+            self.matrices.resize_with(parts, || None);
+        }
+    }
+
+    /// Computes the following products from the tetrahedra.
+    pub fn discard_tangent(&mut self) {
+        self.are_assembled = false;
     }
 }
 
@@ -168,7 +193,9 @@ impl Elements {
             committed_rate_bound: f32::INFINITY,
             damping_rate: 0.0,
             spring_rate: 0.0,
+            max_rest_rate: 0.0,
             rates_known: false,
+            deformed_rates: None,
             pressure_offsets: PressureOffsets::default(),
         };
         elements.find_stiffnesses();
@@ -178,7 +205,11 @@ impl Elements {
     /// Allocates sums for force differentials.
     pub fn new_differentials(&self) -> Result<Sums> {
         let pressure_count = self.pressure_count_of(self.stiffnesses.len());
-        Sums::new(self.forces.sums.len(), self.parts.len(), true, pressure_count)
+        let mut sums = Sums::new(self.forces.sums.len(), self.parts.len(), true, pressure_count)?;
+        if self.nodal_volumes.is_none() {
+            sums.matrices = memory::try_collected(self.parts.iter().map(FemPart::new_matrix))?;
+        }
+        Ok(sums)
     }
 
     /// Removes the tetrahedra that contain the edge between two nodes. Returns their number.

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::cut::{ElementPiece, TetrahedronIndex};
 use super::law::{DeformedTet, ElasticLaw, RestTet};
-use super::tetrahedra::{GROUP, Group, TetrahedronGroups};
+use super::tetrahedra::{GROUP, Group, TangentMatrix, TetrahedronGroups};
 use crate::base::{Result, ensure, memory};
 use crate::codec::saved;
 use crate::simd::Record;
@@ -101,6 +101,13 @@ impl FemPart {
             nodes,
             is_from_cut: false,
         })
+    }
+
+    /// Allocates the tangent matrix of the part, unless a cut has added it.
+    pub fn new_matrix(&self) -> Result<Option<TangentMatrix>> {
+        (!self.is_from_cut)
+            .then(|| TangentMatrix::new(&self.groups))
+            .transpose()
     }
 
     /// Copies the records of the part's nodes from `from` to `to`.

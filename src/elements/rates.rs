@@ -91,6 +91,7 @@ impl Elements {
                 *node_rate += self.rate_beyond_shared(spring_rates(node));
             }
         }
+        self.max_rest_rate = node_rates.iter().fold(0.0, |highest: f32, &rate| highest.max(rate));
         self.parts.iter_mut().for_each(|part| part.set_rates(&node_rates));
         self.node_rates = node_rates;
         self.rates_known = true;
@@ -183,6 +184,7 @@ impl Elements {
     /// Invalidates the bounds at rest, after a change of masses, pins or springs.
     pub fn forget_rates(&mut self) {
         self.rates_known = false;
+        self.forget_deformed_rates();
     }
 
     /// The bound of a node's springs above the shared part, 1/s².

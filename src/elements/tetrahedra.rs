@@ -7,11 +7,18 @@
 #![allow(unsafe_code)]
 
 mod hyperelastic;
+mod linearize;
+mod node_pairs;
 mod st_venant_kirchhoff;
+mod tangent_matrix;
 
 use std::ops::Range;
 
-use self::st_venant_kirchhoff::{FindDifferentials, FindEnergy, FindForces, FindStresses, FindVolumeChanges};
+use self::hyperelastic::HyperelasticTangent;
+use self::linearize::{FindDifferentials, FindStiffenings, Linearize};
+pub(super) use self::node_pairs::NodePairs;
+use self::st_venant_kirchhoff::{FindEnergy, FindForces, FindStresses, FindVolumeChanges, StVenantKirchhoff};
+pub(crate) use self::tangent_matrix::TangentMatrix;
 use crate::codec::saved;
 use crate::elements::ElasticLaw;
 use crate::elements::laws::with_hyperelastic;
@@ -204,52 +211,80 @@ impl TetrahedronGroups {
     ) {
         assert_eq!(displacements.len(), self.node_count);
         assert!(extra.is_empty() || extra.len() == self.groups.len());
-        let displacements = displacements.as_ptr();
-        let tetrahedra = self.checked(positions, sums);
-        with_hyperelastic!(
+        let (displacements, tetrahedra) = (displacements.as_ptr(), self.checked(positions, sums));
+        with_law(
             law,
-            |hyperelastic_law| if law.nodal_pressure {
-                kernel.run_with_lanes(hyperelastic::HyperelasticDifferentials::<_, true> {
-                    law,
-                    hyperelastic_law,
-                    displacements,
-                    tetrahedra,
-                });
-            } else {
-                kernel.run_with_lanes(hyperelastic::HyperelasticDifferentials::<_, false> {
-                    law,
-                    hyperelastic_law,
-                    displacements,
-                    tetrahedra,
-                });
+            extra,
+            true,
+            Differentiate {
+                kernel,
+                is_nodal: law.nodal_pressure,
+                displacements,
+                tetrahedra,
             },
-            match (law.nodal_pressure, extra) {
-                (true, []) => kernel.run_with_lanes(FindDifferentials::<true, false> {
-                    law,
-                    extra,
-                    displacements,
-                    tetrahedra
-                }),
-                (false, []) => kernel.run_with_lanes(FindDifferentials::<false, false> {
-                    law,
-                    extra,
-                    displacements,
-                    tetrahedra
-                }),
-                (true, _) => kernel.run_with_lanes(FindDifferentials::<true, true> {
-                    law,
-                    extra,
-                    displacements,
-                    tetrahedra
-                }),
-                (false, _) => kernel.run_with_lanes(FindDifferentials::<false, true> {
-                    law,
-                    extra,
-                    displacements,
-                    tetrahedra
-                }),
-            }
         );
+    }
+
+    /// Assembles the tangent matrix.
+    pub fn assemble(
+        &self,
+        kernel: ChosenKernel,
+        law: ElasticLaw,
+        extra: &[Stresses],
+        positions: &[Record],
+        matrix: &mut TangentMatrix,
+    ) {
+        assert!(extra.is_empty() || extra.len() == self.groups.len());
+        let tetrahedra = self.checked(positions, &mut []);
+        with_law(
+            law,
+            extra,
+            true,
+            Assemble {
+                kernel,
+                matrix,
+                tetrahedra,
+            },
+        );
+    }
+
+    /// Assembles the blocks of pairs, and computes upper bounds on the stiffness relative to rest.
+    pub fn assemble_pairs(
+        &self,
+        kernel: ChosenKernel,
+        law: ElasticLaw,
+        extra: &[Stresses],
+        positions: &[Record],
+        (pairs, stiffenings): (&mut NodePairs, &mut [[f32; GROUP]]),
+    ) {
+        assert!(extra.is_empty() || extra.len() == self.groups.len());
+        with_law(
+            law,
+            extra,
+            false,
+            FindBound {
+                kernel,
+                pairs,
+                stiffenings,
+                groups: self,
+                positions,
+            },
+        );
+    }
+
+    /// Sets each tetrahedron's rate bound to the highest of its corners' bounds, over its stiffness relative to rest.
+    /// Returns the highest of these stiffnesses.
+    pub fn set_relative_rates(&mut self, stiffenings: &[[f32; GROUP]], corner_rate: impl Fn(u16) -> f32) -> f32 {
+        self.set_rates(corner_rate);
+        let mut stiffest = 1.0_f32;
+        for (group, stiffenings) in self.groups.iter_mut().zip(stiffenings) {
+            for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
+                let stiffening = stiffenings[lane].max(1.0);
+                stiffest = stiffest.max(stiffening);
+                group.rates[lane] /= stiffening;
+            }
+        }
+        stiffest
     }
 
     /// Computes the stresses of the tetrahedra, without nodal pressures.
@@ -296,6 +331,86 @@ impl TetrahedronGroups {
     }
 }
 
+/// Work with the linearized law of a part.
+trait WithLaw {
+    fn run(self, law: impl Linearize);
+}
+
+/// Runs `work` with a law and its extra stresses. `is_clamped`: with tangents that are made positive semidefinite.
+fn with_law(law: ElasticLaw, extra: &[Stresses], is_clamped: bool, work: impl WithLaw) {
+    with_hyperelastic!(
+        law,
+        |hyperelastic_law| work.run(HyperelasticTangent {
+            law,
+            hyperelastic_law,
+            is_clamped,
+        }),
+        if extra.is_empty() {
+            work.run(StVenantKirchhoff::<false> { law, extra, is_clamped });
+        } else {
+            work.run(StVenantKirchhoff::<true> { law, extra, is_clamped });
+        }
+    );
+}
+
+struct Differentiate<'a> {
+    kernel: ChosenKernel,
+    is_nodal: bool,
+    displacements: *const Record,
+    tetrahedra: Tetrahedra<'a>,
+}
+
+impl WithLaw for Differentiate<'_> {
+    fn run(self, law: impl Linearize) {
+        let (displacements, tetrahedra) = (self.displacements, self.tetrahedra);
+        if self.is_nodal {
+            self.kernel.run_with_lanes(FindDifferentials::<_, true> {
+                law,
+                displacements,
+                tetrahedra,
+            });
+        } else {
+            self.kernel.run_with_lanes(FindDifferentials::<_, false> {
+                law,
+                displacements,
+                tetrahedra,
+            });
+        }
+    }
+}
+
+struct FindBound<'a> {
+    kernel: ChosenKernel,
+    pairs: &'a mut NodePairs,
+    stiffenings: &'a mut [[f32; GROUP]],
+    groups: &'a TetrahedronGroups,
+    positions: &'a [Record],
+}
+
+impl WithLaw for FindBound<'_> {
+    fn run(self, law: impl Linearize) {
+        self.kernel.run_with_lanes(FindStiffenings {
+            law: &law,
+            stiffenings: self.stiffenings,
+            tetrahedra: self.groups.checked(self.positions, &mut []),
+        });
+        let tetrahedra = self.groups.checked(self.positions, &mut []);
+        self.pairs.assemble(self.kernel, law, tetrahedra);
+    }
+}
+
+struct Assemble<'a> {
+    kernel: ChosenKernel,
+    matrix: &'a mut TangentMatrix,
+    tetrahedra: Tetrahedra<'a>,
+}
+
+impl WithLaw for Assemble<'_> {
+    fn run(self, law: impl Linearize) {
+        self.matrix.assemble(self.kernel, law, self.tetrahedra);
+    }
+}
+
 /// Groups with validated pointers: corners index readable positions and, except for energies and stresses, writable
 /// sums.
 struct Tetrahedra<'a> {
@@ -305,6 +420,7 @@ struct Tetrahedra<'a> {
 }
 
 /// The deformation of the tetrahedra of a lane batch.
+#[derive(Clone, Copy)]
 struct DeformedLanes<L> {
     /// The deformation gradient F.
     gradient: Matrix3<L>,

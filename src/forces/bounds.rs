@@ -3,8 +3,12 @@
 use super::Forces;
 use crate::base::{LimitKind, Result, memory};
 use crate::def::NodalStiffness;
+use crate::elements::Elements;
 use crate::soa::{FrequencyBound, NodalMasses, Vectors};
 use crate::threads::Team;
+
+/// Bodies with fewer tetrahedra take so little time that memory for tight bounds does not pay.
+const MIN_TIGHTENED: usize = 256;
 
 impl Forces {
     /// The nodal stiffness of elements, terms and cavities. Empty if there are none.
@@ -58,6 +62,28 @@ impl Forces {
             }
         }
         self.rates(true).limit()
+    }
+
+    /// Allocates memory for tight bounds of elements, if there are many.
+    pub fn prepare_deformed_rates(&mut self) -> Result<()> {
+        match &mut self.elements {
+            Some(elements) if elements.count() >= MIN_TIGHTENED => elements.prepare_deformed_rates(),
+            _ => Ok(()),
+        }
+    }
+
+    /// Tightens the bound of elements at `positions`. Returns the longest stable substep of all forces but springs, or
+    /// `None` if that is already known.
+    pub fn tightened_dt_limit(&mut self, positions: &Vectors, masses: &NodalMasses, team: &Team) -> Option<f32> {
+        self.write_records(positions, team);
+        let (elements, records) = (self.elements.as_mut()?, self.records.as_ref()?);
+        let is_found = elements.find_deformed_rates(self.kernel, records.as_slice(), &*self.springs, masses, team);
+        is_found.then(|| self.rates(true).limit())
+    }
+
+    /// True if the bound of elements is relative to a deformation.
+    pub fn uses_deformed_rates(&self) -> bool {
+        self.elements().is_some_and(Elements::uses_deformed_rates)
     }
 
     /// The longest stable substep of all forces but springs where forces were last evaluated, s.

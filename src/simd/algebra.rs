@@ -94,6 +94,56 @@ pub unsafe fn add_times<L: Lanes>(sum: Matrix3<L>, [a, b, c]: Matrix3<L>, s: Six
 }
 
 #[inline(always)]
+pub unsafe fn times_vector<L: Lanes>([a, b, c]: Matrix3<L>, vector: Vector<L>) -> Vector<L> {
+    unsafe { add_scaled(add_scaled(scaled(a, vector[0]), b, vector[1]), c, vector[2]) }
+}
+
+/// Product of a matrix and its transpose.
+#[inline(always)]
+pub unsafe fn times_transposed<L: Lanes>([a, b, c]: Matrix3<L>) -> Matrix3<L> {
+    unsafe {
+        let zero = [[L::splat(0.0); 3]; 3];
+        add_outer(add_outer(add_outer(zero, a, a), b, b), c, c)
+    }
+}
+
+/// `sum + a * b^T`
+#[inline(always)]
+pub unsafe fn add_outer<L: Lanes>(sum: Matrix3<L>, a: Vector<L>, b: Vector<L>) -> Matrix3<L> {
+    unsafe {
+        [
+            add_scaled(sum[0], a, b[0]),
+            add_scaled(sum[1], a, b[1]),
+            add_scaled(sum[2], a, b[2]),
+        ]
+    }
+}
+
+/// The matrix plus a multiple of the identity.
+#[inline(always)]
+pub unsafe fn add_identity<L: Lanes>([[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]]: Matrix3<L>, factor: L) -> Matrix3<L> {
+    unsafe {
+        [
+            [xx.add(factor), xy, xz],
+            [yx, yy.add(factor), yz],
+            [zx, zy, zz.add(factor)],
+        ]
+    }
+}
+
+/// The matrix plus the one that crosses `vector` with others.
+#[inline(always)]
+pub unsafe fn add_skew<L: Lanes>([a, b, c]: Matrix3<L>, [x, y, z]: Vector<L>) -> Matrix3<L> {
+    unsafe {
+        [
+            [a[0], a[1].add(z), a[2].sub(y)],
+            [b[0].sub(z), b[1], b[2].add(x)],
+            [c[0].add(y), c[1].sub(x), c[2]],
+        ]
+    }
+}
+
+#[inline(always)]
 pub unsafe fn scaled_matrix<L: Lanes>([a, b, c]: Matrix3<L>, factor: L) -> Matrix3<L> {
     unsafe { [scaled(a, factor), scaled(b, factor), scaled(c, factor)] }
 }

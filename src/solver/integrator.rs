@@ -125,7 +125,7 @@ pub(super) fn create(
     forces: &mut Forces,
 ) -> Result<Box<dyn Integrator>> {
     Ok(match definition.solver {
-        Solver::Verlet | Solver::Auto => memory::boxed(Leapfrog)?,
+        Solver::Verlet | Solver::Auto => memory::boxed(Leapfrog::new(forces)?)?,
         Solver::Implicit | Solver::Newton => memory::boxed(Implicit::new(definition, positions, forces)?)?,
     })
 }

@@ -10,7 +10,9 @@ use super::integrator::{CoupledBody, CoupledStep, Integrator, LEAPFROG};
 use super::step_request::{IntegratorState, StepRequest, StepStart};
 use super::substep_count::{StepPlan, first_substep, prepare, refined, substeps_needed};
 use super::verlet::{Step, Stepped, SubstepTooLong, begin, check, check_beside_springs, run, run_kick};
+use crate::base::Result;
 use crate::codec::{Writer, saved};
+use crate::forces::Forces;
 use crate::geometry::Aabb;
 use crate::soa::per_node;
 use crate::threads::Team;
@@ -26,6 +28,14 @@ const MAX_SCALINGS: i32 = 8;
 pub(super) struct Leapfrog;
 
 saved! { Leapfrog }
+
+impl Leapfrog {
+    /// Creates the integrator, and prepares the bounds of forces for it.
+    pub fn new(forces: &mut Forces) -> Result<Self> {
+        forces.prepare_deformed_rates()?;
+        Ok(Self)
+    }
+}
 
 per_node! { Leapfrog {} }
 
@@ -193,6 +203,9 @@ fn run_stably(
                 return Ok(result);
             }
             Err(error) => {
+                if body.forces.uses_deformed_rates() {
+                    body.tightened_dt_limit(false, team);
+                }
                 stable_substep = stable_substep.min(error.stable_substep);
                 non_spring_limit = non_spring_limit.min(error.stable_substep);
                 if is_last && substeps_needed(request, stable_substep) <= f64::from(request.max_substeps) {

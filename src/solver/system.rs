@@ -264,6 +264,22 @@ impl System {
             .non_spring_dt_limit(positions, &masses, self.forces_current, team)
     }
 
+    /// Tightens the bound of elements, at the newest positions of the step in progress or at the current state. Returns
+    /// the longest stable substep of all forces but springs, or `None` if that is already known.
+    pub fn tightened_dt_limit(&mut self, is_in_progress: bool, team: &Team) -> Option<f32> {
+        let masses = NodalMasses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+            are_scaled: self.scaling.as_ref().is_some_and(|scaling| scaling.step() > 0.0),
+        };
+        let positions = if is_in_progress {
+            self.state.newest().0
+        } else {
+            self.state.positions()
+        };
+        self.forces.tightened_dt_limit(positions, &masses, team)
+    }
+
     /// Fades residual strain of elements after cuts, over `time` seconds.
     pub fn fade(&mut self, time: f32, team: &Team) {
         if self.forces.decay_offsets(time, self.state.positions(), team) {

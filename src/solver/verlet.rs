@@ -25,6 +25,9 @@ use crate::geometry::Aabb;
 use crate::nodes::Mobility;
 use crate::threads::Team;
 
+/// How often the bound of elements is tightened within a step.
+const MAX_TIGHTENINGS: u32 = 4;
+
 /// The error that a substep is too long, at the start of a step or after its motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SubstepTooLong {
@@ -89,6 +92,17 @@ pub(super) fn check_beside_springs(body: &System, substep: f32) -> Stepped<()> {
     }
 }
 
+/// Like [`check_beside_springs`], but tightens the bound of elements before it fails, up to `left` times.
+fn check_tightened(body: &mut System, substep: f32, left: &mut u32, team: &Team) -> Stepped<()> {
+    let mut checked = check_beside_springs(body, substep);
+    if checked.is_err() && *left > 0 && body.forces.uses_deformed_rates() {
+        *left -= 1;
+        body.tightened_dt_limit(true, team);
+        checked = check_beside_springs(body, substep);
+    }
+    checked
+}
+
 /// The parameters of a step.
 pub(super) struct Step<'a> {
     request: &'a StepRequest<'a>,
@@ -138,6 +152,7 @@ impl<'a> Step<'a> {
             damping.prepare(substep);
         }
         let mut index = 0;
+        let mut tightenings = MAX_TIGHTENINGS;
         while index < substeps {
             let mut substep_kicks = [substep_kick; MAX_DEPTH];
             let depth = match index {
@@ -197,7 +212,8 @@ impl<'a> Step<'a> {
             {
                 coarse.compare_middle(body.state.newest().0);
             }
-            self.check_after(body, &mut carry)?;
+            self.check_springs_after(body, &mut carry)?;
+            check_tightened(body, substep, &mut tightenings, team)?;
         }
         let sums = monitor
             .compares
@@ -211,7 +227,7 @@ impl<'a> Step<'a> {
         } else {
             substep_kick.set_closing(request.gravity, &mut carry.gravity);
             finite = run_kick(body, request, &substep_kick, &mut carry, team);
-            check_beside_springs(body, substep)?;
+            check_tightened(body, substep, &mut tightenings, team)?;
         }
         if let Some(energies) = monitor.record_step(body, &mut carry, sums, team) {
             let excess = carry.energy.compare(&energies);
@@ -222,13 +238,18 @@ impl<'a> Step<'a> {
 
     /// Returns an error if the last substep moved the nodes to positions where the substep is unstable.
     pub fn check_after(&self, body: &System, carry: &mut IntegratorState) -> Stepped<()> {
+        self.check_springs_after(body, carry)?;
+        check_beside_springs(body, self.substep)
+    }
+
+    fn check_springs_after(&self, body: &System, carry: &mut IntegratorState) -> Stepped<()> {
         let substep = self.substep;
         if !self.is_stable_after(&mut carry.stability, &{ carry.gravity.velocities }) {
             let stability = carry.stability.if_stable_anywhere(substep);
             carry.stability = stability.unwrap_or_else(|| body.estimate(body.state.newest().0));
             check(&carry.stability, substep)?;
         }
-        check_beside_springs(body, substep)
+        Ok(())
     }
 
     /// True if the stability limit is valid after a substep with velocities in this box. With added mass it is valid at

@@ -62,6 +62,26 @@ fn add<R: Real>([x, y, z]: MatrixColumns<R>, [a, b, c]: MatrixColumns<R>, factor
     ]
 }
 
+#[inline(always)]
+fn scaled_columns<R: Real>([a, b, c]: MatrixColumns<R>, factor: R) -> MatrixColumns<R> {
+    [scaled(a, factor), scaled(b, factor), scaled(c, factor)]
+}
+
+#[inline(always)]
+fn times<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: [R; 3]) -> [R; 3] {
+    sum(sum(scaled(a, x), scaled(b, y)), scaled(c, z))
+}
+
+/// `matrix + a b^T`
+#[inline(always)]
+fn add_outer<R: Real>([x, y, z]: MatrixColumns<R>, a: [R; 3], b: [R; 3]) -> MatrixColumns<R> {
+    [
+        sum(x, scaled(a, b[0])),
+        sum(y, scaled(a, b[1])),
+        sum(z, scaled(a, b[2])),
+    ]
+}
+
 /// The Frobenius inner product.
 #[inline(always)]
 pub(crate) fn inner<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: MatrixColumns<R>) -> R {
@@ -186,6 +206,32 @@ impl<R: Real> StrainState<R> {
         let strain_term = R::from_f64(4.0) * w11 * inner(self.gradient, change);
         let changed = add(changed, self.gradient, strain_term);
         add(changed, self.cofactors, wjj * inner(self.cofactors, change))
+    }
+
+    /// `g' . dP g` for a change `dF = u g'^T`, as a matrix that multiplies u, with the tangent shifted by `lift`. With
+    /// `f = F g` and `c = cof F g`, it is `((2 w1 + lift) g . g' + 2 w2 (I1 g . g' - f . f')) I + 2 w2 (f f'^T - g . g'
+    /// F F^T) + 4 w11 f f'^T + wJJ c c'^T`, and `X (g' x g)` crossed with u.
+    #[inline(always)]
+    pub fn tangent_block(&self, [g, other_g]: [[R; 3]; 2], lift: R) -> MatrixColumns<R> {
+        let ([w1, w2, wj], [w11, wjj]) = (self.first_derivatives, self.second_derivatives);
+        let (two, zero) = (R::from_f64(2.0), R::from_f64(0.0));
+        let two_w2 = two * w2;
+        let [a, b, c] = self.gradient;
+        let (f, other_f) = (times(self.gradient, g), times(self.gradient, other_g));
+        let product = dot(g, other_g);
+        let along = (two * w1 + lift) * product + two_w2 * (self.i1 * product - dot(f, other_f));
+        let skewed = add(scaled_columns(self.cofactors, two_w2), self.gradient, wj);
+        let [x, y, z] = times(skewed, cross(other_g, g));
+        let skew = [[along, z, zero - y], [zero - z, along, x], [y, zero - x, along]];
+        let block = add_outer(skew, scaled(a, zero - two_w2 * product), a);
+        let block = add_outer(block, scaled(b, zero - two_w2 * product), b);
+        let block = add_outer(block, scaled(c, zero - two_w2 * product), c);
+        let block = add_outer(block, scaled(f, two_w2 + R::from_f64(4.0) * w11), other_f);
+        add_outer(
+            block,
+            scaled(times(self.cofactors, g), wjj),
+            times(self.cofactors, other_g),
+        )
     }
 
     #[inline(always)]

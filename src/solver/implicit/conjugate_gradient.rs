@@ -1,7 +1,7 @@
 //! Preconditioned conjugate gradient (Hestenes, Stiefel 1952) for the linearized equation of a step.
 //!
-//! The matrix is never assembled. Its product with a vector is a sum over springs, tile by tile, like forces. Sums over
-//! nodes are computed per tile and added in tile order, so that they do not depend on the number of threads.
+//! A product with the matrix is a sum over springs, tile by tile, like forces; only the tangent of elements is
+//! assembled. Sums over nodes are computed per tile and added in tile order, so that they do not depend on the number of threads.
 
 use glam::Vec3;
 
@@ -9,12 +9,16 @@ use super::Implicit;
 use super::coarse_space::CoarseSpace;
 use crate::codec::saved;
 use crate::contact::Contacts;
+use crate::def::SolverReport;
 use crate::nodes::Pins;
 use crate::simd::Loops;
 use crate::soa::{Records, TileForces, Vectors, WriteRecords, tile_count, tile_nodes};
 use crate::solver::System;
 use crate::springs::{DirectionInput, Tangent};
 use crate::threads::{Items, Team, Tiles};
+
+/// The number of products of a solve from which on assembling the tangent of elements saves time.
+const WORTH_ASSEMBLING: u32 = 6;
 
 /// Sums over the nodes of a tile.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,6 +70,10 @@ impl Implicit {
         team: &Team,
     ) -> SolveResult {
         let mut residual_sq = residual_sq;
+        let SolverReport { iterations, solves, .. } = self.last_report;
+        if goal.budget.min(iterations.div_ceil(solves.max(1))) >= WORTH_ASSEMBLING || solves == 0 {
+            body.forces.assemble(&mut self.changes, team);
+        }
         let mut solved = SolveResult {
             products: 0,
             work: 0.0,
@@ -105,6 +113,7 @@ impl Implicit {
             }
             self.search(body, beta, team);
         }
+        self.changes.discard_tangent();
         let previous = self.ritz.last_smallest();
         if self.ritz.smallest() > previous && solved.products == goal.budget && self.is_bounded() {
             // A truncated solve has sampled less of the spectrum than earlier ones.
