@@ -16,7 +16,7 @@ use super::forces::extra_stresses;
 use super::parts::FemPart;
 use super::rates::corner_stiffness;
 use super::tetrahedra::{GROUP, NodePairs};
-use super::{DeformedTet, Elements, TetStress};
+use super::{DeformedTet, Elements, RestTet, TetStress};
 use crate::base::{Result, memory};
 use crate::codec::{Reader, Saved, Writer, saved};
 use crate::simd::{ChosenKernel, Record};
@@ -25,7 +25,7 @@ use crate::springs::{Springs, spring_rates};
 use crate::threads::{Items, Ragged, Team};
 
 /// The number of products with the matrix of norms.
-const PRODUCTS: usize = 4;
+const PRODUCTS: usize = 6;
 
 /// The least weight of a node, relative to the largest.
 const MIN_WEIGHT: f32 = 1e-6;
@@ -191,12 +191,46 @@ impl Elements {
             }
         });
         let highest = self.find_row_sums(&mut rates, positions, masses);
-        let is_found = highest > 0.0 && highest.is_finite();
-        if is_found {
-            self.set_deformed_rates(&mut rates, highest, springs, masses);
+        let is_finite = highest > 0.0 && highest.is_finite();
+        if is_finite {
+            self.set_deformed_rates(&mut rates, positions, springs, masses);
+            let sum_bound = self.bound_at_start(&rates, positions);
+            // Where cuts have left nodes of very different masses, the sum over tetrahedra may be lower.
+            if sum_bound <= self.rate_bound {
+                let node_rates = &self.node_rates;
+                self.parts.iter_mut().for_each(|part| part.set_rates(node_rates));
+                rates.is_used = false;
+                self.rate_bound = sum_bound;
+            }
+            self.committed_rate_bound = self.rate_bound;
         }
         self.deformed_rates = Some(rates);
-        is_found
+        is_finite
+    }
+
+    /// The bound of [`super::rates`] for nodes at `positions`, 1/s².
+    fn bound_at_start(&self, rates: &DeformedRates, positions: &[Record]) -> f32 {
+        let mut highest = 0.0_f32;
+        for (index, (part, blocks)) in self.parts.iter().zip(&rates.parts).enumerate() {
+            let rate_of = |corners: [u32; 4]| {
+                let rates = corners.map(|node| self.node_rates[node as usize]);
+                rates.into_iter().fold(0.0, f32::max)
+            };
+            match blocks {
+                Some(blocks) => {
+                    let groups = part.groups.as_slice();
+                    for (group, stiffenings) in blocks.stiffenings.iter().enumerate() {
+                        for lane in (0..GROUP).filter(|&lane| groups[group].volumes[lane] > 0.0) {
+                            highest = highest.max(stiffenings[lane] * rate_of(part.corner_nodes(group, lane)));
+                        }
+                    }
+                }
+                None => self.visit_cut_stiffenings(index, positions, |corners, _, stiffening| {
+                    highest = highest.max(stiffening as f32 * rate_of(corners));
+                }),
+            }
+        }
+        highest
     }
 
     /// Leaves a bound on the squared frequency of each node in `row_sums`, 1/s². Returns the highest.
@@ -248,32 +282,53 @@ impl Elements {
         weights: &[f32],
         sums: &mut [f32],
     ) {
-        let (law, history) = (self.stiffened(), self.history.as_deref());
-        self.parts[part].visit(&mut |corners, rest, lane_index| {
+        self.visit_cut_stiffenings(part, positions, |corners, rest, stiffening| {
             let free = corners.map(|node| masses.inverse(node as usize) > 0.0);
-            let [a, b, c, d] = corners.map(|node| {
-                let Record([x, y, z, _]) = positions[node as usize];
-                DVec3::new(f64::from(x), f64::from(y), f64::from(z))
-            });
-            let extra = history.map_or(TetStress::ZERO, |history| history.extra_stress(part, lane_index));
-            let deformed = DeformedTet::new(law, rest, DMat3::from_cols(b - a, c - a, d - a)).with_extra_stress(extra);
-            let stiffening = deformed.stiffening(law, deformed.pressure());
-            for (node, stiffness) in corners.into_iter().zip(corner_stiffness(law, rest, free)) {
+            for (node, stiffness) in corners.into_iter().zip(corner_stiffness(self.stiffened(), rest, free)) {
                 sums[node as usize] += (stiffening * stiffness) as f32 * weights[node as usize];
             }
         });
+    }
+
+    /// Calls `f` with the nodes, the rest shape and the stiffness relative to rest of each tetrahedron of a part.
+    fn visit_cut_stiffenings(&self, part: usize, positions: &[Record], mut f: impl FnMut([u32; 4], &RestTet, f64)) {
+        self.parts[part].visit(&mut |corners, rest, lane_index| {
+            f(
+                corners,
+                rest,
+                self.cut_stiffening(part, lane_index, corners, rest, positions),
+            );
+        });
+    }
+
+    /// An upper bound on the stiffness of a tetrahedron relative to rest.
+    fn cut_stiffening(
+        &self,
+        part: usize,
+        lane_index: [usize; 2],
+        corners: [u32; 4],
+        rest: &RestTet,
+        positions: &[Record],
+    ) -> f64 {
+        let (law, history) = (self.stiffened(), self.history.as_deref());
+        let [a, b, c, d] = corners.map(|node| {
+            let Record([x, y, z, _]) = positions[node as usize];
+            DVec3::new(f64::from(x), f64::from(y), f64::from(z))
+        });
+        let extra = history.map_or(TetStress::ZERO, |history| history.extra_stress(part, lane_index));
+        let deformed = DeformedTet::new(law, rest, DMat3::from_cols(b - a, c - a, d - a)).with_extra_stress(extra);
+        deformed.stiffening(law, deformed.pressure()).max(1.0)
     }
 
     /// Makes the rates of tetrahedra relative to the deformation that `row_sums` belong to.
     fn set_deformed_rates(
         &mut self,
         rates: &mut DeformedRates,
-        highest: f32,
+        positions: &[Record],
         springs: &dyn Springs,
         masses: &NodalMasses,
     ) {
-        let mut highest = highest;
-        let mut stiffest = 0.0_f32;
+        let (mut highest, mut stiffest) = (0.0_f32, 0.0_f32);
         for (node, sum) in rates.row_sums.iter_mut().enumerate() {
             if *sum > 0.0 {
                 *sum += spring_rates(node, springs, masses).map_or(0.0, |rates| self.rate_beyond_shared(rates));
@@ -290,12 +345,22 @@ impl Elements {
                 part.set_rates(row_sums);
             }
         }
+        for part in (0..self.parts.len()).filter(|&part| rates.parts[part].is_none()) {
+            for group in 0..self.parts[part].groups.as_slice().len() {
+                let volumes = self.parts[part].groups.as_slice()[group].volumes;
+                for lane in (0..GROUP).filter(|&lane| volumes[lane] > 0.0) {
+                    let corners = self.parts[part].corner_nodes(group, lane);
+                    let rest = self.parts[part].rest_shape(group, lane);
+                    let stiffening = self.cut_stiffening(part, [group, lane], corners, &rest, positions);
+                    self.parts[part].groups.soften_rate([group, lane], stiffening as f32);
+                }
+            }
+        }
         if stiffest <= NEAR_REST && !self.parts.iter().any(|part| part.is_from_cut) {
             rates.rest_rate = Some(REST_MARGIN * highest);
         }
         rates.is_used = true;
         self.rate_bound = highest.max(self.rest_rate(rates));
-        self.committed_rate_bound = self.rate_bound;
     }
 
     /// The bound at rest, 1/s².

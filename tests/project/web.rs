@@ -60,6 +60,7 @@ fn build() -> Option<PathBuf> {
         Command::new("make")
             .arg("-C")
             .arg(root().join("web"))
+            .arg("QUICK=1")
             .env("CARGO_TARGET_DIR", target)
             .env_remove("MAKEFLAGS"),
     );
