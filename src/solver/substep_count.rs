@@ -31,8 +31,15 @@ pub(super) fn prepare(body: &mut System, request: &StepRequest, team: &Team) -> 
         }
         body.scale_masses_for(scaling_substep);
     }
+    // The mass of tissue that resists blades follows the looser bound.
+    let resists = resists_blades(body);
+    if resists && body.forces.uses_deformed_rates() {
+        body.forces.forget_rates();
+    }
     let mut non_spring_limit = body.non_spring_dt_limit(team);
-    if body.forces.uses_deformed_rates() || substeps_needed(request, non_spring_limit) > WORTH_TIGHTENING {
+    let is_worth_tightening =
+        body.forces.uses_deformed_rates() || substeps_needed(request, non_spring_limit) > WORTH_TIGHTENING;
+    if is_worth_tightening && !resists {
         non_spring_limit = body.tightened_dt_limit(false, team).unwrap_or(non_spring_limit);
     }
     if substeps_needed(request, non_spring_limit) > f64::from(max_unscaled_substeps(body, request)) {
@@ -184,11 +191,14 @@ pub(crate) fn scale_for_compression(
     Some((substeps.max(as_count(substeps_needed(request, limit))), scaling_substep))
 }
 
+fn resists_blades(body: &System) -> bool {
+    body.cut_properties.is_some_and(|cut| cut.toughness > 0.0)
+}
+
 /// The maximum number of substeps before mass is added for deformed elements. Blades compress the elements at their
 /// edges. Tissue that resists blades is therefore limited to `BLADE_SUBSTEP_RATIO` times the substeps at rest.
 fn max_unscaled_substeps(body: &System, request: &StepRequest) -> u32 {
-    let resists = body.cut_properties.is_some_and(|cut| cut.toughness > 0.0);
-    match body.scaling.as_ref().filter(|_| resists) {
+    match body.scaling.as_ref().filter(|_| resists_blades(body)) {
         Some(scaling) => as_count(BLADE_SUBSTEP_RATIO * scaling.unscaled_at_rest(request.dt)).min(request.max_substeps),
         None => request.max_substeps,
     }
