@@ -47,9 +47,11 @@ pub(super) struct DeformedRates {
     rest_rate: Option<f32>,
     /// True if the rates of tetrahedra are relative to a deformation.
     pub is_used: bool,
+    /// `rest_rate` and `is_used` at the end of the last step.
+    committed: (Option<f32>, bool),
 }
 
-saved! { DeformedRates { parts, weights, row_sums, rest_rate, is_used } }
+saved! { DeformedRates { parts, weights, row_sums, rest_rate, is_used, committed } }
 
 impl DeformedRates {
     /// Reserves memory for `node_count` nodes in all and for parts that a cut adds.
@@ -148,9 +150,15 @@ impl Elements {
                 row_sums: memory::filled(0.0, node_count)?,
                 rest_rate: None,
                 is_used: false,
+                committed: (None, false),
             })?);
         }
         Ok(())
+    }
+
+    /// True if a cut has added parts.
+    pub fn has_cut_parts(&self) -> bool {
+        self.parts.iter().any(|part| part.is_from_cut)
     }
 
     /// True if the bound is relative to a deformation.
@@ -356,7 +364,7 @@ impl Elements {
                 }
             }
         }
-        if stiffest <= NEAR_REST && !self.parts.iter().any(|part| part.is_from_cut) {
+        if stiffest <= NEAR_REST && !self.has_cut_parts() {
             rates.rest_rate = Some(REST_MARGIN * highest);
         }
         rates.is_used = true;
@@ -372,6 +380,27 @@ impl Elements {
     pub(super) fn least_rate(&self) -> f32 {
         let rates = self.deformed_rates.as_deref().filter(|rates| rates.is_used);
         rates.map_or(0.0, |rates| self.rest_rate(rates))
+    }
+
+    /// Makes the bound of the step in progress that of the current state.
+    pub(super) fn commit_deformed_rates(&mut self) {
+        if let Some(rates) = &mut self.deformed_rates {
+            rates.committed = (rates.rest_rate, rates.is_used);
+        }
+    }
+
+    /// Discards the bound of a step that is not taken.
+    pub fn rollback_deformed_rates(&mut self) {
+        let Some(rates) = &mut self.deformed_rates else {
+            return;
+        };
+        let (rest_rate, was_used) = rates.committed;
+        if rates.is_used && !was_used {
+            self.forget_rates();
+        }
+        if let Some(rates) = &mut self.deformed_rates {
+            rates.rest_rate = rest_rate;
+        }
     }
 
     /// Returns to the bounds at rest.

@@ -215,6 +215,7 @@ impl Elements {
     /// Makes the rate bound of the last computed forces that of the current state.
     pub fn commit_rate_bound(&mut self) {
         self.committed_rate_bound = self.rate_bound;
+        self.commit_deformed_rates();
     }
 
     /// The node forces in `sums`, or the last computed forces for `None`.

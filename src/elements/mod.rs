@@ -394,5 +394,6 @@ impl Elements {
             history.hash(hasher);
         }
         self.pressure_offsets.hash(hasher);
+        hasher.write_floats(&[self.least_rate()]);
     }
 }

@@ -81,6 +81,18 @@ impl Forces {
         is_found.then(|| self.rates(true).limit())
     }
 
+    /// True if a cut has moved elements.
+    pub fn has_cut_elements(&self) -> bool {
+        self.elements().is_some_and(Elements::has_cut_parts)
+    }
+
+    /// Discards the tight bound of a step that is not taken.
+    pub fn rollback_bounds(&mut self) {
+        self.elements
+            .iter_mut()
+            .for_each(|elements| elements.rollback_deformed_rates());
+    }
+
     /// True if the bound of elements is relative to a deformation.
     pub fn uses_deformed_rates(&self) -> bool {
         self.elements().is_some_and(Elements::uses_deformed_rates)

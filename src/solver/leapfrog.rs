@@ -44,7 +44,7 @@ impl Integrator for Leapfrog {
         let start = match retry {
             Some(start) => start,
             None => {
-                let (carry, non_spring_limit) = prepare(body, request, team);
+                let (carry, non_spring_limit) = prepare(body, request, true, team);
                 if request.substeps == 0 {
                     return run_stably(body, request, carry, non_spring_limit, team);
                 }
@@ -59,7 +59,7 @@ impl Integrator for Leapfrog {
     }
 
     fn plan_step(&mut self, body: &mut System, request: &StepRequest, team: &Team) -> StepPlan {
-        let (start, non_spring_limit) = prepare(body, request, team);
+        let (start, non_spring_limit) = prepare(body, request, false, team);
         if request.substeps > 0 {
             return StepPlan {
                 start,

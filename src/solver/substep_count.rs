@@ -21,7 +21,15 @@ const BLADE_SUBSTEP_RATIO: f64 = 1.25;
 
 /// Returns the state that a step of VERLET begins with, and the longest stable substep of all forces except springs
 ///, s.
-pub(super) fn prepare(body: &mut System, request: &StepRequest, team: &Team) -> (IntegratorState, f32) {
+///
+/// `may_tighten`: the body steps alone. Coupled bodies do not tighten bounds again within a step, so they would have to
+/// repeat it more often.
+pub(super) fn prepare(
+    body: &mut System,
+    request: &StepRequest,
+    may_tighten: bool,
+    team: &Team,
+) -> (IntegratorState, f32) {
     if body.forces.has_non_spring_forces() {
         // The limits of elements, terms and cavities depend on the masses of the step.
         let ends = body.scaling.as_mut().is_some_and(|scaling| scaling.end_stiffened());
@@ -31,15 +39,15 @@ pub(super) fn prepare(body: &mut System, request: &StepRequest, team: &Team) -> 
         }
         body.scale_masses_for(scaling_substep);
     }
-    // The mass of tissue that resists blades follows the looser bound.
-    let resists = resists_blades(body);
-    if resists && body.forces.uses_deformed_rates() {
+    // The mass of tissue that resists blades follows the looser bound, and slivers of cuts need no tighter one.
+    let may_tighten = may_tighten && !resists_blades(body) && !body.forces.has_cut_elements();
+    if !may_tighten && body.forces.uses_deformed_rates() {
         body.forces.forget_rates();
     }
     let mut non_spring_limit = body.non_spring_dt_limit(team);
     let is_worth_tightening =
         body.forces.uses_deformed_rates() || substeps_needed(request, non_spring_limit) > WORTH_TIGHTENING;
-    if is_worth_tightening && !resists {
+    if is_worth_tightening && may_tighten {
         non_spring_limit = body.tightened_dt_limit(false, team).unwrap_or(non_spring_limit);
     }
     if substeps_needed(request, non_spring_limit) > f64::from(max_unscaled_substeps(body, request)) {

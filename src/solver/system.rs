@@ -363,6 +363,7 @@ impl System {
         self.restore_sleep();
         self.integrator.rollback();
         self.forces.restore();
+        self.forces.rollback_bounds();
         if self.scaling.as_ref().is_some_and(|scaling| scaling.has_changed()) {
             // Nodes that were added to the list during the step lose their added mass.
             self.scale_masses(0.0);
