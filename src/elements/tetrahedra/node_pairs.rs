@@ -88,7 +88,7 @@ impl NodePairs {
         padded(self.nodes.len())
     }
 
-    /// Computes the norms of the blocks of pairs and of nodes: the largest singular values, or up to a few percent more.
+    /// Computes the norms of the blocks of pairs and of nodes: the largest singular values, or a few percent more.
     /// The block of a node is minus the sum of the symmetric parts of its pairs. `sums` is memory for two records of
     /// each node.
     pub fn find_norms(

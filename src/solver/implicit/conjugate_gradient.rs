@@ -1,7 +1,8 @@
 //! Preconditioned conjugate gradient (Hestenes, Stiefel 1952) for the linearized equation of a step.
 //!
 //! A product with the matrix is a sum over springs, tile by tile, like forces; only the tangent of elements is
-//! assembled. Sums over nodes are computed per tile and added in tile order, so that they do not depend on the number of threads.
+//! assembled. Sums over nodes are computed per tile and added in tile order, so that they do not depend on the number
+//! of threads.
 
 use glam::Vec3;
 
