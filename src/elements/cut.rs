@@ -98,9 +98,6 @@ impl Elements {
         for values in [&mut self.stiffnesses, &mut self.node_rates] {
             memory::reserve(values, count)?;
         }
-        if let Some(rates) = &mut self.deformed_rates {
-            rates.reserve(count, 0)?;
-        }
         if let Some(nodal_volumes) = &mut self.nodal_volumes {
             memory::reserve(&mut nodal_volumes.volumes, count)?;
             self.pressure_offsets.resize(nodal_volumes.volumes.len(), count)?;
@@ -138,9 +135,6 @@ impl Elements {
             };
             memory::push(&mut cells.spare, part)?;
         }
-        if let Some(rates) = &mut self.deformed_rates {
-            rates.reserve(node_count, added_parts)?;
-        }
         self.parts.try_reserve(added_parts)?;
         self.starts.try_reserve(added_parts)?;
         let pressure_count = if self.nodal_volumes.is_some() { node_count } else { 0 };
@@ -164,9 +158,6 @@ impl Elements {
     pub fn rewire(&mut self, pieces: &[ElementPiece], node_count: usize, mut other_sums: Option<&mut Sums>) {
         self.stiffnesses.resize(node_count, 0.0);
         self.node_rates.resize(node_count, 0.0);
-        if let Some(rates) = &mut self.deformed_rates {
-            rates.grow(node_count);
-        }
         self.grow_nodal_pressures(node_count, other_sums.as_deref_mut());
         // A source changes after its copies are created.
         for piece in pieces.iter().filter(|piece| piece.is_copy()) {
@@ -330,9 +321,6 @@ impl Elements {
             }
             if let Some(history) = &mut self.history {
                 history.add_part();
-            }
-            if let Some(rates) = &mut self.deformed_rates {
-                rates.add_part();
             }
             cells.used = 0;
         }

@@ -10,13 +10,9 @@
 //! relative to that at the start, as far as that bound is equally tight. The next step assembles the tangent anew. A
 //! body near rest must stay stable when it returns there, so the bound at rest is always part of the bound.
 
-use glam::{DMat3, DVec3};
-
+use super::Elements;
 use super::forces::extra_stresses;
-use super::parts::FemPart;
-use super::rates::corner_stiffness;
 use super::tetrahedra::{GROUP, NodePairs};
-use super::{DeformedTet, Elements, RestTet, TetStress};
 use crate::base::{Result, memory};
 use crate::codec::{Reader, Saved, Writer, saved};
 use crate::simd::{ChosenKernel, Record};
@@ -38,8 +34,7 @@ const REST_MARGIN: f32 = 1.1;
 /// Memory for the tangent of a body.
 #[derive(Debug)]
 pub(super) struct DeformedRates {
-    /// `None` for parts that a cut has added.
-    parts: Vec<Option<PartBlocks>>,
+    parts: Vec<PartBlocks>,
     /// A weight and a row sum for each node.
     weights: Vec<f32>,
     row_sums: Vec<f32>,
@@ -54,24 +49,6 @@ pub(super) struct DeformedRates {
 saved! { DeformedRates { parts, weights, row_sums, rest_rate, is_used, committed } }
 
 impl DeformedRates {
-    /// Reserves memory for `node_count` nodes in all and for parts that a cut adds.
-    pub fn reserve(&mut self, node_count: usize, added_parts: usize) -> Result<()> {
-        memory::reserve(&mut self.weights, node_count)?;
-        memory::reserve(&mut self.row_sums, node_count)?;
-        Ok(self.parts.try_reserve(added_parts)?)
-    }
-
-    /// Resizes to this number of nodes, within the reserved memory.
-    pub fn grow(&mut self, node_count: usize) {
-        self.weights.resize(node_count, 0.0);
-        self.row_sums.resize(node_count, 0.0);
-    }
-
-    /// Adds a part of a cut, within the reserved memory.
-    pub fn add_part(&mut self) {
-        self.parts.push(None);
-    }
-
     /// Returns to the bound at rest of [`super::rates`].
     pub fn forget_rest_rate(&mut self) {
         self.rest_rate = None;
@@ -92,13 +69,6 @@ struct PartBlocks {
 }
 
 impl PartBlocks {
-    fn new(part: &FemPart) -> Result<Option<Self>> {
-        if part.is_from_cut {
-            return Ok(None);
-        }
-        Ok(Some(Self::of(NodePairs::new(&part.groups)?)?))
-    }
-
     fn of(pairs: NodePairs) -> Result<Self> {
         let node_count = pairs.node_count.max(GROUP);
         Ok(Self {
@@ -145,7 +115,11 @@ impl Elements {
         if self.nodal_volumes.is_none() {
             let node_count = self.node_rates.len();
             self.deformed_rates = Some(memory::boxed(DeformedRates {
-                parts: memory::try_collected(self.parts.iter().map(PartBlocks::new))?,
+                parts: memory::try_collected(
+                    self.parts
+                        .iter()
+                        .map(|part| PartBlocks::of(NodePairs::new(&part.groups)?)),
+                )?,
                 weights: memory::filled(0.0, node_count)?,
                 row_sums: memory::filled(0.0, node_count)?,
                 rest_rate: None,
@@ -156,9 +130,11 @@ impl Elements {
         Ok(())
     }
 
-    /// True if a cut has added parts.
-    pub fn has_cut_parts(&self) -> bool {
-        self.parts.iter().any(|part| part.is_from_cut)
+    /// True if there is memory for a tight bound, and no cut has added parts or nodes since.
+    pub fn can_tighten(&self) -> bool {
+        let (parts, nodes) = (self.parts.len(), self.node_rates.len());
+        let rates = self.deformed_rates.as_ref();
+        rates.is_some_and(|rates| rates.parts.len() == parts && rates.weights.len() == nodes)
     }
 
     /// True if the bound is relative to a deformation.
@@ -176,6 +152,9 @@ impl Elements {
         masses: &NodalMasses,
         team: &Team,
     ) -> bool {
+        if !self.can_tighten() {
+            return false;
+        }
         let Some(mut rates) = self.deformed_rates.take() else {
             return false;
         };
@@ -186,24 +165,22 @@ impl Elements {
             Items::new(&mut rates.parts),
         );
         team.pass(parts.len(), written, |part, (copies, blocks)| {
-            if let Some(blocks) = blocks {
-                let part_data = &parts[part];
-                part_data.copy(positions, copies);
-                let extra = extra_stresses(history, part);
-                let assembled = (&mut blocks.pairs, &mut blocks.stiffenings[..]);
-                part_data.groups.assemble_pairs(kernel, law, extra, copies, assembled);
-                let memory = (&mut blocks.sums[..], &mut blocks.spreads[..]);
-                blocks
-                    .pairs
-                    .find_norms(kernel, &mut blocks.norms, &mut blocks.node_norms, memory);
-            }
+            let part_data = &parts[part];
+            part_data.copy(positions, copies);
+            let extra = extra_stresses(history, part);
+            let assembled = (&mut blocks.pairs, &mut blocks.stiffenings[..]);
+            part_data.groups.assemble_pairs(kernel, law, extra, copies, assembled);
+            let memory = (&mut blocks.sums[..], &mut blocks.spreads[..]);
+            blocks
+                .pairs
+                .find_norms(kernel, &mut blocks.norms, &mut blocks.node_norms, memory);
         });
-        let highest = self.find_row_sums(&mut rates, positions, masses);
+        let highest = self.find_row_sums(&mut rates, masses);
         let is_finite = highest > 0.0 && highest.is_finite();
         if is_finite {
-            self.set_deformed_rates(&mut rates, positions, springs, masses);
-            let sum_bound = self.bound_at_start(&rates, positions);
-            // Where cuts have left nodes of very different masses, the sum over tetrahedra may be lower.
+            self.set_deformed_rates(&mut rates, springs, masses);
+            let sum_bound = self.sum_bound(&rates);
+            // Among nodes of very different masses, the sum over tetrahedra may be lower.
             if sum_bound <= self.rate_bound {
                 let node_rates = &self.node_rates;
                 self.parts.iter_mut().for_each(|part| part.set_rates(node_rates));
@@ -216,33 +193,24 @@ impl Elements {
         is_finite
     }
 
-    /// The bound of [`super::rates`] for nodes at `positions`, 1/s².
-    fn bound_at_start(&self, rates: &DeformedRates, positions: &[Record]) -> f32 {
+    /// The bound of [`super::rates`] at the deformation that was assembled, 1/s².
+    fn sum_bound(&self, rates: &DeformedRates) -> f32 {
         let mut highest = 0.0_f32;
-        for (index, (part, blocks)) in self.parts.iter().zip(&rates.parts).enumerate() {
-            let rate_of = |corners: [u32; 4]| {
-                let rates = corners.map(|node| self.node_rates[node as usize]);
-                rates.into_iter().fold(0.0, f32::max)
-            };
-            match blocks {
-                Some(blocks) => {
-                    let groups = part.groups.as_slice();
-                    for (group, stiffenings) in blocks.stiffenings.iter().enumerate() {
-                        for lane in (0..GROUP).filter(|&lane| groups[group].volumes[lane] > 0.0) {
-                            highest = highest.max(stiffenings[lane] * rate_of(part.corner_nodes(group, lane)));
-                        }
-                    }
+        for (part, blocks) in self.parts.iter().zip(&rates.parts) {
+            let groups = part.groups.as_slice();
+            for (group, stiffenings) in blocks.stiffenings.iter().enumerate() {
+                for lane in (0..GROUP).filter(|&lane| groups[group].volumes[lane] > 0.0) {
+                    let corners = part.corner_nodes(group, lane);
+                    let node_rates = corners.map(|node| self.node_rates[node as usize]);
+                    highest = highest.max(stiffenings[lane] * node_rates.into_iter().fold(0.0, f32::max));
                 }
-                None => self.visit_cut_stiffenings(index, positions, |corners, _, stiffening| {
-                    highest = highest.max(stiffening as f32 * rate_of(corners));
-                }),
             }
         }
         highest
     }
 
     /// Leaves a bound on the squared frequency of each node in `row_sums`, 1/s². Returns the highest.
-    fn find_row_sums(&self, rates: &mut DeformedRates, positions: &[Record], masses: &NodalMasses) -> f32 {
+    fn find_row_sums(&self, rates: &mut DeformedRates, masses: &NodalMasses) -> f32 {
         let DeformedRates {
             parts,
             weights,
@@ -255,11 +223,8 @@ impl Elements {
         }
         for product in 1..=PRODUCTS {
             row_sums.fill(0.0);
-            for (index, (part, blocks)) in self.parts.iter().zip(&*parts).enumerate() {
-                match blocks {
-                    Some(blocks) => blocks.add_products(&part.nodes, weights, row_sums),
-                    None => self.add_cut_stiffness(index, positions, masses, weights, row_sums),
-                }
+            for (part, blocks) in self.parts.iter().zip(&*parts) {
+                blocks.add_products(&part.nodes, weights, row_sums);
             }
             highest = 0.0;
             for (node, (sum, weight)) in row_sums.iter_mut().zip(&*weights).enumerate() {
@@ -281,61 +246,8 @@ impl Elements {
         highest
     }
 
-    /// Adds the bounds of the tetrahedra of a part that a cut has added.
-    fn add_cut_stiffness(
-        &self,
-        part: usize,
-        positions: &[Record],
-        masses: &NodalMasses,
-        weights: &[f32],
-        sums: &mut [f32],
-    ) {
-        self.visit_cut_stiffenings(part, positions, |corners, rest, stiffening| {
-            let free = corners.map(|node| masses.inverse(node as usize) > 0.0);
-            for (node, stiffness) in corners.into_iter().zip(corner_stiffness(self.stiffened(), rest, free)) {
-                sums[node as usize] += (stiffening * stiffness) as f32 * weights[node as usize];
-            }
-        });
-    }
-
-    /// Calls `f` with the nodes, the rest shape and the stiffness relative to rest of each tetrahedron of a part.
-    fn visit_cut_stiffenings(&self, part: usize, positions: &[Record], mut f: impl FnMut([u32; 4], &RestTet, f64)) {
-        self.parts[part].visit(&mut |corners, rest, lane_index| {
-            f(
-                corners,
-                rest,
-                self.cut_stiffening(part, lane_index, corners, rest, positions),
-            );
-        });
-    }
-
-    /// An upper bound on the stiffness of a tetrahedron relative to rest.
-    fn cut_stiffening(
-        &self,
-        part: usize,
-        lane_index: [usize; 2],
-        corners: [u32; 4],
-        rest: &RestTet,
-        positions: &[Record],
-    ) -> f64 {
-        let (law, history) = (self.stiffened(), self.history.as_deref());
-        let [a, b, c, d] = corners.map(|node| {
-            let Record([x, y, z, _]) = positions[node as usize];
-            DVec3::new(f64::from(x), f64::from(y), f64::from(z))
-        });
-        let extra = history.map_or(TetStress::ZERO, |history| history.extra_stress(part, lane_index));
-        let deformed = DeformedTet::new(law, rest, DMat3::from_cols(b - a, c - a, d - a)).with_extra_stress(extra);
-        deformed.stiffening(law, deformed.pressure()).max(1.0)
-    }
-
     /// Makes the rates of tetrahedra relative to the deformation that `row_sums` belong to.
-    fn set_deformed_rates(
-        &mut self,
-        rates: &mut DeformedRates,
-        positions: &[Record],
-        springs: &dyn Springs,
-        masses: &NodalMasses,
-    ) {
+    fn set_deformed_rates(&mut self, rates: &mut DeformedRates, springs: &dyn Springs, masses: &NodalMasses) {
         let (mut highest, mut stiffest) = (0.0_f32, 0.0_f32);
         for (node, sum) in rates.row_sums.iter_mut().enumerate() {
             if *sum > 0.0 {
@@ -345,26 +257,11 @@ impl Elements {
         }
         let row_sums = &rates.row_sums;
         for (part, blocks) in self.parts.iter_mut().zip(&rates.parts) {
-            if let Some(blocks) = blocks {
-                let nodes = &part.nodes;
-                let rate = |corner: u16| row_sums[nodes[usize::from(corner)] as usize];
-                stiffest = stiffest.max(part.groups.set_relative_rates(&blocks.stiffenings, rate));
-            } else {
-                part.set_rates(row_sums);
-            }
+            let nodes = &part.nodes;
+            let rate = |corner: u16| row_sums[nodes[usize::from(corner)] as usize];
+            stiffest = stiffest.max(part.groups.set_relative_rates(&blocks.stiffenings, rate));
         }
-        for part in (0..self.parts.len()).filter(|&part| rates.parts[part].is_none()) {
-            for group in 0..self.parts[part].groups.as_slice().len() {
-                let volumes = self.parts[part].groups.as_slice()[group].volumes;
-                for lane in (0..GROUP).filter(|&lane| volumes[lane] > 0.0) {
-                    let corners = self.parts[part].corner_nodes(group, lane);
-                    let rest = self.parts[part].rest_shape(group, lane);
-                    let stiffening = self.cut_stiffening(part, [group, lane], corners, &rest, positions);
-                    self.parts[part].groups.soften_rate([group, lane], stiffening as f32);
-                }
-            }
-        }
-        if stiffest <= NEAR_REST && !self.has_cut_parts() {
+        if stiffest <= NEAR_REST {
             rates.rest_rate = Some(REST_MARGIN * highest);
         }
         rates.is_used = true;

@@ -151,11 +151,6 @@ impl TetrahedronGroups {
         self.groups[group].rates[lane] = rate;
     }
 
-    /// Divides the rate bound of a tetrahedron.
-    pub fn soften_rate(&mut self, [group, lane]: [usize; 2], factor: f32) {
-        self.groups[group].rates[lane] /= factor;
-    }
-
     /// Sets the volume of a tetrahedron.
     pub fn set_volume(&mut self, [group, lane]: [usize; 2], volume: f32) {
         self.groups[group].volumes[lane] = volume;

@@ -81,9 +81,9 @@ impl Forces {
         is_found.then(|| self.rates(true).limit())
     }
 
-    /// True if a cut has moved elements.
-    pub fn has_cut_elements(&self) -> bool {
-        self.elements().is_some_and(Elements::has_cut_parts)
+    /// True if the bound of elements can be tightened.
+    pub fn can_tighten(&self) -> bool {
+        self.elements().is_some_and(Elements::can_tighten)
     }
 
     /// Discards the tight bound of a step that is not taken.

@@ -39,8 +39,8 @@ pub(super) fn prepare(
         }
         body.scale_masses_for(scaling_substep);
     }
-    // The mass of tissue that resists blades follows the looser bound, and slivers of cuts need no tighter one.
-    let may_tighten = may_tighten && !resists_blades(body) && !body.forces.has_cut_elements();
+    // The mass of tissue that resists blades follows the looser bound.
+    let may_tighten = may_tighten && !resists_blades(body) && body.forces.can_tighten();
     if !may_tighten && body.forces.uses_deformed_rates() {
         body.forces.forget_rates();
     }

@@ -63,11 +63,6 @@ fn add<R: Real>([x, y, z]: MatrixColumns<R>, [a, b, c]: MatrixColumns<R>, factor
 }
 
 #[inline(always)]
-fn scaled_columns<R: Real>([a, b, c]: MatrixColumns<R>, factor: R) -> MatrixColumns<R> {
-    [scaled(a, factor), scaled(b, factor), scaled(c, factor)]
-}
-
-#[inline(always)]
 fn times<R: Real>([a, b, c]: MatrixColumns<R>, [x, y, z]: [R; 3]) -> [R; 3] {
     sum(sum(scaled(a, x), scaled(b, y)), scaled(c, z))
 }
@@ -194,13 +189,20 @@ impl<R: Real> StrainState<R> {
         add(stress, self.cofactors, wj)
     }
 
+    /// The matrix X of the tangent, `2 w2 cof F + wJ F`.
+    #[inline(always)]
+    fn cross_factor(&self) -> MatrixColumns<R> {
+        let [_, w2, wj] = self.first_derivatives;
+        let zero = [[R::from_f64(0.0); 3]; 3];
+        add(add(zero, self.cofactors, R::from_f64(2.0) * w2), self.gradient, wj)
+    }
+
     /// The stress change to first order, Pa, with the tangent shifted by `lift`.
     #[inline(always)]
     pub fn stress_change(&self, change: MatrixColumns<R>, lift: R) -> MatrixColumns<R> {
-        let ([w1, w2, wj], [w11, wjj]) = (self.first_derivatives, self.second_derivatives);
-        let (two, zero) = (R::from_f64(2.0), [[R::from_f64(0.0); 3]; 3]);
-        let cross_factor = add(add(zero, self.cofactors, two * w2), self.gradient, wj);
-        let changed = add(tensor_cross(cross_factor, change), change, two * w1 + lift);
+        let ([w1, w2, _], [w11, wjj]) = (self.first_derivatives, self.second_derivatives);
+        let two = R::from_f64(2.0);
+        let changed = add(tensor_cross(self.cross_factor(), change), change, two * w1 + lift);
         let areas = tensor_cross(self.gradient, change);
         let changed = add(changed, tensor_cross(self.gradient, areas), two * w2);
         let strain_term = R::from_f64(4.0) * w11 * inner(self.gradient, change);
@@ -213,15 +215,14 @@ impl<R: Real> StrainState<R> {
     /// F F^T) + 4 w11 f f'^T + wJJ c c'^T`, and `X (g' x g)` crossed with u.
     #[inline(always)]
     pub fn tangent_block(&self, [g, other_g]: [[R; 3]; 2], lift: R) -> MatrixColumns<R> {
-        let ([w1, w2, wj], [w11, wjj]) = (self.first_derivatives, self.second_derivatives);
+        let ([w1, w2, _], [w11, wjj]) = (self.first_derivatives, self.second_derivatives);
         let (two, zero) = (R::from_f64(2.0), R::from_f64(0.0));
         let two_w2 = two * w2;
         let [a, b, c] = self.gradient;
         let (f, other_f) = (times(self.gradient, g), times(self.gradient, other_g));
         let product = dot(g, other_g);
         let along = (two * w1 + lift) * product + two_w2 * (self.i1 * product - dot(f, other_f));
-        let skewed = add(scaled_columns(self.cofactors, two_w2), self.gradient, wj);
-        let [x, y, z] = times(skewed, cross(other_g, g));
+        let [x, y, z] = times(self.cross_factor(), cross(other_g, g));
         let skew = [[along, z, zero - y], [zero - z, along, x], [y, zero - x, along]];
         let block = add_outer(skew, scaled(a, zero - two_w2 * product), a);
         let block = add_outer(block, scaled(b, zero - two_w2 * product), b);
