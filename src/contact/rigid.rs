@@ -155,7 +155,7 @@ impl MassProperties {
 }
 
 /// Returns the moments of inertia of a capsule of density 1 about its axis and across it (kg m²), and its volume
-///, m³.
+/// (m³).
 fn mass_of_capsule(radius: f64, half_length: f64) -> [f64; 3] {
     use std::f64::consts::PI;
     let (square, length) = (radius * radius, 2.0 * half_length);

@@ -37,7 +37,7 @@ impl CoarseStep {
     }
 
     /// Compares the end of the step with the stored one, then stores it. Returns the distance between the two steps
-    ///, m. A velocity difference counts as its displacement in `time` seconds. The distance is infinite if a value is
+    /// (m). A velocity difference counts as its displacement in `time` seconds. The distance is infinite if a value is
     /// not finite.
     pub fn compare_end(&mut self, positions: &Vectors, velocities: &Vectors, time: f32) -> f32 {
         let apart = self.positions.largest_distance(positions);

@@ -231,7 +231,7 @@ pub(crate) fn visit_flushed(body: &System, deferred: &DeferredHalfKick, visit: &
 }
 
 /// Corrects the velocity of `node` so that the deferred half kick gives the same result as with an additional `force`
-///, N. Pass the force of a removed spring, or the negated force of an added one.
+/// (N). Pass the force of a removed spring, or the negated force of an added one.
 pub(crate) fn correct_deferred_kick(body: &mut System, node: u32, mut force: Vec3) {
     let Some(deferred) = body.carry.deferred_kick else {
         return;

@@ -83,8 +83,8 @@ impl AddedMass {
         }
     }
 
-    /// The mass for which a substep of `step` seconds is stable, if elements stiffen further by the factor `margin`
-    ///, kg.
+    /// The mass (kg) for which a substep of `step` seconds is stable, if elements stiffen further by the factor
+    /// `margin`.
     fn required_mass(&self, step: f64, margin: f32) -> f64 {
         let extra_stiffness =
             (f64::from(margin * self.stiffening) - 1.0).max(0.0) * f64::from(self.non_spring.stiffness);

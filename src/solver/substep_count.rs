@@ -19,8 +19,8 @@ const WORTH_TIGHTENING: f64 = 24.0;
 /// The maximum ratio of substeps to those at rest for tissue that resists blades, as far as mass can be added.
 const BLADE_SUBSTEP_RATIO: f64 = 1.25;
 
-/// Returns the state that a step of VERLET begins with, and the longest stable substep of all forces except springs
-///, s.
+/// Returns the state that a step of VERLET begins with, and the longest stable substep (s) of all forces except
+/// springs.
 ///
 /// `may_tighten`: the body steps alone. Coupled bodies do not tighten bounds again within a step, so they would have to
 /// repeat it more often.
