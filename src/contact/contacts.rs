@@ -183,11 +183,6 @@ impl Contacts {
         is_pressed.then(|| self.dynamic_tools.end(index, dt)).flatten()
     }
 
-    /// Energy that contact transferred to a dynamic tool in the step, J. `None` for a kinematic tool.
-    pub fn received(&self, index: usize) -> Option<f64> {
-        self.dynamic_tools.received(index)
-    }
-
     /// Reserves memory for the contacts of `features` features with `tools` tools.
     pub(super) fn reserve_contacts(&mut self, features: usize, tools: usize) -> Result<()> {
         let batch_capacity = features.saturating_mul(tools);
@@ -410,6 +405,21 @@ impl Contacts {
         for (index, constraint) in self.constraints.iter().enumerate().take(self.multipliers.len()) {
             self.loads[constraint.tool].add(self.multipliers.force(index) * (0.5 * substep), constraint.arm);
         }
+    }
+
+    /// The work of tools on the body since the step of `dt` seconds began, J.
+    pub fn work_of_tools(&self, tools: &[ToolPath], dt: f32) -> f64 {
+        let tools = tools.iter().zip(&self.loads).enumerate();
+        let moving = tools.filter(|(_, (tool, _))| tool.moves());
+        let work = moving.map(|(index, (tool, load))| match self.dynamic_tools.received(index) {
+            Some(received) => -received,
+            // If tissue hits a tool faster than the tool moves, the rest of the energy is lost.
+            None => {
+                let [displacement, rotation] = tool.travel();
+                -(load.impulse.dot(displacement) + load.angular_impulse.dot(rotation)) / f64::from(dt)
+            }
+        });
+        work.sum()
     }
 
     /// The load on each tool of the step.

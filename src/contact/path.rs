@@ -306,7 +306,7 @@ impl ToolPath {
     }
 
     /// Returns the speed of the fastest point, m/s; for a plane that of its position.
-    pub(super) fn speed(&self, dt: f32) -> f32 {
+    pub fn speed(&self, dt: f32) -> f32 {
         let travel = match self.sweep(DVec3::ZERO) {
             Some(sweep) => sweep.travel,
             None => self.start.position.distance(self.end.position),

@@ -120,18 +120,9 @@ impl<'a> EnergyMonitor<'a> {
                 work += DVec3::select(pin.axes, force, DVec3::ZERO).dot(displacement);
             }
         }
-        let loads = body.contacts.iter().flat_map(|contacts| contacts.loads());
-        let tools = self.request.tools.iter().zip(loads).enumerate();
-        for (index, (tool, load)) in tools.filter(|(_, (tool, _))| tool.moves()) {
-            let received = body.contacts.as_ref().and_then(|contacts| contacts.received(index));
-            if let Some(received) = received {
-                work -= received;
-                continue;
-            }
-            // If tissue hits a tool faster than the tool moves, the rest of the energy is lost.
-            let [displacement, rotation] = tool.travel();
-            work -= (load.impulse.dot(displacement) + load.angular_impulse.dot(rotation)) / f64::from(self.request.dt);
-        }
-        work
+        let contacts = body.contacts.as_deref();
+        work + contacts.map_or(0.0, |contacts| {
+            contacts.work_of_tools(self.request.tools, self.request.dt)
+        })
     }
 }

@@ -3,7 +3,7 @@
 use crate::support::tissue::*;
 use glam::{Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Pose, Shape, ToolId, Values, World};
+use sinew::{BodyDefinition, ElementLaw, Material, Model, Pose, Shape, Solver, ToolDefinition, ToolId, Values, World};
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
@@ -61,6 +61,64 @@ fn check_a_tool_created_inside_a_body_pushes_the_body_out(dt: f32) {
             deepest < 0.001,
             "radius {radius} at {target}, dt {dt}: {deepest} m deep"
         );
+    }
+}
+
+#[test]
+fn a_body_thrown_at_a_box_gains_no_energy() {
+    for (solver, young_modulus, speed, dt) in [
+        (Solver::Implicit, 1.6e5, 12.0, 1.0 / 130.0),
+        (Solver::Implicit, 3.3e5, 25.0, 1.0 / 400.0),
+        (Solver::Implicit, 5e6, 20.0, 1.0 / 300.0),
+        (Solver::Implicit, 3e4, 20.0, 1.0 / 60.0),
+        (Solver::Verlet, 3.3e5, 25.0, 1.0 / 400.0),
+    ] {
+        let mut world = world(DOWN);
+        let mesh = Mesh::block([0.06; 3], [4; 3]).expect("a block");
+        let material = Material {
+            model: Model::Tetrahedra,
+            young_modulus,
+            poisson_ratio: 0.39,
+            density: 1000.0,
+            ..Material::default()
+        };
+        let block = world.create_body(&BodyDefinition {
+            material: Some(material),
+            element_law: ElementLaw::NeoHookean,
+            solver,
+            ..BodyDefinition::of(&mesh)
+        });
+        let block = block.expect("a body");
+        let raised: Vec<Vec3> = mesh
+            .positions
+            .iter()
+            .map(|&position| position + 0.2 * Vec3::Y)
+            .collect();
+        let thrown = vec![Vec3::new(0.2 * speed, -speed, 0.0); raised.len()];
+        let body = world.body_mut(block).expect("a body");
+        body.set_positions(&raised).expect("positions");
+        body.set_velocities(&thrown).expect("velocities");
+        let mut floor = ToolDefinition::new(Shape::Plane);
+        floor.pose.position = Vec3::ZERO;
+        let mut edge = ToolDefinition::new(Shape::Box {
+            half_extents: Vec3::splat(0.02),
+        });
+        edge.pose.position = Vec3::new(0.02, 0.02, 0.0);
+        for tool in [floor, edge] {
+            world.create_tool(&tool).expect("a tool");
+        }
+        let start = total_energy(&world, block);
+        let mut was_hit = false;
+        for step in 0..(0.08 / dt) as u32 {
+            world.step(dt).expect("a step");
+            let energy = total_energy(&world, block);
+            was_hit |= energy < 0.9 * start;
+            assert!(
+                energy <= 1.001 * start,
+                "{solver:?}, {young_modulus} Pa, {speed} m/s, step {step}: {energy} J of {start} J"
+            );
+        }
+        assert!(was_hit, "{solver:?}, {young_modulus} Pa: missed");
     }
 }
 

@@ -19,7 +19,7 @@ use crate::springs::{DirectionInput, Tangent};
 use crate::threads::{Items, Team, Tiles};
 
 /// The number of products of a solve from which on assembling the tangent of elements saves time.
-const WORTH_ASSEMBLING: u32 = 6;
+const WORTH_ASSEMBLING: u32 = 12;
 
 /// Sums over the nodes of a tile.
 #[derive(Clone, Copy, Debug, Default)]

@@ -6,6 +6,7 @@
 
 use glam::Vec3;
 
+use super::energy::EnergyBefore;
 use super::step::Substep;
 use super::subdivision::contact_substeps;
 use super::{Implicit, SubstepOutcome};
@@ -247,8 +248,14 @@ impl Substep<'_> {
         watch.subtract_from(profile, Stage::Solver);
     }
 
-    /// Stops nodes that would enter a tool.
-    pub(super) fn resolve_contacts(&self, body: &mut System, implicit: &mut Implicit) -> SubstepOutcome {
+    /// Stops nodes that would enter a tool. The substep is refused if that adds energy, except as a last resort.
+    pub(super) fn resolve_contacts(
+        &self,
+        body: &mut System,
+        implicit: &mut Implicit,
+        before: EnergyBefore,
+        is_last_resort: bool,
+    ) -> SubstepOutcome {
         let may_accept_long = may_be_long(body, implicit, self.request);
         let Some(mean_velocities) = &mut implicit.mean_velocities else {
             return SubstepOutcome::Accepted;
@@ -309,7 +316,21 @@ impl Substep<'_> {
         for pin in body.pins.partial() {
             pin.set_held(&mut history.velocity_changes, Vec3::ZERO);
         }
-        history.energy = None;
+        // In a long substep the loads on moving tools are means of its ends, so that their work is not known.
+        let is_work_known = !self.is_long() || self.request.tools.iter().all(|tool| !tool.moves());
+        let is_work_known = is_work_known && !body.has_tool_attachments();
+        let gain = if is_work_known {
+            self.contact_gain(body, implicit, before)
+        } else {
+            history.energy = None;
+            0.0
+        };
+        if gain > 0.0 {
+            if !is_last_resort && implicit.budget_left > 0 {
+                return SubstepOutcome::EnergyGained;
+            }
+            self.remove_contact_gain(body, implicit, gain);
+        }
         if self.is_long()
             && let Some(contacts) = &mut body.contacts
         {

@@ -4,7 +4,7 @@ use glam::{BVec3, DVec3};
 
 use super::iterations::store_pin_reactions;
 use super::step::Substep;
-use super::{History, Implicit, SubstepOutcome};
+use super::{History, Implicit, SubstepOutcome, contact};
 use crate::codec::saved;
 use crate::contact::Contacts;
 use crate::simd::Loops;
@@ -25,6 +25,9 @@ const MAX_CREDIT: f64 = 0.1;
 
 /// Limit of accumulated gains, as a fraction of the energy: rounding, and gains inherent in the second-order formula.
 const MAX_DEBT: f64 = 2e-4;
+
+/// Limit of a gain by contact with tools in a substep, as a fraction of the energy.
+const MAX_CONTACT_GAIN: f64 = 1e-3;
 
 /// Relative error of the displacements by gravity that solved equations may have.
 const SOLVE_TOLERANCE: f64 = 1e-4;
@@ -50,6 +53,9 @@ pub(super) struct EnergyBefore {
     total: EnergyTotals,
     /// Losses that may be recovered (positive) or gains that must be lost again (negative), J.
     credit: f64,
+    /// The kinetic energy of the mean velocity, and the work of tools in the step so far, J; 0 far from tools.
+    rigid: f64,
+    work_of_tools: f64,
 }
 
 impl EnergyTotals {
@@ -76,10 +82,22 @@ impl Substep<'_> {
         let history = implicit.solution.last(self.is_first);
         let credit = history.credit;
         let pins_move = body.pins.iter().any(|pin| pin.travel != glam::Vec3::ZERO);
+        let (rigid, work_of_tools) = if contact::is_near(body) {
+            let mean = mean_vector(body, newest_velocities(body, self.is_first));
+            (rigid_energy(body, mean), self.work_of_tools(body))
+        } else {
+            (0.0, 0.0)
+        };
+        let before = |total| EnergyBefore {
+            total,
+            credit,
+            rigid,
+            work_of_tools,
+        };
         if let Some(total) = history.energy
             && !pins_move
         {
-            return EnergyBefore { total, credit };
+            return before(total);
         }
         let (kinetic, _) = kinetic_energy(body, self.is_first);
         let from = implicit.solution.history_index(self.is_first);
@@ -98,10 +116,7 @@ impl Substep<'_> {
                 magnitude: total.magnitude.max(moved.magnitude),
             };
         }
-        EnergyBefore {
-            total: total.plus(kinetic),
-            credit,
-        }
+        before(total.plus(kinetic))
     }
 
     /// Compares the energy after the step with the energy before it and the external work.
@@ -119,12 +134,8 @@ impl Substep<'_> {
         let mass = total_mass(body);
         let fall = displacement.dot(self.request.gravity.as_dvec3());
         let available = available + SOLVE_TOLERANCE * SOLVE_TOLERANCE * mass * fall.abs();
-        // Rounding of velocities, relative to the total velocity, and of coordinates.
-        let extent = body.local_bounds().magnitudes().max_element();
-        let speed = velocity.length() * f64::from(f32::EPSILON) + f64::EPSILON * f64::from(extent) / self.step;
-        let roundoff = mass * speed * speed + ROUNDOFF_MARGIN * implicit.roundoff(extent).energy;
         let magnitude = after.magnitude + work.abs();
-        let rounding = ROUNDING * (before.total.magnitude + magnitude) + roundoff + 2.0 * (roundoff * magnitude).sqrt();
+        let rounding = self.rounding(body, implicit, velocity, [before.total.magnitude, magnitude]);
         if !(after.energy.is_finite() && after.magnitude.is_finite() && work.is_finite()) {
             return SubstepOutcome::NotFinite;
         }
@@ -139,6 +150,62 @@ impl Substep<'_> {
         } else {
             SubstepOutcome::EnergyGained
         }
+    }
+
+    /// The rounding error of energies of these magnitudes before and after the substep, J: of velocities, relative to
+    /// the mean velocity, and of coordinates.
+    fn rounding(&self, body: &System, implicit: &Implicit, velocity: DVec3, [before, after]: [f64; 2]) -> f64 {
+        let extent = body.local_bounds().magnitudes().max_element();
+        let speed = velocity.length() * f64::from(f32::EPSILON) + f64::EPSILON * f64::from(extent) / self.step;
+        let roundoff = total_mass(body) * speed * speed + ROUNDOFF_MARGIN * implicit.roundoff(extent).energy;
+        ROUNDING * (before + after) + roundoff + 2.0 * (roundoff * after).sqrt()
+    }
+
+    /// Returns how much contact with tools has raised the energy above that before the substep plus the external work,
+    /// J; 0 if that is within its limit. Contact takes energy away, unless it moves nodes far that the equation did not
+    /// foresee.
+    pub(super) fn contact_gain(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> f64 {
+        let (kinetic, mean) = kinetic_energy(body, false);
+        let elastic = implicit.elastic(body, true, 1 - implicit.solution.current_index, self.team);
+        let internal = elastic.plus(kinetic);
+        implicit.solution.next_mut().energy = Some(internal);
+        let after = internal.plus(rigid_energy(body, mean));
+        let work = self.external_work(body, implicit.solution.next(), DVec3::ZERO) + self.work_of_tools(body)
+            - before.work_of_tools;
+        let available = before.total.energy + before.rigid + work;
+        let magnitudes = [before.total.magnitude + before.rigid, after.magnitude + work.abs()];
+        // Tissue that a tool meets within the substep takes its speed at once, and forces against that act later.
+        let speeds = self.request.tools.iter().map(|tool| tool.speed(self.request.dt));
+        let fastest = f64::from(speeds.fold(0.0, f32::max));
+        let taken = 0.5 * total_mass(body) * fastest * fastest;
+        let allowed = self.rounding(body, implicit, mean, magnitudes) + MAX_CONTACT_GAIN * magnitudes[1] + taken;
+        let gain = after.energy - available;
+        if gain <= allowed { 0.0 } else { gain }
+    }
+
+    /// Removes the energy that contact with tools has added, as far as velocities have it.
+    pub(super) fn remove_contact_gain(&self, body: &mut System, implicit: &mut Implicit, gain: f64) {
+        let remaining = gain - remove_kinetic_energy(body, gain, true);
+        let (kinetic, mean) = kinetic_energy(body, false);
+        let kinetic = kinetic + rigid_energy(body, mean);
+        if remaining > 0.0 && kinetic > 0.0 {
+            let factor = (1.0 - remaining / kinetic).max(0.0).sqrt() as f32;
+            for axis in body.state.substep().velocities.axes_mut() {
+                axis.iter_mut().for_each(|value| *value *= factor);
+            }
+        }
+        let history = implicit.solution.next_mut();
+        history.velocity_changes.clear();
+        (history.step, history.energy, history.credit) = (0.0, None, 0.0);
+        implicit.report.has_converged = false;
+    }
+
+    /// The work of tools on the body in the step so far, J.
+    fn work_of_tools(&self, body: &System) -> f64 {
+        let contacts = body.contacts.as_deref();
+        contacts.map_or(0.0, |contacts| {
+            contacts.work_of_tools(self.request.tools, self.request.dt)
+        })
     }
 
     /// Removes the energy gain, first from internal velocities, then from all. If that does not suffice, only the pins
@@ -231,14 +298,21 @@ impl Substep<'_> {
     fn work(&self, body: &System, history: &History) -> (f64, DVec3) {
         let displacements = &history.displacements;
         let mean = mean_vector(body, displacements);
-        let contact_forces = history.active_contact_forces();
-        let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let held = |contacts: &Contacts| {
             contacts
                 .multipliers
                 .work(|node| displacements.get(node) - mean.as_vec3())
         };
-        let mut work = body.contacts.as_deref().map_or(0.0, held);
+        let work = body.contacts.as_deref().map_or(0.0, held);
+        (work + self.external_work(body, history, mean), mean)
+    }
+
+    /// Returns the work of gravity, applied forces and other tissue along the displacements relative to `mean` (m), J.
+    fn external_work(&self, body: &System, history: &History, mean: DVec3) -> f64 {
+        let displacements = &history.displacements;
+        let contact_forces = history.active_contact_forces();
+        let applied = body.applied.as_ref().filter(|_| body.forces_applied);
+        let mut work = 0.0;
         for (axis, displacements) in displacements.axes().into_iter().enumerate() {
             let gravity = f64::from(self.request.gravity[axis]);
             if gravity != 0.0 {
@@ -256,7 +330,7 @@ impl Substep<'_> {
             );
             work -= mass * pin.held(displacement).as_dvec3().dot(self.request.gravity.as_dvec3());
         }
-        (work, mean)
+        work
     }
 }
 
@@ -353,14 +427,24 @@ fn mean_vector(body: &System, vectors: &Vectors) -> DVec3 {
     }
 }
 
-/// Kinetic energy of the free nodes, J, before the first substep or now, and the mean velocity, m/s. The energy of
-/// prescribed axes and of the mean velocity is excluded.
-fn kinetic_energy(body: &System, is_first: bool) -> (f64, DVec3) {
-    let velocities = if is_first {
+/// The kinetic energy of a body that moves with its mean velocity, J.
+fn rigid_energy(body: &System, mean: DVec3) -> f64 {
+    0.5 * total_mass(body) * mean.length_squared()
+}
+
+/// The velocities before the first substep, or now, m/s.
+fn newest_velocities(body: &System, is_first: bool) -> &Vectors {
+    if is_first {
         body.state.velocities()
     } else {
         body.state.newest().1
-    };
+    }
+}
+
+/// Kinetic energy of the free nodes, J, before the first substep or now, and the mean velocity, m/s. The energy of
+/// prescribed axes and of the mean velocity is excluded.
+fn kinetic_energy(body: &System, is_first: bool) -> (f64, DVec3) {
+    let velocities = newest_velocities(body, is_first);
     let mean = mean_vector(body, velocities);
     let (masses, inverse_masses) = (&body.masses, &body.inverse_masses);
     let prescribed = body.pins.partial().map(|pin| {

@@ -96,7 +96,7 @@ impl Substep<'_> {
             outcome = SubstepOutcome::Accepted;
         }
         if outcome == SubstepOutcome::Accepted {
-            outcome = self.resolve_contacts(body, implicit);
+            outcome = self.resolve_contacts(body, implicit, before, is_last_resort);
         }
         if outcome == SubstepOutcome::Accepted {
             if let Some(contacts) = &mut body.contacts {
