@@ -76,7 +76,8 @@ impl Body {
             let ends = [a.min(b), a.max(b)];
             let first = springs.partition_point(|piece| piece.source < ends);
             let parts = springs[first..].iter().take_while(|piece| piece.source == ends);
-            // Each end is bounded separately and carries half of the spring: with masses m of both ends, a squared frequency is at most sum 2 k / m.
+            // Each end is bounded separately and carries half of the spring: with masses m of both ends, a squared
+            // frequency is at most sum 2 k / m.
             let stiffness = 2.0 * f64::from(link.stiffness);
             for (piece, sum) in pieces.iter().zip(&mut *stiffnesses) {
                 let mut link_pieces = parts.clone().peekable();

@@ -2,17 +2,13 @@
 
 use super::Body;
 use crate::base::{LimitKind, SubstepLimit};
-use crate::soa::NodalMasses;
-use crate::solver::Stability;
+use crate::solver::{Stability, masses_in_use};
 
 impl Body {
     /// The cause of the shortest stable substep at the current positions. All forces are examined.
     pub(crate) fn substep_limit(&self) -> SubstepLimit {
-        let masses = NodalMasses {
-            masses: &self.system.masses,
-            inverse_masses: &self.system.inverse_masses,
-            are_scaled: self.system.scaling.as_ref().is_some_and(|scaling| scaling.step() > 0.0),
-        };
+        let system = &self.system;
+        let masses = masses_in_use(&system.masses, &system.inverse_masses, system.scaling.as_deref());
         let positions = self.system.state.positions();
         let forces = &self.system.forces;
         let spring = Stability::tightest(&*forces.springs, masses, positions);

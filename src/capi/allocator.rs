@@ -1,5 +1,5 @@
-//! Memory from functions of the program. Only a build with the feature `allocator` asks them: it decides for the whole program, so a crate
-//! of Rust must not do it to others.
+//! Memory from functions of the program. Only a build with the feature `allocator` asks them: it decides for the whole
+//! program, so a crate of Rust must not do it to others.
 
 use std::ffi::c_void;
 
@@ -69,7 +69,8 @@ mod routed {
         }
     }
 
-    // SAFETY: all requests go to the system, or all go to functions whose setter vouches for them. Memory that is not aligned counts as none.
+    // SAFETY: all requests go to the system, or all go to functions whose setter vouches for them. Memory that is not
+    // aligned counts as none.
     unsafe impl GlobalAlloc for Routed {
         unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
             let Some(&(Some(allocate), Some(deallocate), context)) = functions() else {
@@ -117,7 +118,8 @@ mod routed {
                 // SAFETY: the same contract.
                 return unsafe { System.realloc(memory, layout, size) };
             }
-            // SAFETY: the same contract, by which `size` is fit for a layout; both have the bytes that are copied, and are apart.
+            // SAFETY: the same contract, by which `size` is fit for a layout; both have the bytes that are copied, and
+            // are apart.
             unsafe {
                 let longer = self.alloc(Layout::from_size_align_unchecked(size, layout.align()));
                 if !longer.is_null() {
@@ -151,8 +153,8 @@ mod routed {
 /// Call it before every other function. Both run on any thread that uses the library, and must not call it. `context`
 /// is nullable. Thread stacks and memory of the C library are not routed.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED without the cargo feature `allocator`; SINEW_STATUS_INVALID_ARGUMENT after the first
-/// allocation, also for the message of a failed call.
+/// Errors: SINEW_STATUS_UNSUPPORTED without the cargo feature `allocator`; SINEW_STATUS_INVALID_ARGUMENT after the
+/// first allocation, also for the message of a failed call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_set_allocator(
     alloc: sinew_alloc,

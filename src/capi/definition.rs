@@ -177,8 +177,8 @@ pub struct sinew_body_def {
     pub fibre_stiffnesses: *const f32,
     /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6.
     ///
-    /// It acts in parallel with the stiffness. Later springs have none. From about 0.001 s on use IMPLICIT: VERLET needs
-    /// short substeps.
+    /// It acts in parallel with the stiffness. Later springs have none. From about 0.001 s on use IMPLICIT: VERLET
+    /// needs short substeps.
     pub retardation_time: f32,
     /// [s] Relaxation time of the Maxwell branch, 1e-9 to 1e6; 0: a Kelvin-Voigt solid.
     ///

@@ -316,8 +316,8 @@ pub unsafe extern "C" fn sinew_detector_create(
 
 /// Finds the overlap of the two bodies at their current positions.
 ///
-/// You may pass a world loaded from a snapshot if both ids refer there to bodies with identical surfaces. An open body reports only
-/// edges (EXACT: also points). Image space does not allocate.
+/// You may pass a world loaded from a snapshot if both ids refer there to bodies with identical surfaces. An open body
+/// reports only edges (EXACT: also points). Image space does not allocate.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface; SINEW_STATUS_CAPACITY if one
 /// ray has more than `crossings`.

@@ -33,8 +33,8 @@ pub(super) unsafe trait Versioned: Copy {
 
 /// Makes structs [`Versioned`], each with the fields at which an earlier header ended, if any.
 ///
-/// Who lists a struct vouches that it is `repr(C)` and has numbers and pointers alone. A function among them is what the caller
-/// says it is.
+/// Who lists a struct vouches that it is `repr(C)` and has numbers and pointers alone. A function among them is what
+/// the caller says it is.
 macro_rules! versioned {
     ($($name:ident $({ $($later:ident),+ })?),+) => { $(
         const _: () = assert!(std::mem::offset_of!($name, struct_size) == 0);

@@ -1,7 +1,7 @@
 //! The C interface: a thin room in front of the Rust one, where a caller's pointers are checked.
 //!
-//! The headers of `include/` are generated from here. Every function checks its pointers, catches what might panic, and writes
-//! its outputs only when it answers [`SINEW_STATUS_OK`](status::SINEW_STATUS_OK).
+//! The headers of `include/` are generated from here. Every function checks its pointers, catches what might panic, and
+//! writes its outputs only when it answers [`SINEW_STATUS_OK`](status::SINEW_STATUS_OK).
 //!
 //! # Safety
 //!

@@ -41,7 +41,8 @@ pub const SINEW_VERSION: u32 = SINEW_VERSION_MAJOR << 16 | SINEW_VERSION_MINOR <
 
 thread_local! {
     static LAST_ERROR: RefCell<Option<Error>> = const { RefCell::new(None) };
-    /// The last was that memory ran out: kept by itself, as a thread's first use of what has to be dropped at its end takes memory, or ends the program.
+    /// The last was that memory ran out: kept by itself, as a thread's first use of what has to be dropped at its end
+    /// takes memory, or ends the program.
     static OUT_OF_MEMORY: Cell<bool> = const { Cell::new(false) };
 }
 

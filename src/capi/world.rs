@@ -134,7 +134,8 @@ impl sinew_world_def {
     }
 
     /// # Safety
-    /// `def` is NULL or points to a definition of the size that it states, whose `run_tasks` is as [`Self::definition`] says.
+    /// `def` is NULL or points to a definition of the size that it states, whose `run_tasks` is as [`Self::definition`]
+    /// says.
     pub(super) unsafe fn read_or_default(def: *const Self) -> Result<WorldDefinition> {
         memory::optional_definition("def", def, Self::defaults())?.definition()
     }

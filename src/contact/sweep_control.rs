@@ -23,7 +23,8 @@ pub(super) fn depth_correction(substep: f32) -> f32 {
 /// it. There the tool penetrates instead.
 pub(crate) const LEVERAGE: f32 = 4.0;
 
-/// Number of sweeps over pressing contacts between two sweeps over all. Few contacts begin to press between two full sweeps.
+/// Number of sweeps over pressing contacts between two sweeps over all. Few contacts begin to press between two full
+/// sweeps.
 const PRESSING_SWEEPS: u32 = 3;
 
 /// Convergence is slow if the change of a full sweep exceeds `STALL_RATIO` times that of the last full sweep and is

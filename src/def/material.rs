@@ -9,9 +9,8 @@ use crate::base::{Error, Result, above_zero, ensure, not_negative};
 #[doc = include_str!("../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let material = material.expect("the block has one");
-/// let mut with = |model| world.create_body(&BodyDefinition { material: Some(Material { model, ..material }), ..block });
-/// // Poisson's ratio is 0.45: elements can have it, springs cannot.
-/// assert!(with(Model::Tetrahedra).is_ok());
+/// let mut with = |model| world.create_body(&BodyDefinition { material: Some(Material { model, ..material }), ..block
+/// }); // Poisson's ratio is 0.45: elements can have it, springs cannot. assert!(with(Model::Tetrahedra).is_ok());
 /// assert!(with(Model::Springs).is_err());
 /// # Ok::<(), sinew::Error>(())
 /// ```

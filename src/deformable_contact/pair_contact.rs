@@ -237,8 +237,8 @@ impl PairContact {
     }
 
     /// Moves penetrating sides apart by at most `max_displacement`, m, in a substep of `duration` seconds. Sides that
-    /// do not penetrate come no closer than their gap allows. [`CollisionSurface::predicted_velocities`] contains the displacements of nodes so
-    /// far.
+    /// do not penetrate come no closer than their gap allows. [`CollisionSurface::predicted_velocities`] contains the
+    /// displacements of nodes so far.
     ///
     /// Sides that a cut separated begin too close. Their correction is limited by the contact impulse, so that sides
     /// that nothing presses stay.

@@ -1,35 +1,18 @@
 //! Contact search between two surfaces, or within one. It finds the first contact of each moving node with faces, and
 //! of each moving edge with edges, by conservative advancement.
 
-use glam::{Vec3, Vec3A};
+mod edges;
+mod faces;
+
+use glam::Vec3;
 
 use super::candidate_pairs::{CandidateFeature, CandidateView};
 use super::clearances::{Clearances, SurfaceFeature};
-use super::collision_surface::{COINCIDENT_DISTANCE, Clearance, CollisionSurface, NONE, NodeMotion};
+use super::collision_surface::{COINCIDENT_DISTANCE, Clearance, CollisionSurface};
 use super::pair_contact::ContactSide;
 use super::wound::Wound;
 use crate::contact::time_of_impact::{Corners, Extent, Segment, Separation};
 use crate::geometry::Aabb;
-
-/// Relative difference below which distances are equal. Faces that share the closest point differ by less. The face
-/// seen most squarely then decides the side of a point.
-const EQUAL_DISTANCE: f32 = 1e-4;
-
-/// Faces of another body are redundant for a corner if their points and directions differ by less than this fraction of
-/// the distance. The closest one suffices. A surface that crumples needs all.
-const SIMILAR: f32 = 0.05;
-
-/// Distance from an edge's end within which edges of two bodies do not touch, as a fraction of the contact distance.
-/// The corner touches faces there. With a quarter, a body that rests on a tip trembles.
-const EDGE_END_MARGIN: f32 = 0.05;
-
-/// Maximum number of faces that a corner touches. With the closest one alone, a corner in a fold would be pushed from
-/// face to face and tremble. With three, so would a tip in a matching hole, where eight triangles meet.
-const MAX_FACES: usize = 8;
-
-/// Maximum number of edges that an edge touches. With the closest one alone, an edge across several would be supported
-/// by each in turn and tremble.
-const MAX_EDGES: usize = 8;
 
 /// A contact with a face or edge: whether it is speculative, the distance at the start, the feature, the separation and
 /// the clearance.
@@ -256,293 +239,6 @@ impl PairSearch<'_> {
         }
     }
 
-    fn nodes_with_faces(
-        &self,
-        search_sides: [SearchSide; 2],
-        mut clearances: Option<&mut Clearances>,
-        visit: &mut impl FnMut(FoundContact),
-    ) {
-        for corner in 0..search_sides[0].surface.nodes.len() {
-            self.node_with_faces(
-                search_sides,
-                corner,
-                FeatureSource::Search,
-                clearances.as_deref_mut(),
-                visit,
-            );
-        }
-    }
-
-    /// Reports the contacts of a corner of the first side with faces of the second. Returns a lower bound of its
-    /// distance at the start, m, and whether it is outside.
-    fn node_with_faces(
-        &self,
-        [corner_side, face_side]: [SearchSide; 2],
-        corner: usize,
-        source: FeatureSource,
-        clearances: Option<&mut Clearances>,
-        visit: &mut impl FnMut(FoundContact),
-    ) -> (f32, bool) {
-        let shift = shift(corner_side.surface, face_side.surface);
-        let node = corner_side.surface.nodes[corner];
-        let NodeMotion {
-            start: position,
-            displacement,
-        } = corner_side
-            .surface
-            .relative_motion(node, (shift, face_side.surface.center_velocity), self.dt);
-        let radius = self.contact_radius(clearances.as_deref(), SurfaceFeature::Corner(corner));
-        let segment = Segment {
-            ends: [position; 2],
-            steps: [displacement; 2],
-            radius,
-        };
-        let mut front_distance = f32::INFINITY;
-        let mut closest: [Option<FeatureContact<usize>>; MAX_FACES] = [None; MAX_FACES];
-        // Distance of the nearest face of a closed surface and its height above it, and whether the corner is behind
-        // it.
-        let mut nearest = (f32::INFINITY, 0.0_f32);
-        let mut behind: Option<(usize, Separation)> = None;
-        let around = Aabb::of([position, position + displacement].map(Vec3::from).into_iter());
-        let is_solid = face_side.surface.is_closed && !self.is_self_contact();
-        let depth = self.ejection_depth_in(face_side);
-        // In crushed solids, a face may approach an outside corner with its inner side. Rounding may also put flush
-        // corners behind a face.
-        let flush = corner_side
-            .surface
-            .min_thickness()
-            .min(face_side.surface.min_thickness());
-        let within_behind = if self.may_be_inside { f32::INFINITY } else { flush };
-        let reach = (self.radius + self.speculative_margin).max(depth) + face_side.surface.displacement_spread;
-        let max_distance = match source {
-            FeatureSource::Search => self.contact_reach(),
-            FeatureSource::Listed(_, [_, reach]) => reach,
-        };
-        let comparison = self.comparison_bounds(&segment, max_distance);
-        let anywhere = |_: &Separation| true;
-        let lower_bound = self.visit_near_corner(source, face_side.surface, &around, reach, |triangle| {
-            let nodes = face_side.surface.triangles[triangle];
-            if self.is_self_contact() && (nodes.contains(&node) || face_side.surface.are_in_wound([node; 2], &nodes)) {
-                return f32::INFINITY;
-            }
-            let corners = face_side.surface.corners(&nodes);
-            let (start, distance) = match self.separation(&corners, &segment, &comparison) {
-                Ok(found) => found,
-                Err(lower_bound) => return lower_bound,
-            };
-            if distance > max_distance {
-                return distance;
-            }
-            let height = if is_solid { height_above(&corners, &start) } else { 0.0 };
-            let is_in_front = !(height < 0.0 && distance <= within_behind);
-            if is_in_front {
-                front_distance = front_distance.min(distance);
-            }
-            let is_nearer = distance < nearest.0 * (1.0 - EQUAL_DISTANCE)
-                || distance < nearest.0 * (1.0 + EQUAL_DISTANCE) && height.abs() > nearest.1;
-            if is_solid && is_nearer {
-                nearest = (distance, height.abs());
-                behind = (!is_in_front).then_some((triangle, start));
-            }
-            if self.needs_test([corner_side, face_side], &[node], &nodes)
-                && let Some((found, is_speculative)) = self.first_contact(
-                    face_side.surface,
-                    ([node; 2], &segment),
-                    (&nodes, &corners),
-                    start,
-                    anywhere,
-                )
-            {
-                insert_closest(&mut closest, (is_speculative, distance, triangle, found));
-            }
-            distance
-        });
-        // A corner created inside another body is pushed out by the full thickness. A flush corner touches.
-        let nearest_distance = match behind {
-            Some(_) if self.clearance_update == ClearanceUpdate::Reductions && nearest.0 > flush => f32::INFINITY,
-            Some(_) => 0.0,
-            None => front_distance,
-        };
-        self.update_clearance(clearances, SurfaceFeature::Corner(corner), nearest_distance);
-        // A corner on the wrong side is pushed out, or left alone if it is too deep.
-        let is_behind = behind.is_some();
-        if let Some((triangle, start)) = behind {
-            let is_near = nearest.0 < self.radius.max(depth);
-            closest = [None; MAX_FACES];
-            closest[0] = is_near.then_some((false, nearest.0, triangle, (start, Clearance::of(radius))));
-        }
-        let side_of = |triangle: usize, found: &Separation| ContactSide {
-            body: face_side.body_index,
-            nodes: face_side.surface.triangles[triangle],
-            weights: found.weights,
-        };
-        let position_of = |side: &ContactSide| side.weighted(|node| face_side.surface.start(node));
-        let similar = if self.is_self_contact() {
-            EQUAL_DISTANCE
-        } else {
-            SIMILAR
-        };
-        for slot in 0..MAX_FACES {
-            let Some((is_speculative, _, triangle, (found, clearance))) = closest[slot] else {
-                break;
-            };
-            let side = side_of(triangle, &found);
-            let is_similar = |(_, _, closer, (other, _)): &FeatureContact<usize>| {
-                let max_difference = similar * found.offset.length();
-                (other.offset - found.offset).length() <= max_difference
-                    && position_of(&side_of(*closer, other)).distance(position_of(&side)) <= max_difference
-            };
-            if closest[..slot].iter().flatten().any(is_similar) {
-                continue;
-            }
-            let mut offset = Vec3::from(if is_behind { found.offset } else { -found.offset });
-            if is_solid && offset == Vec3::ZERO {
-                offset = face_normal(&face_side.surface.corners(&side.nodes)).into();
-            }
-            let sides = [ContactSide::of_node(corner_side.body_index, node), side];
-            self.report_contact(sides, (offset, is_speculative), (clearance, shift), visit);
-        }
-        (lower_bound, !is_behind)
-    }
-
-    /// Reports the contacts of an edge of the first side with edges of the second. Returns a lower bound of its
-    /// distance at the start, m.
-    fn edge_with_edges(
-        &self,
-        index: usize,
-        source: FeatureSource,
-        clearances: Option<&mut Clearances>,
-        visit: &mut impl FnMut(FoundContact),
-    ) -> f32 {
-        let [first, second] = self.search_sides;
-        let shift = shift(first.surface, second.surface);
-        let edge = first.surface.edges[index];
-        if first.surface.is_crossing[index] || edge[0] == NONE {
-            return f32::INFINITY;
-        }
-        let curvature = first.surface.edge_curvatures.get(index);
-        let is_measured = self.is_measured(clearances.as_deref(), index);
-        let motions = edge.map(|node| {
-            first
-                .surface
-                .relative_motion(node, (shift, second.surface.center_velocity), self.dt)
-        });
-        let segment = Segment {
-            ends: motions.map(|motion| motion.start),
-            steps: motions.map(|motion| motion.displacement),
-            radius: self.contact_radius(clearances.as_deref(), SurfaceFeature::Edge(index)),
-        };
-        let end_margin = if self.is_self_contact() {
-            0.0
-        } else {
-            EDGE_END_MARGIN * segment.radius
-        };
-        let max_distance = self.edge_reach();
-        let motion = Aabb::of(
-            motions
-                .into_iter()
-                .flat_map(|motion| [motion.start(), (motion.start + motion.displacement).into()]),
-        );
-        let comparison = self.comparison_bounds(&segment, max_distance);
-        let mut lower_bound = f32::INFINITY;
-        let mut nearest = f32::INFINITY;
-        let mut closest: [Option<FeatureContact<[u32; 2]>>; MAX_EDGES] = [None; MAX_EDGES];
-        let mut test_edge = |number: u32| {
-            let Some((other, is_crossing, other_curvature)) = second.surface.edge(number) else {
-                return f32::INFINITY;
-            };
-            // The side of a crossing edge is unknown, so it cannot touch, but its distance counts.
-            let can_touch = !is_crossing && !curvature.is_flat_against(&other_curvature, self.radius);
-            if !can_touch && !is_measured {
-                return f32::INFINITY;
-            }
-            if self.is_self_contact()
-                && (other <= edge
-                    || other.iter().any(|node| edge.contains(node))
-                    || first.surface.are_in_wound(edge, &other))
-            {
-                return f32::INFINITY;
-            }
-            let corners = second.surface.corners(&other);
-            let (start_separation, start_distance) = match self.separation(&corners, &segment, &comparison) {
-                Ok(found) => found,
-                Err(lower_bound) => return lower_bound,
-            };
-            nearest = nearest.min(start_distance);
-            if !can_touch || start_distance > max_distance || !self.edges_need_test(&edge, &other) {
-                return start_distance;
-            }
-            // Near an end of either edge, the corner touches instead.
-            let edges = [segment.ends[1] - segment.ends[0], corners.points[1] - corners.points[0]];
-            let is_across = |found: &Separation| found.is_across_beyond(end_margin, edges);
-            let found = self.first_contact(
-                second.surface,
-                (edge, &segment),
-                (&other, &corners),
-                start_separation,
-                is_across,
-            );
-            if let Some((found, is_speculative)) = found
-                && !closest.iter().flatten().any(|(_, _, edge, _)| *edge == other)
-            {
-                insert_closest(&mut closest, (is_speculative, start_distance, other, found));
-            }
-            start_distance
-        };
-
-        let reach = self.radius + self.speculative_margin + second.surface.displacement_spread;
-        match &second.surface.images {
-            _ if let FeatureSource::Listed(others, accumulated) = source => {
-                lower_bound = visit_listed(others, accumulated.into(), test_edge);
-            }
-            Some(images) if self.uses_images => {
-                // The box of a long edge is mostly empty, so images are searched piece by piece.
-                let [from, to] = segment.ends;
-                let pieces = images.piece_count((to - from).into());
-                for piece in 0..pieces {
-                    let shares = [piece, piece + 1].map(|end| end as f32 / pieces as f32);
-                    let piece_ends = shares
-                        .map(|share| segment.at(share).map(Vec3::from))
-                        .into_iter()
-                        .flatten();
-                    let (surface, around) = (second.surface, Aabb::of(piece_ends));
-                    images.visit_near(surface, &around, reach, |triangle| {
-                        let edges = images.edges_near(surface, triangle, &around, reach);
-                        lower_bound = edges.into_iter().map(&mut test_edge).fold(lower_bound, f32::min);
-                    });
-                }
-            }
-            _ => {
-                let surface = second.surface;
-                surface.visit_near(&motion, reach, |triangle| {
-                    lower_bound = surface
-                        .owned_edges(triangle)
-                        .into_iter()
-                        .map(&mut test_edge)
-                        .fold(lower_bound, f32::min);
-                });
-            }
-        }
-        self.update_clearance(clearances, SurfaceFeature::Edge(index), nearest);
-        for (is_speculative, _, other, (found, clearance)) in closest.into_iter().flatten() {
-            let sides = [
-                ContactSide::of_edge(first.body_index, edge, found.along),
-                ContactSide {
-                    body: second.body_index,
-                    nodes: [other[0], other[1], other[1]],
-                    weights: found.weights,
-                },
-            ];
-            self.report_contact(
-                sides,
-                ((-found.offset).into(), is_speculative),
-                (clearance, shift),
-                visit,
-            );
-        }
-        lower_bound
-    }
-
     /// Returns the distance and bounds within which other features are compared with a segment, m. Distances to other
     /// bodies are useful for later substeps. In self-contact most features move too much for that, so only swept bounds
     /// count.
@@ -579,16 +275,6 @@ impl PairSearch<'_> {
         }
         let start = corners.separation(segment, 0.0);
         Ok((start, start.offset.length()))
-    }
-
-    /// True if the distance of an edge is recorded even if it cannot touch.
-    fn is_measured(&self, clearances: Option<&Clearances>, edge: usize) -> bool {
-        match self.clearance_update {
-            ClearanceUpdate::Nothing => false,
-            ClearanceUpdate::Distances => clearances
-                .is_some_and(|clearances| clearances.allowed_distance(SurfaceFeature::Edge(edge)) < f32::INFINITY),
-            ClearanceUpdate::Reductions => true,
-        }
     }
 
     /// Returns the first contact of a node or edge with a face or edge that satisfies `is_counted`, its clearance, and
@@ -689,17 +375,6 @@ fn insert_closest<Feature: Copy + PartialOrd>(
         closest[slot..].rotate_right(1);
         closest[slot] = Some(met);
     }
-}
-
-/// Returns the height of a point above a face at the start of the substep, m; negative on its inner side.
-fn height_above(face: &Corners, start: &Separation) -> f32 {
-    -start.offset.dot(face_normal(face))
-}
-
-/// Returns the normal of a face at the start of the substep.
-fn face_normal(face: &Corners) -> Vec3A {
-    let [a, b, c] = face.points;
-    (b - a).cross(c - a).normalize_or_zero()
 }
 
 /// Returns the vector that leads from the coordinates of one body to those of another.

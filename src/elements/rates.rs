@@ -9,8 +9,9 @@
 //! with `c = lambda + 2 mu gamma`.
 //!
 //! An element with the deformation R U has the same quadratic form, in `U R^T u_a` instead of `u_a`, and in the
-//! cofactors of U in the volume term. `TetrahedronGroups::forces` computes c for it, with the stress. The stiffness of a node's elements and
-//! springs over its mass bounds the squared frequencies. Pinned corners have no displacement and are left out.
+//! cofactors of U in the volume term. `TetrahedronGroups::forces` computes c for it, with the stress. The stiffness of
+//! a node's elements and springs over its mass bounds the squared frequencies. Pinned corners have no displacement and
+//! are left out.
 //!
 //! Elements stiffen together, and springs do not, so their bounds are kept apart: all elements share a part P of the
 //! springs' bound. Let E be the bound

@@ -24,8 +24,8 @@ use follow::Follower;
 #[doc = include_str!("../doctest/block.txt")]
 /// # let mut world = World::new(WorldDefinition::default())?;
 /// # let body = world.create_body(&block)?;
-/// let skin = EmbeddingDefinition { vertices: &[0.01 * Vec3::ONE], tetrahedra: &mesh.tetrahedra, ..EmbeddingDefinition::default() };
-/// let embedding = world.create_embedding(body, &skin)?;
+/// let skin = EmbeddingDefinition { vertices: &[0.01 * Vec3::ONE], tetrahedra: &mesh.tetrahedra,
+/// ..EmbeddingDefinition::default() }; let embedding = world.create_embedding(body, &skin)?;
 /// assert!(embedding.positions()[0].distance(0.01 * Vec3::ONE) < 1e-6);
 /// # Ok::<(), sinew::Error>(())
 /// ```

@@ -47,8 +47,8 @@ impl PassivityObserver {
         self.by_proxy -= 0.5 * (six::dot(on_proxy[0], displacement) + six::dot(on_proxy[1], displacement));
     }
 
-    /// Updates the energy balance. `work` is the tool's work on the tissue up to the last local model, and `sent_work` the
-    /// proxy's until then.
+    /// Updates the energy balance. `work` is the tool's work on the tissue up to the last local model, and `sent_work`
+    /// the proxy's until then.
     pub fn balance(&mut self, (work, sent_work): (f64, f64), on_proxy: &Vector6, coupling: &Coupling, dt: f64) {
         let on_tissue = work + self.by_proxy - sent_work;
         let stiffness = expanded(coupling.stiffness);
@@ -115,8 +115,8 @@ impl PassivityObserver {
         ((generated / DISSIPATION_TIME.max(dt) + unpaid) / square).min(MAX_DAMPING * coupling.critical)
     }
 
-    /// The fraction of the releasable energy that was never supplied, by the hand's own balance. It counts if the energy would be
-    /// released within the delay.
+    /// The fraction of the releasable energy that was never supplied, by the hand's own balance. It counts if the
+    /// energy would be released within the delay.
     fn unsupplied_share(&self, power: f64, releasable: f64, delay: f64) -> f64 {
         let soon = (power * delay / releasable).min(1.0);
         // A hand that has supplied nothing is moved by the tissue.

@@ -8,11 +8,10 @@
 //! that are stiff now may be soft then. Each repetition assumes further stiffening, as far as the mass bound permits.
 
 use super::System;
-use super::mass_scaling::MIN_MARGIN;
+use super::mass_scaling::{MIN_MARGIN, masses_in_use};
 use super::step_request::StepRequest;
 use super::substep_count::fewer_substeps;
 use super::verlet::begin;
-use crate::soa::NodalMasses;
 use crate::threads::Team;
 
 impl System {
@@ -41,11 +40,7 @@ impl System {
                 }
             });
         }
-        let in_use = NodalMasses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-            are_scaled: scaling.step() > 0.0,
-        };
+        let in_use = masses_in_use(&self.masses, &self.inverse_masses, Some(scaling));
         let rates = self.damping.as_ref().map(|damping| damping.rates());
         scaling.adopt_stiffenings(&*self.forces.springs, &self.masses, rates, |node| {
             self.forces.nodal_stiffness_at_rest(node, in_use.inverse(node))

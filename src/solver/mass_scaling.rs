@@ -15,6 +15,7 @@ use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::def::NodalStiffness;
 use crate::nodes::NodeDamping;
+use crate::soa::NodalMasses;
 use crate::springs::Springs;
 
 /// Mass is added only if it reduces the number of substeps to this fraction.
@@ -109,6 +110,19 @@ impl AddedMass {
             self.stiffness += link.stiffness;
             self.damping += link.damping;
         });
+    }
+}
+
+/// The masses in use, with those that `scaling` has added.
+pub(crate) fn masses_in_use<'a>(
+    masses: &'a [f32],
+    inverse_masses: &'a [f32],
+    scaling: Option<&MassScaling>,
+) -> NodalMasses<'a> {
+    NodalMasses {
+        masses,
+        inverse_masses,
+        are_scaled: scaling.is_some_and(|scaling| scaling.step > 0.0),
     }
 }
 

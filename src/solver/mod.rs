@@ -44,6 +44,7 @@ pub(crate) use energy_removal::remove_kinetic_energy;
 pub(crate) use energy_sums::Energies;
 pub(crate) use gravity::GravityKicks;
 pub(crate) use integrator::{CoupledBody, CoupledStep};
+pub(crate) use mass_scaling::masses_in_use;
 pub(crate) use newton::rest_state;
 pub use newton::{RestStateDefinition, RestStateReport};
 pub(crate) use pair_impulses::SubstepSpan;

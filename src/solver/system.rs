@@ -8,7 +8,7 @@ use super::energy_sums::TileSums;
 use super::integrator::{self, Integrator};
 use super::kick::TileStats;
 use super::leapfrog::Leapfrog;
-use super::mass_scaling::{MassScaleTarget, MassScaling};
+use super::mass_scaling::{MassScaleTarget, MassScaling, masses_in_use};
 use super::pre_kick_velocities::PreKickVelocities;
 use super::sleep::SleepState;
 use super::substep_history::SubstepHistory;
@@ -254,11 +254,7 @@ impl System {
     /// The longest stable substep of elements, terms and cavities at the current positions, s. Infinity if there are
     /// none.
     pub fn non_spring_dt_limit(&mut self, team: &Team) -> f32 {
-        let masses = NodalMasses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-            are_scaled: self.scaling.as_ref().is_some_and(|scaling| scaling.step() > 0.0),
-        };
+        let masses = masses_in_use(&self.masses, &self.inverse_masses, self.scaling.as_deref());
         let positions = self.state.positions();
         self.forces
             .non_spring_dt_limit(positions, &masses, self.forces_current, team)
@@ -267,11 +263,7 @@ impl System {
     /// Tightens the bound of elements, at the newest positions of the step in progress or at the current state. Returns
     /// the longest stable substep of all forces but springs, or `None` if that is already known.
     pub fn tightened_dt_limit(&mut self, is_in_progress: bool, team: &Team) -> Option<f32> {
-        let masses = NodalMasses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-            are_scaled: self.scaling.as_ref().is_some_and(|scaling| scaling.step() > 0.0),
-        };
+        let masses = masses_in_use(&self.masses, &self.inverse_masses, self.scaling.as_deref());
         let positions = if is_in_progress {
             self.state.newest().0
         } else {

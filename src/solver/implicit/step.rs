@@ -73,8 +73,8 @@ pub(super) struct Substep<'a> {
 
 impl Substep<'_> {
     /// Takes the substep. If the second-order formula gains energy, the substep is repeated with first order. As a last
-    /// resort, or if the budget of matrix products is used up, the gain is removed from the velocities. Then tools stop nodes that would
-    /// enter them.
+    /// resort, or if the budget of matrix products is used up, the gain is removed from the velocities. Then tools stop
+    /// nodes that would enter them.
     pub(super) fn step_with_fallbacks(
         self,
         body: &mut System,
