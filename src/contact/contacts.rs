@@ -422,6 +422,14 @@ impl Contacts {
         work.sum()
     }
 
+    /// The speed of the fastest kinematic tool that has touched the body in a step of `dt` seconds, m/s.
+    pub fn fastest_touching(&self, tools: &[ToolPath], dt: f32) -> f32 {
+        let tools = tools.iter().zip(&self.loads).enumerate();
+        let touching = tools
+            .filter(|(index, (_, load))| load.impulse != DVec3::ZERO && self.dynamic_tools.received(*index).is_none());
+        touching.fold(0.0, |fastest: f32, (_, (tool, _))| fastest.max(tool.speed(dt)))
+    }
+
     /// The load on each tool of the step.
     pub fn loads(&self) -> &[ToolLoad] {
         &self.loads

@@ -22,6 +22,9 @@ use crate::solver::step_request::StepRequest;
 /// Longest step near a tool, s.
 pub(super) const MAX_CONTACT_STEP: f64 = 1e-3;
 
+/// Shorter substeps are not divided further because contact has added energy, s.
+const MIN_CONTACT_STEP: f64 = MAX_CONTACT_STEP / 16.0;
+
 /// Budget below which short substeps would have too few products each to be solved.
 const SMALL_BUDGET: u32 = 256;
 
@@ -248,7 +251,8 @@ impl Substep<'_> {
         watch.subtract_from(profile, Stage::Solver);
     }
 
-    /// Stops nodes that would enter a tool. The substep is refused if that adds energy, except as a last resort.
+    /// Stops nodes that would enter a tool. If the equation has foreseen no contact, the substep is refused if that adds
+    /// energy, except as a last resort.
     pub(super) fn resolve_contacts(
         &self,
         body: &mut System,
@@ -257,6 +261,10 @@ impl Substep<'_> {
         is_last_resort: bool,
     ) -> SubstepOutcome {
         let may_accept_long = may_be_long(body, implicit, self.request);
+        let was_foreseen = body
+            .contacts
+            .as_ref()
+            .is_some_and(|contacts| !contacts.multipliers.is_empty());
         let Some(mean_velocities) = &mut implicit.mean_velocities else {
             return SubstepOutcome::Accepted;
         };
@@ -317,19 +325,13 @@ impl Substep<'_> {
             pin.set_held(&mut history.velocity_changes, Vec3::ZERO);
         }
         // In a long substep the loads on moving tools are means of its ends, so that their work is not known.
-        let is_work_known = !self.is_long() || self.request.tools.iter().all(|tool| !tool.moves());
+        let (tools, dt) = (self.request.tools, self.request.dt);
+        let is_work_known = !self.is_long() || contacts.fastest_touching(tools, dt) == 0.0;
         let is_work_known = is_work_known && !body.has_tool_attachments();
-        let gain = if is_work_known {
-            self.contact_gain(body, implicit, before)
-        } else {
+        if !is_work_known || was_foreseen {
             history.energy = None;
-            0.0
-        };
-        if gain > 0.0 {
-            if !is_last_resort && implicit.budget_left > 0 {
-                return SubstepOutcome::EnergyGained;
-            }
-            self.remove_contact_gain(body, implicit, gain);
+        } else if self.has_contact_gain(body, implicit, before) && !is_last_resort && self.step > MIN_CONTACT_STEP {
+            return SubstepOutcome::EnergyGained;
         }
         if self.is_long()
             && let Some(contacts) = &mut body.contacts

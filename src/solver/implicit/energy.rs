@@ -26,8 +26,8 @@ const MAX_CREDIT: f64 = 0.1;
 /// Limit of accumulated gains, as a fraction of the energy: rounding, and gains inherent in the second-order formula.
 const MAX_DEBT: f64 = 2e-4;
 
-/// Limit of a gain by contact with tools in a substep, as a fraction of the energy.
-const MAX_CONTACT_GAIN: f64 = 1e-3;
+/// Limit of accumulated gains by contact with tools, as a fraction of the energy.
+const MAX_CONTACT_DEBT: f64 = 1e-3;
 
 /// Relative error of the displacements by gravity that solved equations may have.
 const SOLVE_TOLERANCE: f64 = 1e-4;
@@ -53,6 +53,7 @@ pub(super) struct EnergyBefore {
     total: EnergyTotals,
     /// Losses that may be recovered (positive) or gains that must be lost again (negative), J.
     credit: f64,
+    contact_credit: f64,
     /// The kinetic energy of the mean velocity, and the work of tools in the step so far, J; 0 far from tools.
     rigid: f64,
     work_of_tools: f64,
@@ -82,15 +83,20 @@ impl Substep<'_> {
         let history = implicit.solution.last(self.is_first);
         let credit = history.credit;
         let pins_move = body.pins.iter().any(|pin| pin.travel != glam::Vec3::ZERO);
-        let (rigid, work_of_tools) = if contact::is_near(body) {
+        let (rigid, work_of_tools, contact_credit) = if contact::is_near(body) {
             let mean = mean_vector(body, newest_velocities(body, self.is_first));
-            (rigid_energy(body, mean), self.work_of_tools(body))
+            (
+                rigid_energy(body, mean),
+                self.work_of_tools(body),
+                history.contact_credit,
+            )
         } else {
-            (0.0, 0.0)
+            (0.0, 0.0, 0.0)
         };
         let before = |total| EnergyBefore {
             total,
             credit,
+            contact_credit,
             rigid,
             work_of_tools,
         };
@@ -144,6 +150,7 @@ impl Substep<'_> {
         let max_credit = if implicit.solution.is_attached { 0.0 } else { MAX_CREDIT };
         let history = implicit.solution.next_mut();
         history.energy = Some(after);
+        history.contact_credit = before.contact_credit;
         history.credit = (available + before.credit - after.energy).min(max_credit * magnitude);
         if history.credit >= -(MAX_DEBT * magnitude + rounding) || is_rounding {
             SubstepOutcome::Accepted
@@ -161,43 +168,31 @@ impl Substep<'_> {
         ROUNDING * (before + after) + roundoff + 2.0 * (roundoff * after).sqrt()
     }
 
-    /// Returns how much contact with tools has raised the energy above that before the substep plus the external work,
-    /// J; 0 if that is within its limit. Contact takes energy away, unless it moves nodes far that the equation did not
-    /// foresee.
-    pub(super) fn contact_gain(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> f64 {
+    /// Returns true if contact with tools has raised the energy above that put in. Contact takes energy away, unless it
+    /// moves nodes far that the equation did not foresee.
+    pub(super) fn has_contact_gain(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> bool {
         let (kinetic, mean) = kinetic_energy(body, false);
         let elastic = implicit.elastic(body, true, 1 - implicit.solution.current_index, self.team);
         let internal = elastic.plus(kinetic);
-        implicit.solution.next_mut().energy = Some(internal);
         let after = internal.plus(rigid_energy(body, mean));
         let work = self.external_work(body, implicit.solution.next(), DVec3::ZERO) + self.work_of_tools(body)
             - before.work_of_tools;
         let available = before.total.energy + before.rigid + work;
         let magnitudes = [before.total.magnitude + before.rigid, after.magnitude + work.abs()];
         // Tissue that a tool meets within the substep takes its speed at once, and forces against that act later.
-        let speeds = self.request.tools.iter().map(|tool| tool.speed(self.request.dt));
-        let fastest = f64::from(speeds.fold(0.0, f32::max));
-        let taken = 0.5 * total_mass(body) * fastest * fastest;
-        let allowed = self.rounding(body, implicit, mean, magnitudes) + MAX_CONTACT_GAIN * magnitudes[1] + taken;
-        let gain = after.energy - available;
-        if gain <= allowed { 0.0 } else { gain }
-    }
-
-    /// Removes the energy that contact with tools has added, as far as velocities have it.
-    pub(super) fn remove_contact_gain(&self, body: &mut System, implicit: &mut Implicit, gain: f64) {
-        let remaining = gain - remove_kinetic_energy(body, gain, true);
-        let (kinetic, mean) = kinetic_energy(body, false);
-        let kinetic = kinetic + rigid_energy(body, mean);
-        if remaining > 0.0 && kinetic > 0.0 {
-            let factor = (1.0 - remaining / kinetic).max(0.0).sqrt() as f32;
-            for axis in body.state.substep().velocities.axes_mut() {
-                axis.iter_mut().for_each(|value| *value *= factor);
-            }
-        }
+        let contacts = body.contacts.as_deref();
+        let fastest = contacts.map_or(0.0, |contacts| {
+            contacts.fastest_touching(self.request.tools, self.request.dt)
+        });
+        let taken = 0.5 * total_mass(body) * f64::from(fastest).powi(2);
+        let rounding = self.rounding(body, implicit, mean, magnitudes);
+        let max_debt = MAX_CONTACT_DEBT * magnitudes[1];
+        let balance = before.contact_credit + available - after.energy;
         let history = implicit.solution.next_mut();
-        history.velocity_changes.clear();
-        (history.step, history.energy, history.credit) = (0.0, None, 0.0);
-        implicit.report.has_converged = false;
+        history.energy = Some(internal);
+        // Unlike `clamp`, this accepts NaN.
+        history.contact_credit = balance.min(MAX_CREDIT * magnitudes[1]).max(-max_debt);
+        balance < -(max_debt + taken + rounding)
     }
 
     /// The work of tools on the body in the step so far, J.

@@ -365,6 +365,7 @@ impl Integrator for Implicit {
             step,
             energy,
             credit,
+            contact_credit,
             contact_forces: _,
         } = history;
         for vectors in [displacements, velocity_changes, remainders] {
@@ -372,7 +373,7 @@ impl Integrator for Implicit {
         }
         hasher.write_floats(&[*step, self.accuracy]);
         let [energy, magnitude] = energy.map_or([f64::NAN; 2], |total| [total.energy, total.magnitude]);
-        hasher.write_doubles(&[energy, magnitude, *credit]);
+        hasher.write_doubles(&[energy, magnitude, *credit, *contact_credit]);
         hasher.write_vectors(history.active_contact_forces().into_iter().flat_map(Vectors::iter));
         hasher.write_u64(u64::from(self.order) << 32 | u64::from(self.budget));
         if let Some(newton) = &self.newton {

@@ -24,11 +24,13 @@ pub(crate) struct History {
     pub(super) energy: Option<EnergyTotals>,
     /// Recent energy loss that may be recovered: the formula conserves a slightly different energy.
     pub credit: f64,
+    /// The same for contact with tools: the energy that was put in and is no longer there, J.
+    pub contact_credit: f64,
     /// Forces by other tissue, if the body can be in contact with it.
     pub(super) contact_forces: Option<ContactForces>,
 }
 
-saved! { History { displacements, velocity_changes, remainders, step, energy, credit, contact_forces } }
+saved! { History { displacements, velocity_changes, remainders, step, energy, credit, contact_credit, contact_forces } }
 
 impl History {
     /// Creates a history for `node_count` nodes, of which `solved_count` have remainders.
@@ -40,6 +42,7 @@ impl History {
             step: 0.0,
             energy: None,
             credit: 0.0,
+            contact_credit: 0.0,
             contact_forces: None,
         })
     }
