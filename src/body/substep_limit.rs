@@ -9,8 +9,8 @@ impl Body {
     pub(crate) fn substep_limit(&self) -> SubstepLimit {
         let system = &self.system;
         let masses = masses_in_use(&system.masses, &system.inverse_masses, system.scaling.as_deref());
-        let positions = self.system.state.positions();
-        let forces = &self.system.forces;
+        let positions = system.state.positions();
+        let forces = &system.forces;
         let spring = Stability::tightest(&*forces.springs, masses, positions);
         let (kind, nodes, count) = forces.tightest(&masses, positions, spring);
         self.limit_at(kind, &nodes[..count])

@@ -6,6 +6,7 @@ use super::collision_surface::CollisionSurface;
 use crate::codec::saved;
 use crate::contact::corner_weights::MAX_FEATURE_NODES;
 use crate::contact::sweep_control::LEVERAGE;
+use crate::contact::time_of_impact::Separation;
 use crate::solver::System;
 
 /// A point on a node, edge or face of a body.
@@ -83,13 +84,17 @@ impl ContactSide {
         }
     }
 
-    /// Returns the side for the point of an edge at the fraction `along`.
-    pub fn of_edge(body: usize, [from, to]: [u32; 2], along: f32) -> Self {
-        Self {
-            body,
-            nodes: [from, to, to],
-            weights: [1.0 - along, along, 0.0],
-        }
+    /// Returns the sides for the closest points of two edges of these bodies.
+    pub fn of_edges(bodies: [usize; 2], edges: [[u32; 2]; 2], separation: &Separation) -> [Self; 2] {
+        let weights = [[1.0 - separation.along, separation.along, 0.0], separation.weights];
+        std::array::from_fn(|side| {
+            let [from, to] = edges[side];
+            Self {
+                body: bodies[side],
+                nodes: [from, to, to],
+                weights: weights[side],
+            }
+        })
     }
 
     /// Returns the feature, without the point on it.

@@ -269,14 +269,7 @@ impl PairSearch<'_> {
                 }
             });
             if let Some((_, other, separation, normal)) = deepest {
-                let sides = [
-                    ContactSide::of_edge(search_side.body_index, edge, separation.along),
-                    ContactSide {
-                        body: search_side.body_index,
-                        nodes: [other[0], other[1], other[1]],
-                        weights: separation.weights,
-                    },
-                ];
+                let sides = ContactSide::of_edges([search_side.body_index; 2], [edge, other], &separation);
                 self.report_contact(sides, (normal, false), (Clearance::of(0.0), Vec3::ZERO), visit);
             }
         }

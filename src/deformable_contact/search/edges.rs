@@ -140,14 +140,7 @@ impl PairSearch<'_> {
         }
         self.update_clearance(clearances, SurfaceFeature::Edge(index), nearest);
         for (is_speculative, _, other, (found, clearance)) in closest.into_iter().flatten() {
-            let sides = [
-                ContactSide::of_edge(first.body_index, edge, found.along),
-                ContactSide {
-                    body: second.body_index,
-                    nodes: [other[0], other[1], other[1]],
-                    weights: found.weights,
-                },
-            ];
+            let sides = ContactSide::of_edges([first, second].map(|side| side.body_index), [edge, other], &found);
             self.report_contact(
                 sides,
                 ((-found.offset).into(), is_speculative),
